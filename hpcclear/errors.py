@@ -1,0 +1,30 @@
+"""Errors a user can mend: one message with key, value, reason and remedy."""
+
+
+class InputError(ValueError):
+    """Bad input; the command line prints the message and exits with code 2.
+
+    Parameters
+    ----------
+    key : str
+        Where the value stands: a dotted scene path, an option, or a file.
+    value : object
+        What was found there.
+    reason : str
+        Why it cannot be used.
+    remedy : str
+        What to write instead.
+    """
+
+    def __init__(self, key: str, value: object, reason: str, remedy: str) -> None:
+        self.key = key
+        self.value = value
+        self.reason = reason
+        self.remedy = remedy
+        super().__init__(key, value, reason, remedy)  # args, so that pickling keeps all four
+
+    def __str__(self) -> str:
+        shown = repr(self.value)
+        if len(shown) > 80:
+            shown = shown[:77] + "..."
+        return f"{self.key} = {shown}: {self.reason}. {self.remedy}"

@@ -1,0 +1,87 @@
+"""How a simulation ended: one code a sample, each with a message and a remedy, and the record it fills.
+
+A failed simulation is an outcome, not an exception: its numbers are NaN and its status says why.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+JOINTS = ("crank_rod", "rod_slider")
+"""Joint labels in every dataset: O12 and O23 of the paper."""
+
+
+class Status(IntEnum):
+    """Outcome of one simulation; `OK` is the only one whose numbers are not NaN."""
+
+    OK = 0
+    STEP_CAP = 1
+    STEP_TOO_SMALL = 2
+    NOT_FINITE = 3
+    STALLED = 4
+
+    @property
+    def message(self) -> str:
+        """What happened, in one sentence."""
+        return _TEXT[self][0]
+
+    @property
+    def remedy(self) -> str:
+        """What to change, in one sentence."""
+        return _TEXT[self][1]
+
+
+_TEXT = {
+    Status.OK: ("finished", "nothing to do"),
+    Status.STEP_CAP: (
+        "numerics.max_steps was reached before the last revolution ended",
+        "raise numerics.max_steps or loosen numerics.rtol",
+    ),
+    Status.STEP_TOO_SMALL: (
+        "the step size fell below the resolution of the time",
+        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range",
+    ),
+    Status.NOT_FINITE: (
+        "the state became infinite or undefined",
+        "check masses, stiffness and clearance of this sample",
+    ),
+    Status.STALLED: (
+        "the crank stopped before it had turned the revolutions asked for",
+        "raise the drive torque, the initial speed or the flywheel inertia",
+    ),
+}
+
+
+class Flag(IntEnum):
+    """Bits of `flags`: the result is valid, but read it with care."""
+
+    LATCHED = 1  # a joint stayed in contact for whole revolutions with a frozen impact speed
+    BEYOND_HERTZ = 2  # penetration beyond the range of Hertz theory
+    STIFF = 4  # the implicit method was used for part of the run
+
+
+OUTCOME = np.dtype(
+    [
+        ("sample", np.int64),  # index in the design; -1 never leaves the evaluator
+        ("objective", np.float64),  # m, eq. 13
+        ("objective_spread", np.float64),  # m, standard deviation between averaged revolutions
+        ("objective_uncertainty", np.float64),  # m, scatter over kicked copies; NaN unless asked for
+        ("mean_gap", np.float64, 2),  # m, time mean of | |e| - c | at each joint
+        ("peak_contact_force", np.float64, 2),  # N, at each joint over the averaged revolutions
+        ("latched", np.int8, 2),
+        ("rhs_evaluations", np.int64),
+        ("status", np.int8),
+        ("flags", np.int8),
+    ]
+)
+"""The record of one finished sample, as it travels over ranks and into datasets."""
+
+
+def failed(sample: int, status: Status, rhs_evaluations: int = 0) -> np.ndarray:
+    """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of `OUTCOME`)."""
+    record = np.zeros(1, OUTCOME)
+    for name in OUTCOME.names or ():
+        if OUTCOME[name].base.kind == "f":
+            record[name] = np.nan
+    record["sample"], record["status"], record["rhs_evaluations"] = sample, status, rhs_evaluations
+    return record
