@@ -1,0 +1,281 @@
+"""The building blocks of scene models: strict frozen tables, quantities with a unit and bounds, counts, curves."""
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    model_validator,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from hpcclear.scene.units import UnitError, to_si
+
+LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
+LONGEST_CURVE = 10_000
+
+
+def problem(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
+    """An error for validators: `key` is relative to the table that is validated; `...` means "look it up"."""
+    return PydanticCustomError(
+        "scene",
+        "{reason}. {remedy}",
+        {"reason": reason, "remedy": remedy, "key": key, "value": value},
+    )
+
+
+def nearest(word: str, words: Sequence[str]) -> str:
+    """A sentence that points to the nearest of `words`, or lists them."""
+    close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)
+    if close:
+        return f"Did you mean {close[0]!r}?"
+    return "Use one of: " + ", ".join(words) if words else "Remove it"
+
+
+class Table(BaseModel):
+    """A table of the scene file: frozen, and closed against unknown keys."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    """Keys that a user might expect here and that belong to another kind: reason and remedy."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if isinstance(data, Table):
+            return data
+        if not isinstance(data, Mapping):
+            raise problem("a table is expected here", "Write it as [table] or { key = value }")
+        known = tuple(cls.model_fields)
+        for key in data:
+            if not isinstance(key, str):
+                raise problem("keys are strings", "Write the key as text", key=repr(key))
+            if key not in known:
+                reason, remedy = cls.elsewhere.get(key, ("is not a known key", nearest(key, known)))
+                raise problem(reason, remedy, key=key)
+        return data
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A finite float in an SI unit, given as a number or as a string with a unit; open or closed bounds."""
+
+    unit: str = ""
+    above: float | None = None
+    below: float | None = None
+    least: float | None = None
+    most: float | None = None
+    why: str = ""
+
+    def convert(self, value: Any) -> float:
+        """The value in SI; raises PydanticCustomError."""
+        number = self.number(value)
+        if (
+            (self.above is not None and not number > self.above)
+            or (self.least is not None and not number >= self.least)
+            or (self.below is not None and not number < self.below)
+            or (self.most is not None and not number <= self.most)
+        ):
+            raise problem(
+                f"must be {self.bounds()}" + (f": {self.why}" if self.why else ""), self._remedy()
+            )
+        return number
+
+    def number(self, value: Any) -> float:
+        """The value in SI, finite, bounds not looked at."""
+        if isinstance(value, str):
+            try:
+                value = to_si(value, self.unit)
+            except UnitError as error:
+                raise problem(error.reason, error.remedy[0].upper() + error.remedy[1:]) from None
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise problem("a number is expected here", self._remedy())
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise problem("the number must be finite", self._remedy())
+        return number
+
+    def bounds(self) -> str:
+        """The bounds in words."""
+        parts = [
+            f"{word} {bound:g}"
+            for word, bound in (
+                ("above", self.above),
+                ("at least", self.least),
+                ("below", self.below),
+                ("at most", self.most),
+            )
+            if bound is not None
+        ]
+        return " and ".join(parts) + (f" {self.unit}" if self.unit else "")
+
+    def _remedy(self) -> str:
+        limits = self.bounds() if self.bounds().strip() != self.unit else ""
+        unit = f" in {self.unit}" if self.unit and not limits else ""
+        return f"Write a number{unit}{' ' if limits else ''}{limits}"
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.convert)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        number: dict[str, Any] = {"type": "number"}
+        for name, bound in (
+            ("exclusiveMinimum", self.above),
+            ("exclusiveMaximum", self.below),
+            ("minimum", self.least),
+            ("maximum", self.most),
+        ):
+            if bound is not None:
+                number[name] = bound
+        if not self.unit:
+            return number
+        text = {"type": "string", "description": f"a number with a unit of {self.unit}"}
+        return {"anyOf": [number, text], "description": f"in {self.unit}, or a string with a unit"}
+
+
+@dataclass(frozen=True)
+class Count:
+    """A whole number within closed bounds, or one word in its place."""
+
+    least: int = 0
+    most: int = LARGEST_COUNT
+    word: str | None = None
+
+    def convert(self, value: Any) -> int | str:
+        """The value; raises PydanticCustomError."""
+        if self.word is not None and value == self.word:
+            return self.word
+        remedy = f"Write a whole number from {self.least} to {self.most}" + (
+            f', or "{self.word}"' if self.word else ""
+        )
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise problem("a whole number is expected here", remedy)
+        if not self.least <= value <= self.most:
+            raise problem(f"must be from {self.least} to {self.most}", remedy)
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.convert)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        number = {"type": "integer", "minimum": self.least, "maximum": self.most}
+        return number if self.word is None else {"anyOf": [number, {"const": self.word}]}
+
+
+Curve = float | tuple[tuple[float, float], ...]
+"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn, linear between."""
+
+
+@dataclass(frozen=True)
+class CurveOf:
+    """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit."""
+
+    unit: str
+
+    def convert(self, value: Any) -> Curve:
+        """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
+        if not isinstance(value, (list, tuple)):
+            return Quantity(self.unit).convert(value)
+        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...] over one turn"
+        if not 2 <= len(value) <= LONGEST_CURVE:
+            raise problem(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
+        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
+            raise problem("every row of a table is a pair [angle, value]", remedy)
+        angle, height = Quantity("rad"), Quantity(self.unit)
+        pairs = tuple((angle.convert(row[0]), height.convert(row[1])) for row in value)
+        if any(second[0] <= first[0] for first, second in zip(pairs, pairs[1:], strict=False)):
+            raise problem(
+                "the crank angles must rise from row to row",
+                "Sort the rows by angle, each angle once",
+            )
+        span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi
+        if span > turn * (1 + 1e-12):
+            raise problem(
+                "the table is longer than one turn", "Give one turn (2 pi rad, 360 deg); it repeats"
+            )
+        if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
+            raise problem(
+                "the curve repeats every turn, but its last value differs from its first",
+                "Make both equal, or leave the last row out",
+            )
+        return pairs
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.convert)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        entry = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+        pair = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
+        table = {"type": "array", "items": pair, "minItems": 2, "maxItems": LONGEST_CURVE}
+        return {
+            "anyOf": [*entry["anyOf"], table],
+            "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
+        }
+
+
+@dataclass(frozen=True)
+class NamedRows:
+    """A table of named rows, kept in file order as a tuple, because a dict would not be frozen."""
+
+    def rows(self, value: Any) -> Any:
+        """``{name: {...}}`` as ``[{"name": name, ...}]``."""
+        if isinstance(value, Mapping):
+            rows: list[Any] = []
+            for name, row in value.items():
+                if not isinstance(row, Mapping):
+                    raise problem(
+                        "a table is expected here", "Write it as { key = value }", key=str(name)
+                    )
+                if "name" in row:
+                    raise problem(
+                        "the name is the key of this table", "Remove it", key=f"{name}.name"
+                    )
+                rows.append({"name": name, **row})
+            return rows
+        if isinstance(value, tuple):
+            return value
+        raise problem("a table is expected here", "Write it as [table] or { key = value }")
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.rows, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "object", "additionalProperties": handler(schema)["items"]}
+
+
+Length = Annotated[float, Quantity("m")]
+PositiveLength = Annotated[float, Quantity("m", above=0)]
+Mass = Annotated[float, Quantity("kg", above=0)]
+Inertia = Annotated[float, Quantity("kg*m**2", above=0)]
+Speed = Annotated[float, Quantity("m/s", above=0)]
+Fraction = Annotated[float, Quantity("", above=0, below=1)]

@@ -1,0 +1,81 @@
+"""Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or replace one."""
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from hpcclear.scene.fields import CurveOf, Quantity
+from hpcclear.scene.models import Drive, Effects, Joints, Mechanism
+
+PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
+"""The tables whose numbers describe the mechanism and what acts on it."""
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """An annotation and everything inside it: metadata, members of unions."""
+    yield annotation
+    for part in get_args(annotation):
+        if not isinstance(part, (str, int, float)):
+            yield from _parts(part)
+
+
+def _quantity(field: FieldInfo) -> Quantity | None:
+    """The quantity a field holds when it holds a single number."""
+    if str(field.annotation).startswith("tuple"):
+        return None
+    for part in (*field.metadata, *_parts(field.annotation)):
+        if isinstance(part, Quantity):
+            return part
+        if isinstance(part, CurveOf):
+            return Quantity(part.unit)
+    return None
+
+
+def _entries(annotation: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
+    for model in _parts(annotation):
+        if not (isinstance(model, type) and issubclass(model, BaseModel)):
+            continue
+        for name, field in model.model_fields.items():
+            path, quantity = f"{prefix}.{name}", _quantity(field)
+            if quantity is not None:
+                yield path, quantity
+            else:
+                yield from _entries(field.annotation, path)
+
+
+@lru_cache(maxsize=1)
+def quantities() -> Mapping[str, Quantity]:
+    """Every path of a physical number that some scene may have, with its unit and bounds."""
+    return {
+        path: quantity for top, model in PHYSICAL.items() for path, quantity in _entries(model, top)
+    }
+
+
+def replace(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
+
+    What is not a table on the way to it is replaced by one; the model then says what is wrong with that.
+    """
+    head, _, rest = path.partition(".")
+    copy = dict(content)
+    if rest:
+        inner = copy.get(head)
+        copy[head] = replace(inner if isinstance(inner, Mapping) else {}, rest, value)
+    elif value is None:
+        copy.pop(head, None)
+    else:
+        copy[head] = value
+    return copy
+
+
+def flatten(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values of nested tables, in order."""
+    for key, value in content.items():
+        path = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            yield from flatten(value, f"{path}.")
+        else:
+            yield path, value
