@@ -1,0 +1,1 @@
+"""Surrogates of an expensive function: response surfaces, Kriging, and their accuracy."""
