@@ -1,0 +1,229 @@
+"""Compiled sums of squared-exponential kernels: Kriging means at points, and their moments over tensor rules.
+
+Everything runs along the training points, the one long dimension, so that a design's result does
+not depend on which other designs are in the batch. Numba has no vectorised exponential of its own;
+the polynomial one below lets LLVM keep these loops in vector registers.
+"""
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+REORDER = {"contract", "reassoc", "nsz", "arcp"}
+"""Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
+
+STEEPEST = 300.0
+"""Exponents are cut here (exp(-300) = 5e-131), which keeps products of a few factors out of the slow denormals."""
+
+LANES = 8
+"""Training points are padded to a multiple of this with weightless ones, so that no loop has a tail."""
+
+
+@intrinsic
+def _bits_as_float(typingctx, bits):  # type: ignore[no-untyped-def]
+    """The float64 with these 64 bits."""
+
+    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.bitcast(args[0], ir.DoubleType())
+
+    return types.float64(types.int64), codegen
+
+
+@intrinsic
+def _float_as_bits(typingctx, value):  # type: ignore[no-untyped-def]
+    """The 64 bits of a float64."""
+
+    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return builder.bitcast(args[0], ir.IntType(64))
+
+    return types.int64(types.float64), codegen
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def gaussian(square: float) -> float:
+    """exp(-square / 2) for square >= 0, to 2e-16 relative, branch-free so that loops over it vectorise.
+
+    Range reduction to |r| <= ln(2)/2 and a Taylor polynomial of degree 13; the power of two is put
+    together from its bits. Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits.
+    """
+    x = -min(0.5 * square, STEEPEST)
+    shifted = x * 1.4426950408889634 + 6755399441055744.0
+    power = shifted - 6755399441055744.0
+    r = x - power * 0.6931471803691238
+    r = r - power * 1.9082149292705877e-10
+    p = 1.6059043836821613e-10
+    p = p * r + 2.08767569878681e-09
+    p = p * r + 2.505210838544172e-08
+    p = p * r + 2.755731922398589e-07
+    p = p * r + 2.7557319223985893e-06
+    p = p * r + 2.48015873015873e-05
+    p = p * r + 0.0001984126984126984
+    p = p * r + 0.001388888888888889
+    p = p * r + 0.008333333333333333
+    p = p * r + 0.041666666666666664
+    p = p * r + 0.16666666666666666
+    p = p * r + 0.5
+    p = p * r + 1.0
+    p = p * r + 1.0
+    return p * _bits_as_float((_float_as_bits(shifted) + 1023) << 52)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
+    """Fill `row` with the kernel between one place and every training point, over the inputs `dims`."""
+    count = row.size
+    row[:] = 0.0
+    for k in range(dims.size):
+        place = coordinates[k] / lengths[dims[k]]
+        inputs = scaled[dims[k]]
+        for i in range(count):
+            step = place - inputs[i]
+            row[i] += step * step
+    for i in range(count):
+        row[i] = gaussian(row[i])
+
+
+@njit(cache=True, error_model="numpy", fastmath=REORDER)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
+    """Kriging means ``level + sum_i weights_i k(x, x_i)``.
+
+    Parameters
+    ----------
+    unit : (n, d) array
+        Places in the unit cube.
+    scaled : (d, p) array
+        Training points in the unit cube over `lengths`, padded (`pad`).
+    lengths : (d,) array
+        Length scales in the unit cube.
+    weights : (p,) array
+        Weights of the training points in the units of the answer.
+    level : float
+        What is added to the sum.
+
+    Returns
+    -------
+    (n,) array
+    """
+    dims = np.arange(lengths.size)
+    row = np.empty(weights.size)
+    out = np.empty(unit.shape[0])
+    for j in range(unit.shape[0]):
+        _kernel_row(scaled, lengths, dims, unit[j], row)
+        out[j] = level + _dot(weights, row)
+    return out
+
+
+def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Training points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)`` with p a multiple of `LANES`."""
+    count, dims = points.shape
+    padded = -(-count // LANES) * LANES
+    transposed, filled = np.zeros((dims, padded)), np.zeros(padded)
+    transposed[:, :count], filled[:count] = points.T, weights
+    return transposed, filled
+
+
+@njit(cache=True, error_model="numpy", fastmath=REORDER)
+def _four_dots(table, first, row, out):  # type: ignore[no-untyped-def]
+    """``out[k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    t0, t1, t2, t3 = table[first], table[first + 1], table[first + 2], table[first + 3]
+    for i in range(row.size):
+        a += t0[i] * row[i]
+        b += t1[i] * row[i]
+        c += t2[i] * row[i]
+        d += t3[i] * row[i]
+    out[0], out[1], out[2], out[3] = a, b, c, d
+
+
+@njit(cache=True, error_model="numpy")
+def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
+    """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
+    mean, variance = 0.0, 0.0
+    for k in range(values.size):
+        mean += weights[k] * values[k]
+    for k in range(values.size):
+        variance += weights[k] * (values[k] - mean) ** 2
+    return mean, variance
+
+
+@njit(cache=True, error_model="numpy")
+def tensor_moments(  # type: ignore[no-untyped-def]
+    places, shares, counts, starts, dims, steady, steady_shares, scaled, lengths
+):
+    """Mean and variance of ``sum_i weights_i k(x, x_i)`` over tensor rules, one rule a design.
+
+    The kernel is a product over groups of inputs, so a rule of N1 x N2 x ... nodes needs only
+    N1 + N2 + ... kernel rows; the tensor is formed by multiplying rows and ends in dot products.
+    What does not move with the design comes ready-made in `steady`.
+
+    Parameters
+    ----------
+    places : (n, r) array
+        In the unit cube: for each group, for each of its nodes, the group's coordinates.
+    shares : (n, s) array
+        Probability of each node of each group; each group's add up to 1.
+    counts : (g,) array of int
+        Nodes of each group (their sum is s).
+    starts, dims : (g + 1,) and (starts[-1],) arrays of int
+        Group k holds the inputs ``dims[starts[k] : starts[k + 1]]``.
+    steady : (q, p) array
+        Weights of the training points times the kernel rows of the q steady nodes, q a multiple of 4.
+    steady_shares : (q,) array
+        Their probabilities (0 for padding).
+    scaled, lengths
+        As in `kernel_sum`.
+
+    Returns
+    -------
+    (n, 2) array
+        Mean and variance.
+    """
+    groups, size, still = counts.size, scaled.shape[1], steady.shape[0]
+    table, stack = np.empty((counts.sum(), size)), np.empty((groups, size))
+    digits, first = np.zeros(groups, np.int64), np.zeros(groups + 1, np.int64)
+    first[1:] = np.cumsum(counts)
+    total = 1
+    for k in range(groups):
+        total *= counts[k]
+    chance = np.empty(groups)
+    values, weights = np.empty(total * still), np.empty(total * still)
+    out = np.empty((places.shape[0], 2))
+    for j in range(places.shape[0]):
+        at = 0
+        for k in range(groups):
+            width = starts[k + 1] - starts[k]
+            for node in range(first[k], first[k + 1]):
+                inputs = dims[starts[k] : starts[k + 1]]
+                _kernel_row(scaled, lengths, inputs, places[j, at : at + width], table[node])
+                at += width
+        digits[:] = 0
+        changed = 0
+        for node in range(total):
+            for k in range(changed, groups):
+                line = first[k] + digits[k]
+                if k == 0:
+                    stack[0] = table[line]
+                    chance[0] = shares[j, line]
+                else:
+                    stack[k] = stack[k - 1] * table[line]
+                    chance[k] = chance[k - 1] * shares[j, line]
+            for q in range(0, still, 4):
+                _four_dots(steady, q, stack[groups - 1], values[node * still + q :])
+            for q in range(still):
+                weights[node * still + q] = chance[groups - 1] * steady_shares[q]
+            changed = groups - 1
+            while changed > 0 and digits[changed] == counts[changed] - 1:
+                digits[changed] = 0
+                changed -= 1
+            digits[changed] += 1
+        out[j] = _weighted_moments(values, weights)
+    return out
