@@ -146,6 +146,12 @@ def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> NDArray[np.floa
     return residual / np.where(remaining > ROUNDING, remaining, np.nan)
 
 
+def check_confidence(confidence: float) -> None:
+    """Refuse a confidence that is not in (0, 1)."""
+    if not 0.0 < confidence < 1.0:
+        raise InputError("confidence", confidence, "not a probability", "take 0.99, for example")
+
+
 def _pair(first: ArrayLike, second: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Two equally long vectors; the second must be finite."""
     a, b = np.asarray(first, float), np.asarray(second, float)

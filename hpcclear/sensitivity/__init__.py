@@ -1,0 +1,36 @@
+"""Sensitivity of a function to its inputs: derivatives at a point, their trust, global indices."""
+
+from hpcclear.sensitivity.convergence import (
+    ConvergenceIntervals,
+    best_estimates,
+    convergence_intervals,
+)
+from hpcclear.sensitivity.intervals import (
+    IntervalDesign,
+    IntervalSettings,
+    SensitivityHistory,
+    analyse_intervals,
+    design_intervals,
+    sensitivity_history,
+)
+from hpcclear.sensitivity.selection import Influence, Selection, select_influential
+from hpcclear.sensitivity.sobol import SobolIndices, analyse_sobol, sobol_design, sobol_indices
+
+__all__ = [
+    "ConvergenceIntervals",
+    "Influence",
+    "IntervalDesign",
+    "IntervalSettings",
+    "Selection",
+    "SensitivityHistory",
+    "SobolIndices",
+    "analyse_intervals",
+    "analyse_sobol",
+    "best_estimates",
+    "convergence_intervals",
+    "design_intervals",
+    "select_influential",
+    "sensitivity_history",
+    "sobol_design",
+    "sobol_indices",
+]
