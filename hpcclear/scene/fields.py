@@ -1,6 +1,7 @@
 """The building blocks of scene models: strict frozen tables, quantities with a unit and bounds, counts, curves."""
 
 import difflib
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -205,7 +206,7 @@ class CurveOf:
             raise problem("every row of a table is a pair [angle, value]", remedy)
         angle, height = Quantity("rad"), Quantity(self.unit)
         pairs = tuple((angle.convert(row[0]), height.convert(row[1])) for row in value)
-        if any(second[0] <= first[0] for first, second in zip(pairs, pairs[1:], strict=False)):
+        if any(second[0] <= first[0] for first, second in itertools.pairwise(pairs)):
             raise problem(
                 "the crank angles must rise from row to row",
                 "Sort the rows by angle, each angle once",

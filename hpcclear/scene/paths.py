@@ -7,8 +7,9 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import CurveOf, Quantity
-from hpcclear.scene.models import Drive, Effects, Joints, Mechanism
+from hpcclear.scene.models import Drive, Joints, Mechanism
 
 PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
 """The tables whose numbers describe the mechanism and what acts on it."""

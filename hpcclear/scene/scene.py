@@ -5,23 +5,18 @@ import json
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.errors import InputError
-from hpcclear.scene.fields import Table, nearest, problem
-from hpcclear.scene.models import (
-    ClearanceJoint,
-    Drive,
-    Effects,
-    Joints,
-    Mechanism,
-    Numerics,
-    Output,
-)
-from hpcclear.scene.paths import PHYSICAL, flatten, quantities
+from hpcclear.scene import describing, domain
+from hpcclear.scene.effects import Effects
+from hpcclear.scene.fields import NamedRows, Table, nearest, problem
+from hpcclear.scene.models import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.numerics import Numerics, Output
+from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.study import Study
+from hpcclear.scene.variables import PAPER_PATHS
 from hpcclear.scene.writing import to_toml
-
-FORMAT_VERSION = 1
 
 
 class Scene(Table):
@@ -37,8 +32,33 @@ class Scene(Table):
     effects: Effects = Effects()
     numerics: Numerics = Numerics()
     output: Output = Output()
+    study: Study | None = None
 
     _text: str = PrivateAttr("")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _clearance_of_open_joints(cls, data: Any) -> Any:
+        """Without a path of its own, C drives the clearances there are."""
+        try:
+            ideal = [
+                name
+                for name in ("crank_rod", "rod_slider")
+                if data["joints"][name]["kind"] == "ideal"
+            ]
+            tables = {
+                key: data["study"][key] for key in ("variables", "random") if key in data["study"]
+            }
+        except (KeyError, TypeError):
+            return data  # the models below say what is wrong with it
+        if len(ideal) != 1:
+            return data
+        paths = [path for path in PAPER_PATHS["C"] if f".{ideal[0]}." not in path]
+        for key, table in tables.items():
+            row = table.get("C") if isinstance(table, Mapping) else None
+            if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
+                data = replace(data, f"study.{key}.C", {**row, "paths": paths})
+        return data
 
     @model_validator(mode="after")
     def _effects_fit_joints(self) -> "Scene":
@@ -46,7 +66,7 @@ class Scene(Table):
         if clearance and self.effects.contact is None:
             raise problem(
                 "a clearance joint needs a contact law",
-                'Add [effects.contact] with law = "lankarani-nikravesh" and restitution = 0.9, or make both joints ideal',
+                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, or make both joints ideal',
                 key="effects.contact",
                 value=None,
             )
@@ -59,6 +79,59 @@ class Scene(Table):
             )
         return self
 
+    @model_validator(mode="after")
+    def _study_fits_mechanism(self) -> "Scene":
+        if self.study is None:
+            return self
+        numbers = self._numbers()
+        for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
+            for row in rows:
+                for path in row.paths:
+                    if path not in numbers:
+                        raise problem(
+                            f"drives {path}, and this scene has no number there",
+                            "Give that entry a value first, or remove the variable",
+                            key=f"study.{table}.{row.name}",
+                        )
+        self._check_corners()
+        try:
+            domain.box(self, widen=tuple(row.name for row in self.study.random))
+        except InputError as error:
+            raise problem(error.reason, error.remedy, error.key, error.value) from None
+        return self
+
+    def _check_corners(self) -> None:
+        """Each bound of each variable, widened by its random half-width, must still make a mechanism."""
+        assert self.study is not None
+        content = {name: _plain(getattr(self, name)) for name in (*PHYSICAL, "numerics")}
+        reach = {row.name: 0.0 if row.absolute else row.reach for row in self.study.random}
+        spans = {
+            variable.name: ("variables", variable.paths, variable.range)
+            for variable in self.study.variables
+            if variable.range is not None
+        }
+        for row in self.study.random:
+            if row.name not in self.study.names:
+                centre = self.number(row.paths[0]) if row.centre is None else row.centre
+                reach[row.name] = row.reach
+                spans[row.name] = ("random", row.paths, (centre, centre))
+        for name, (table, paths, (lower, upper)) in spans.items():
+            width = reach.get(name, 0.0)
+            for value in (lower - width, upper + width):
+                corner: Mapping[str, Any] = content
+                for path in paths:
+                    corner = replace(corner, path, value)
+                try:
+                    Scene.model_validate(corner)
+                except ValidationError as error:
+                    context = error.errors(include_url=False)[0].get("ctx", {})
+                    raise problem(
+                        f"reaches {name} = {value:g}, which makes no mechanism: "
+                        + context.get("reason", "it is not valid"),
+                        "Narrow the range" + (" or the distribution" if width else ""),
+                        key=f"study.{table}.{name}",
+                    ) from None
+
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23."""
         return tuple(
@@ -68,8 +141,17 @@ class Scene(Table):
         )
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed and still deserves a look, a sentence each."""
+        return tuple(describing.warnings(self))
+
+    def effects_on(self) -> tuple[str, ...]:
+        """What is on, in words, one entry an effect."""
+        return tuple(describing.effects_on(self))
+
+    @property
     def text(self) -> str:
-        """The TOML text this scene came from, overrides added as comments."""
+        """The TOML text this scene came from, after a comment line for each change made to it."""
         return self._text
 
     @property
@@ -148,12 +230,15 @@ class Scene(Table):
 
 def _plain(value: Any) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
-    if isinstance(value, Table):
-        entries = {name: _plain(getattr(value, name)) for name in type(value).model_fields}
-        return {name: entry for name, entry in entries.items() if entry is not None}
     if isinstance(value, tuple):
-        rows = [_plain(item) for item in value]
-        if rows and all(isinstance(row, dict) for row in rows):
-            return {row.pop("name"): row for row in rows}
-        return rows
-    return value
+        return [_plain(item) for item in value]
+    if not isinstance(value, Table):
+        return value
+    content = {}
+    for name, field in type(value).model_fields.items():
+        entry = _plain(getattr(value, name))
+        if any(isinstance(part, NamedRows) for part in field.metadata):
+            entry = {row.pop("name"): row for row in entry}
+        if entry is not None:
+            content[name] = entry
+    return content

@@ -1,0 +1,79 @@
+"""A scene in words: the effects that are on, what deserves a look, and how two scenes differ."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from hpcclear.scene.models import ClearanceJoint, TorqueDrive
+from hpcclear.scene.paths import flatten
+
+if TYPE_CHECKING:
+    from hpcclear.scene.scene import Scene
+
+NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
+
+
+def slender_inertia(mass: float, length: float) -> float:
+    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass would have."""
+    return mass * length**2 / 12
+
+
+def effects_on(scene: "Scene") -> Iterator[str]:
+    """What is on, in words."""
+    for name, label in NAMES.items():
+        joint = getattr(scene.joints, name)
+        if isinstance(joint, ClearanceJoint):
+            yield f"clearance {joint.clearance * 1e3:g} mm in joint {name} ({label})"
+    effects = scene.effects
+    if scene.clearance_joints() and effects.contact is not None:
+        yield f"contact law {effects.contact.law}"
+    if effects.friction.law != "none":
+        yield f"friction {effects.friction.law}, coefficient {effects.friction.coefficient:g}"
+    if isinstance(scene.drive, TorqueDrive):
+        yield "torque-driven crank"
+    if effects.gravity != 0:
+        yield f"gravity {effects.gravity:g} m/s2"
+    if effects.slider_load is not None:
+        shape = "constant" if isinstance(effects.slider_load, float) else "against crank angle"
+        yield f"slider load, {shape}"
+    if effects.guide_friction is not None:
+        yield f"guide friction, coefficient {effects.guide_friction.coefficient:g}"
+    if scene.numerics.formulation == "baumgarte":
+        yield "Lagrange multipliers with Baumgarte feedback"
+    if scene.numerics.energy:
+        yield "energy balance of each sample"
+    if scene.numerics.uncertainty:
+        yield "uncertainty of each sample"
+
+
+def warnings(scene: "Scene") -> Iterator[str]:
+    """What is allowed and still deserves a look."""
+    for name in ("crank", "rod"):
+        link = getattr(scene.mechanism, name)
+        least = slender_inertia(link.mass, link.length)
+        if link.inertia < least * (1 - 1e-12):
+            yield (
+                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is less than a thin uniform rod of that mass and "
+                f"length has ({least:g} kg m2)"
+            )
+        if not 0 <= link.mass_center <= link.length:
+            yield (
+                f"mechanism.{name}.mass_center = {link.mass_center:g} m lies beyond the pins, which are at 0 and "
+                f"{link.length:g} m"
+            )
+    for name in scene.clearance_joints():
+        joint = getattr(scene.joints, name)
+        if sum(part**2 for part in joint.start_eccentricity) > joint.clearance**2 * (1 + 1e-12):
+            yield f"joints.{name}.start_eccentricity lies outside the clearance, so the run starts in contact"
+
+
+def differences(first: "Scene", second: "Scene") -> list[str]:
+    """Dotted keys in which two scenes differ, each with both values; empty when their hashes are equal."""
+    ours, theirs = dict(flatten(first.resolved())), dict(flatten(second.resolved()))
+    lines = [
+        f"{key}: {ours.get(key, '(not set)')!r} -> {theirs.get(key, '(not set)')!r}"
+        for key in {**ours, **theirs}
+        if ours.get(key) != theirs.get(key)
+    ]
+    if not lines and first.hash != second.hash:
+        lines.append("study: the order of variables or random inputs")
+    return lines

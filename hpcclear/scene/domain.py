@@ -1,0 +1,148 @@
+"""The box a study samples: bounds of its variables, widened by the random inputs about them.
+
+Its coordinates are the values themselves (SI), except that an inertia given as a ratio is sampled as
+r = I / (m L^2/12), because its bounds depend on the mass.
+"""
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.errors import InputError
+from hpcclear.scene.study import Study
+from hpcclear.scene.variables import Variable
+
+if TYPE_CHECKING:
+    from hpcclear.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds in sampling coordinates, arrays of shape ``(d,)``, read-only."""
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+
+
+def study_of(scene: "Scene") -> Study:
+    """The study of a scene; InputError if it has none."""
+    if scene.study is None:
+        raise InputError(
+            "study", None, "the scene has no study", "Add [study] and [study.variables]"
+        )
+    return scene.study
+
+
+def box(scene: "Scene", names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
+    """Bounds of some study variables.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    names : sequence of str, optional
+        Study variables, in the order of the columns; all of them by default.
+    widen : iterable of str
+        Random inputs by whose reach the box grows, so that a surrogate trained on it never extrapolates. Those that are
+        absolute, or no variables among `names`, change nothing.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the widened box would hold inertias of 0 or below.
+    """
+    study = study_of(scene)
+    chosen = study.names if names is None else tuple(names)
+    for name in chosen:
+        if name not in study.names:
+            raise InputError(
+                "study.variables", name, "is not a study variable", f"Use {', '.join(study.names)}"
+            )
+    reach = _reaches(study, widen)
+    bounds = [_bounds(scene, study.variable(name), chosen, reach) for name in chosen]
+    lower, upper = (np.array(side, dtype=np.float64) for side in zip(*bounds, strict=True))
+    lower.flags.writeable = upper.flags.writeable = False
+    return Box(chosen, lower, upper)
+
+
+def _reaches(study: Study, widen: Iterable[str]) -> dict[str, float]:
+    """How far each path moves about its design value."""
+    rows = [study.random_input(name) for name in widen]
+    return {path: row.reach for row in rows if not row.absolute for path in row.paths}
+
+
+def _bounds(
+    scene: "Scene", variable: Variable, names: tuple[str, ...], reach: dict[str, float]
+) -> tuple[float, float]:
+    lower, upper = variable.bounds
+    width = reach.get(variable.paths[0], 0.0)
+    if variable.ratio is None:
+        return lower - width, upper + width
+    # The random inputs move I, m and L separately; r = 12 I/(m L^2) is monotonic in each of them and in the design,
+    # so its extremes are at corners.
+    link = variable.paths[0].rpartition(".")[0]
+    masses, lengths = (_span(scene, f"{link}.{part}", names) for part in ("mass", "length"))
+    dm, dl = reach.get(f"{link}.mass", 0.0), reach.get(f"{link}.length", 0.0)
+    ratios = []
+    for mass, length in itertools.product(masses, lengths):
+        unit = mass * length**2 / 12
+        ratios.append((lower * unit - width) / ((mass + dm) * (length + dl) ** 2 / 12))
+        ratios.append((upper * unit + width) / ((mass - dm) * (length - dl) ** 2 / 12))
+    if min(ratios) <= 0:
+        raise InputError(
+            f"study.random.{variable.name}",
+            width,
+            "takes the smallest inertia of the box to 0 or below",
+            f"Narrow it, or raise study.variables.{variable.name}.ratio",
+        )
+    return min(ratios), max(ratios)
+
+
+def _span(scene: "Scene", path: str, names: tuple[str, ...]) -> tuple[float, float]:
+    """Range of the design values at a path: its variable's, if that is among `names`, else the scene's."""
+    for name in names:
+        variable = study_of(scene).variable(name)
+        if path in variable.paths and variable.range is not None:
+            return variable.range
+    value = scene.number(path)
+    return value, value
+
+
+def to_physical(scene: "Scene", names: Sequence[str], coordinates: Array) -> Array:
+    """Sampling coordinates to SI values: ratios become inertias by the mass and length of the same row.
+
+    Both arrays have shape ``(n, d)``, a column a name.
+    """
+    return _scaled(scene, names, coordinates, inverse=False)
+
+
+def to_coordinates(scene: "Scene", names: Sequence[str], values: Array) -> Array:
+    """SI values to sampling coordinates, the inverse of `to_physical`; shapes ``(n, d)``."""
+    return _scaled(scene, names, values, inverse=True)
+
+
+def _scaled(scene: "Scene", names: Sequence[str], columns: Array, inverse: bool) -> Array:
+    study = study_of(scene)
+    result = np.array(columns, dtype=np.float64)
+    owner = {
+        path: column for column, name in enumerate(names) for path in study.variable(name).paths
+    }
+    for column, name in enumerate(names):
+        variable = study.variable(name)
+        if variable.ratio is None:
+            continue
+        link = variable.paths[0].rpartition(".")[0]
+        mass, length = (
+            result[:, owner[path]] if path in owner else scene.number(path)
+            for path in (f"{link}.mass", f"{link}.length")
+        )
+        unit = mass * length**2 / 12
+        result[:, column] = result[:, column] / unit if inverse else result[:, column] * unit
+    return result

@@ -1,0 +1,184 @@
+"""What acts on the mechanism: contact, friction, gravity and loads, as in the scene file."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import model_validator
+
+from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, problem
+
+LATCHED_LAWS = (
+    "lankarani-nikravesh",
+    "flores",
+    "gonthier",
+    "hu-guo",
+    "herbert-mcwhannell",
+    "lee-wang",
+)
+"""Laws whose damping is scaled by the approach speed, latched at each impact."""
+DIVIDING_LAWS = ("flores", "gonthier", "hu-guo")
+"""Of these, the ones whose damping factor divides by the restitution."""
+
+
+class Contact(Table):
+    """Normal contact force of every clearance joint."""
+
+    law: Literal[
+        "hertz",
+        "hunt-crossley",
+        "lankarani-nikravesh",
+        "flores",
+        "gonthier",
+        "hu-guo",
+        "herbert-mcwhannell",
+        "lee-wang",
+    ]
+    restitution: Annotated[float, Quantity("", least=0, most=1)] | None = None
+    """Coefficient of restitution of the laws that latch the impact speed."""
+    damping: Annotated[float, Quantity("s/m", least=0)] | None = None
+    """Fixed damping factor chi of Hunt and Crossley, s/m."""
+    minimum_impact_speed: Speed = 1e-3
+    """Floor of the latched impact speed, m/s."""
+
+    @model_validator(mode="after")
+    def _parameters_fit_law(self) -> "Contact":
+        latched = self.law in LATCHED_LAWS
+        if latched and self.restitution is None:
+            raise problem(
+                f"the law {self.law!r} needs a restitution",
+                "Add restitution = 0.9 or so",
+                key="restitution",
+                value=None,
+            )
+        if not latched and self.restitution is not None:
+            raise problem(
+                f"the law {self.law!r} has no restitution",
+                "Remove it, or set effects.contact as a whole table",
+                key="restitution",
+            )
+        if self.law == "hunt-crossley" and self.damping is None:
+            raise problem(
+                "the law 'hunt-crossley' needs a fixed damping factor",
+                "Add damping = 0.5 (s/m) or so",
+                key="damping",
+                value=None,
+            )
+        if self.law != "hunt-crossley" and self.damping is not None:
+            raise problem(
+                f"the law {self.law!r} has no fixed damping factor",
+                "Remove it, or set effects.contact as a whole table",
+                key="damping",
+            )
+        if self.law in DIVIDING_LAWS and self.restitution == 0:
+            raise problem(
+                f"the damping of {self.law!r} divides by the restitution, so 0 has no meaning",
+                'Use a value above 0, or the law "lankarani-nikravesh"',
+                key="restitution",
+            )
+        return self
+
+    @property
+    def latched(self) -> bool:
+        """Whether the law remembers the approach speed of each impact."""
+        return self.law in LATCHED_LAWS
+
+
+class Friction(Table):
+    """Tangential force of every clearance joint."""
+
+    law: Literal["none", "coulomb", "ambrosio"] = "none"
+    coefficient: Annotated[float, Quantity("", least=0)] | None = None
+    """Coefficient of friction."""
+    ramp_speed: Speed | None = None
+    """Coulomb: sliding speed below which the force falls linearly to 0, m/s (default 0.01)."""
+    speeds: tuple[Annotated[float, Quantity("m/s", least=0)], Speed] | None = None
+    """Ambrosio: no friction below the first speed, full friction above the second, m/s."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_ramp(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and data.get("law") == "coulomb" and "ramp_speed" not in data:
+            return {**data, "ramp_speed": 0.01}
+        return data
+
+    @model_validator(mode="after")
+    def _parameters_fit_law(self) -> "Friction":
+        if self.law == "none":
+            if (
+                self.coefficient is not None
+                or self.ramp_speed is not None
+                or self.speeds is not None
+            ):
+                raise problem(
+                    'the law "none" has no parameters, and a parameter says that friction is meant',
+                    'Set law = "coulomb", or remove the parameters',
+                    key="law",
+                    value="none",
+                )
+            return self
+        if self.coefficient is None:
+            raise problem(
+                f"the law {self.law!r} needs a coefficient",
+                "Add coefficient = 0.01 or so",
+                "coefficient",
+                None,
+            )
+        if self.law == "coulomb" and self.speeds is not None:
+            raise problem(
+                "the law 'coulomb' has one ramp speed",
+                "Write ramp_speed = 0.01 (m/s) instead",
+                "speeds",
+            )
+        if self.law == "ambrosio" and self.ramp_speed is not None:
+            raise problem(
+                "the law 'ambrosio' has two speeds",
+                "Write speeds = [0.001, 0.01] (m/s) instead",
+                "ramp_speed",
+            )
+        if self.law == "ambrosio" and self.speeds is None:
+            raise problem(
+                "the law 'ambrosio' needs two speeds",
+                "Add speeds = [0.001, 0.01] (m/s)",
+                "speeds",
+                None,
+            )
+        if self.speeds is not None and not self.speeds[0] < self.speeds[1]:
+            raise problem(
+                "the first speed must be below the second", "Write them in rising order", "speeds"
+            )
+        return self
+
+
+class GuideFriction(Table):
+    """Coulomb friction between slider and guide."""
+
+    coefficient: Annotated[float, Quantity("", least=0)]
+    """Coefficient of friction."""
+    ramp_speed: Speed = 0.01
+    """Sliding speed below which the force falls linearly to 0, m/s."""
+
+
+class Effects(Table):
+    """What acts on the mechanism; what is off is not computed."""
+
+    contact: Contact | None = None
+    """Normal contact force; needed as soon as a joint has clearance."""
+    friction: Friction = Friction()
+    """Friction in the clearance joints."""
+    gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
+    """m/s2, towards -y; 0 is off."""
+    slider_load: Annotated[Curve, CurveOf("N")] | None = None
+    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or left out is off."""
+    guide_friction: GuideFriction | None = None
+    """Friction of the slider in its guide; left out is off."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _none_is_off(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            return {
+                key: value
+                for key, value in data.items()
+                if not (key in ("slider_load", "guide_friction") and value == "none")
+            }
+        return data

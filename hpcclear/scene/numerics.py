@@ -1,0 +1,52 @@
+"""How a scene is integrated and what is written, as in the scene file."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
+
+
+class Numerics(Table):
+    """How the motion is integrated, and over which revolutions."""
+
+    formulation: Literal["minimal", "baumgarte"] = "minimal"
+    """Minimal coordinates, or Lagrange multipliers with Baumgarte feedback (eq. 11)."""
+    alpha: Annotated[float, Quantity("1/s", least=0)] = 250.0
+    """Baumgarte feedback on constraint speed, 1/s; used by that formulation only."""
+    beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
+    """Baumgarte feedback on constraint position, 1/s; used by that formulation only."""
+    method: Literal["auto", "dormand-prince", "fehlberg", "dormand-prince-853", "radau"] = "auto"
+    """Integrator."""
+    rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
+    """Relative tolerance of a step."""
+    atol: PositiveLength | None = None
+    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled alike (see the manual)."""
+    target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
+    """Relative error of the objective to aim at; chooses tolerance and revolutions in place of the entries here."""
+    transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
+    """Revolutions before the average starts."""
+    averaged_revolutions: Annotated[int | Literal["auto"], Count(1, 10**9, word="auto")] = 5
+    """Revolutions of the average; "auto" goes on until objective_tolerance is met."""
+    objective_tolerance: Annotated[float, Quantity("", above=0, below=1)] = 1e-3
+    """For "auto": relative standard error of the objective at which averaging ends."""
+    max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
+    """For "auto": the cap."""
+    max_steps: Annotated[int, Count(1)] = 10_000_000
+    """Accepted and rejected steps of one sample together; beyond it the sample ends with status STEP_CAP."""
+    uncertainty: Annotated[bool, Field(strict=True)] = False
+    """Whether each sample also reports the scatter of its objective under kicks of 1e-10."""
+    energy: Annotated[bool, Field(strict=True)] = False
+    """Whether each sample also closes its energy balance."""
+
+    @property
+    def absolute_tolerance(self) -> float:
+        """Absolute tolerance on lengths, m."""
+        return self.rtol * 1e-3 if self.atol is None else self.atol
+
+
+class Output(Table):
+    """What `simulate` writes."""
+
+    instants_per_revolution: Annotated[int, Count(0, 10**6)] = 720
+    """Instants a revolution, evenly spaced in crank angle; 0 writes every accepted step."""

@@ -1,0 +1,116 @@
+"""Settings of the study's stages; the defaults are the paper's values where it states them."""
+
+from typing import Annotated, Literal
+
+from hpcclear.scene.fields import Count, Quantity, Table, problem
+
+Names = tuple[str, ...]
+Share = Annotated[float, Quantity("", above=0, below=1)]
+Factor = Annotated[float, Quantity("", least=0, most=4)]
+Accuracy = Annotated[float, Quantity("", most=1)]
+Positive = Annotated[float, Quantity("", above=0)]
+
+
+class Sensitivity(Table):
+    """Response surfaces and first-order sensitivities (the paper's sections 4.2 and 5)."""
+
+    groups: tuple[Names, ...] | None = None
+    """Inputs fitted together; default the paper's pairs, as far as they are study variables."""
+    parameter: str = "C"
+    """The study variable held fixed for each surface."""
+    levels: Annotated[int, Count(1, 1000)] = 8
+    """Values of the parameter, evenly over its range."""
+    samples: Annotated[int, Count(1, 10**6)] = 45
+    """Points a surface is fitted to."""
+    test_samples: Annotated[int, Count(2, 10**6)] = 5
+    """Points it is tested on."""
+    order: Annotated[int, Count(1, 6)] = 3
+    """Order of the polynomial."""
+    together_samples: Annotated[int, Count(1, 10**6)] = 150
+    """Points for the surface in all inputs at once."""
+    together_order: Annotated[int, Count(1, 6)] = 2
+    """Order of that surface."""
+    r2: Accuracy = 0.9
+    """Least 1 - SSE/SST on the test points; below it the sample is raised."""
+    rmae: Positive = 0.3
+    """Largest error on the test points, over their standard deviation."""
+    resamplings: Annotated[int, Count(0, 20)] = 3
+    """How often the sample is doubled before a surface counts as not fitted."""
+    shrink: Share = 0.1
+    """Share of the interval taken off at both limits together, in each round of the convergence loop."""
+    rounds: Annotated[int, Count(1, 50)] = 8
+    """Rounds of that loop at most."""
+    influence: Share = 0.1
+    """Inputs whose range times sensitivity reaches this share of the largest form X_G-I."""
+    sobol_samples: Annotated[int, Count(0, 2**24)] = 2**12
+    """Base samples of the global indices, a power of two; 0 leaves them out."""
+
+    def check(self) -> None:
+        """Contradictions between the entries; raises PydanticCustomError."""
+        if self.sobol_samples & (self.sobol_samples - 1):
+            raise problem(
+                "must be a power of two, or the sequence is not balanced",
+                "Write 4096, say",
+                key="sobol_samples",
+            )
+
+
+class Surrogate(Table):
+    """Kriging models (the paper's section 4.2)."""
+
+    models: tuple[Names, ...] | None = None
+    """Inputs of each model; default the paper's five, as far as they are study variables."""
+    optimisation: Names | None = None
+    """The model the swarm searches; default m2, m3, u2, I2, C as far as they are study variables, else all."""
+    r2: Accuracy = 0.99
+    """Least 1 - SSE/SST on the test points."""
+    rmae: Positive = 0.4
+    """Largest error on the test points, over their standard deviation."""
+    resamplings: Annotated[int, Count(0, 20)] = 1
+    """How often the sample is doubled before an interval is cut."""
+    cuts: Annotated[int, Count(0, 6)] = 1
+    """How often an interval may be halved where a model is refused."""
+    restarts: Annotated[int, Count(0, 100)] = 2
+    """Further starts of the likelihood search."""
+
+
+class Swarm(Table):
+    """Multi-objective particle swarm (eqs. 22 and 23)."""
+
+    particles: Annotated[int, Count(2, 10**6)] = 100
+    iterations: Annotated[int, Count(1, 10**6)] = 100
+    runs: Annotated[int, Count(1, 10**4)] = 4
+    """Independent runs of each case."""
+    c1: Factor = 1.8
+    """Pull towards the particle's own best."""
+    c2: Factor = 1.8
+    """Pull towards a leader of the archive."""
+    inertia: tuple[Factor, Factor] = (1.2, 0.1)
+    """Inertia weight at the first and the last iteration, linear between."""
+    archive: Annotated[int, Count(2, 10**5)] = 100
+    """Solutions of a front."""
+    statistics: Literal["quadrature", "monte-carlo"] = "quadrature"
+    """How mean and deviation over the random inputs are found."""
+    monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
+    """Samples a design, for "monte-carlo"."""
+
+
+class Verification(Table):
+    """Chosen designs through the true dynamics."""
+
+    samples: Annotated[int, Count(2, 10**9)] = 10_000
+    """Direct Monte Carlo samples a design."""
+    designs: Annotated[int, Count(0, 10**5)] = 10
+    """Designs of each front, spread along it, beside alpha, beta and the original."""
+    confidence: Share = 0.95
+    """Level of the confidence limits."""
+    tolerance: Share = 0.02
+    """Relative difference of surrogate and true mean above which points are added."""
+    infill_rounds: Annotated[int, Count(0, 100)] = 3
+    """Rounds of added points at most."""
+    infill_samples: Annotated[int, Count(1, 10**5)] = 20
+    """Points added a round."""
+    response_clearance: Annotated[float, Quantity("m", above=0)] = 3e-4
+    """Clearance of the responses that are compared, m (Fig. 10)."""
+    response_revolutions: Annotated[int, Count(1, 1000)] = 2
+    """Steady revolutions of these responses."""

@@ -1,0 +1,290 @@
+"""The [study] table: what is varied, how it is sampled, and the settings of each stage."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import model_validator
+
+from hpcclear.scene.fields import Count, NamedRows, Table, nearest, problem
+from hpcclear.scene.settings import Names, Sensitivity, Surrogate, Swarm, Verification
+from hpcclear.scene.variables import Case, RandomInput, Variable
+
+PAPER_GROUPS = (("m1", "m2"), ("m2", "m3"), ("u1", "u2"), ("I1", "I2"))
+PAPER_MODELS = (
+    ("m1", "m2", "C"),
+    ("m2", "m3", "C"),
+    ("u1", "u2", "C"),
+    ("I1", "I2", "C"),
+    ("m2", "m3", "u2", "I2", "C"),
+)
+
+
+class Study(Table):
+    """Sampling and optimisation over a scene."""
+
+    seed: Annotated[int, Count(0, 2**63 - 1)] = 0
+    """Every random number of the study follows from it."""
+    method: Literal["lhs", "monte-carlo"] = "lhs"
+    """How `sample` draws its points."""
+    samples: Annotated[int, Count(1, 10**9)] = 200
+    """Points of a design: training points of each Kriging model, or what `sample` simulates."""
+    test_samples: Annotated[int, Count(0, 10**6)] = 50
+    """Fresh points each Kriging model is tested on."""
+    objective: Literal[
+        "mean-gap",
+        "mean-contact-force",
+        "peak-contact-force",
+        "peak-crank-moment",
+        "slider-acceleration-deviation",
+    ] = "mean-gap"
+    """What the study makes small: eq. 13, or another response."""
+    variables: Annotated[tuple[Variable, ...], NamedRows()]
+    random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
+    cases: Annotated[tuple[Case, ...], NamedRows()] = ()
+    sensitivity: Sensitivity = Sensitivity()
+    surrogate: Surrogate = Surrogate()
+    swarm: Swarm = Swarm()
+    verification: Verification = Verification()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, data: Any) -> Any:
+        """Cases as plain lists of names, and random inputs with the paths of the variable of that name."""
+        if not isinstance(data, Mapping):
+            return data
+        data = dict(data)
+        cases, variables, random = data.get("cases"), data.get("variables"), data.get("random")
+        if isinstance(cases, Mapping):
+            data["cases"] = {
+                name: {"random": case} if isinstance(case, (list, tuple)) else case
+                for name, case in cases.items()
+            }
+        if isinstance(random, Mapping) and isinstance(variables, Mapping):
+            data["random"] = {
+                name: _with_paths(row, variables.get(name)) for name, row in random.items()
+            }
+        return data
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Study":
+        if not self.variables:
+            raise problem(
+                "the list of variables is empty",
+                "Name at least one, such as m2 = { range = [0.1, 0.4] }",
+                key="variables",
+            )
+        self._check_paths()
+        self._check_cases()
+        self.sensitivity.check()
+        self._check_names()
+        self._check_sizes()
+        return self
+
+    def _check_paths(self) -> None:
+        owner: dict[str, str] = {}
+        for variable in self.variables:
+            for path in variable.paths:
+                if path in owner:
+                    raise problem(
+                        f"{variable.name} and {owner[path]} both drive {path}",
+                        "Remove one, or give them different paths",
+                        key=f"variables.{variable.name}",
+                    )
+                owner[path] = variable.name
+        for row in self.random:
+            other = next(
+                (owner[path] for path in row.paths if owner.get(path, row.name) != row.name), None
+            )
+            if other is not None or (
+                row.name in self.names and self.variable(row.name).paths != row.paths
+            ):
+                raise problem(
+                    f"drives what the study variable {other or row.name} drives",
+                    f"Name the random input {other or row.name}, without a path",
+                    key=f"random.{row.name}",
+                )
+            for path in row.paths:
+                if owner.setdefault(path, row.name) != row.name:
+                    raise problem(
+                        f"{row.name} and {owner[path]} both drive {path}",
+                        "Remove one",
+                        key=f"random.{row.name}",
+                    )
+            self._check_width(row)
+
+    def _check_width(self, row: RandomInput) -> None:
+        if row.name not in self.names:
+            return
+        if self.variable(row.name).range is None:
+            if row.absolute:
+                raise problem(
+                    "a distribution that does not follow the design needs a domain in SI",
+                    f"Give study.variables.{row.name} a range instead of a ratio",
+                    key=f"random.{row.name}",
+                )
+            return
+        lower, upper = self.variable(row.name).bounds
+        slack = 1e-12 * (upper - lower)  # half-widths of decimal numbers are not exact
+        if row.centre is None:
+            inside = 2 * row.reach <= upper - lower + slack
+        else:
+            inside = (
+                lower - slack <= row.centre - row.reach and row.centre + row.reach <= upper + slack
+            )
+        if not inside:
+            raise problem(
+                f"the distribution is wider than its domain, {row.name} from {lower:g} to {upper:g}",
+                f"Narrow it, or widen study.variables.{row.name}.range",
+                key=f"random.{row.name}",
+            )
+
+    def _check_cases(self) -> None:
+        for case in self.cases:
+            for name in case.random:
+                if name not in (known := tuple(row.name for row in self.random)):
+                    raise problem(
+                        f"{name!r} is not a random input of this study",
+                        nearest(name, known),
+                        key=f"cases.{case.name}",
+                    )
+                if name not in self.optimisation:
+                    raise problem(
+                        f"the surrogate of the optimisation does not know the random input {name!r}",
+                        "Add it to study.variables and to study.surrogate.optimisation",
+                        key=f"cases.{case.name}",
+                    )
+            if not self.design_variables(case.name):
+                raise problem(
+                    "every variable of this case is random wherever the design is, so nothing can be chosen",
+                    "Add a study variable, or give a half_width instead of a range",
+                    key=f"cases.{case.name}",
+                )
+
+    def _check_names(self) -> None:
+        lists: list[tuple[str, Iterable[str]]] = [
+            ("surrogate.optimisation", self.surrogate.optimisation or ()),
+            *(("surrogate.models", model) for model in self.surrogate.models or ()),
+            *(("sensitivity.groups", group) for group in self.sensitivity.groups or ()),
+        ]
+        for key, names in lists:
+            names = tuple(names)
+            for name in names:
+                if name not in self.names:
+                    raise problem(
+                        f"{name!r} is not a study variable", nearest(name, self.names), key=key
+                    )
+            if len(set(names)) < len(names):
+                raise problem("a variable is named twice", "Remove one", key=key)
+        if any(
+            not names for names in (self.surrogate.models or ()) + (self.sensitivity.groups or ())
+        ):
+            raise problem(
+                "a model needs at least one input",
+                "Name one, or remove the empty list",
+                key="surrogate.models",
+            )
+        if self.sensitivity.groups:
+            if self.sensitivity.parameter not in self.names:
+                raise problem(
+                    f"{self.sensitivity.parameter!r} is not a study variable",
+                    nearest(self.sensitivity.parameter, self.names),
+                    key="sensitivity.parameter",
+                )
+            if any(self.sensitivity.parameter in group for group in self.sensitivity.groups):
+                raise problem(
+                    "the parameter is held fixed, so it cannot be an input of a surface",
+                    "Remove it from the group",
+                    key="sensitivity.groups",
+                )
+
+    def _check_sizes(self) -> None:
+        for group in self.groups:
+            _enough(
+                len(group), self.sensitivity.order, self.sensitivity.samples, "sensitivity.samples"
+            )
+        together = len({name for group in self.groups for name in group})
+        if together:
+            _enough(
+                together,
+                self.sensitivity.together_order,
+                self.sensitivity.together_samples,
+                "sensitivity.together_samples",
+            )
+        if self.cases:
+            inputs = max(len(model) for model in self.models)
+            if self.samples < inputs + 2:
+                raise problem(
+                    f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
+                    f"Ask for at least {10 * inputs} samples",
+                    key="samples",
+                    value=self.samples,
+                )
+
+    @property
+    def names(self) -> Names:
+        """Names of the study variables, in file order: the columns of its designs."""
+        return tuple(variable.name for variable in self.variables)
+
+    def variable(self, name: str) -> Variable:
+        """The variable of that name; KeyError if there is none."""
+        return {variable.name: variable for variable in self.variables}[name]
+
+    def random_input(self, name: str) -> RandomInput:
+        """The random input of that name; KeyError if there is none."""
+        return {row.name: row for row in self.random}[name]
+
+    def case(self, name: str) -> Case:
+        """The case of that name; KeyError if there is none."""
+        return {case.name: case for case in self.cases}[name]
+
+    @property
+    def groups(self) -> tuple[Names, ...]:
+        """Inputs of the response surfaces, fitted at each level of the sensitivity's parameter."""
+        if self.sensitivity.groups is not None:
+            return self.sensitivity.groups
+        usable = self.sensitivity.parameter in self.names
+        return tuple(group for group in PAPER_GROUPS if usable and set(group) <= set(self.names))
+
+    @property
+    def models(self) -> tuple[Names, ...]:
+        """Inputs of the Kriging models; the last one, `optimisation`, is always among them."""
+        models = self.surrogate.models
+        if models is None:
+            models = tuple(model for model in PAPER_MODELS if set(model) <= set(self.names))
+        return tuple(model for model in models if model != self.optimisation) + (self.optimisation,)
+
+    @property
+    def optimisation(self) -> Names:
+        """Inputs of the model the swarm searches."""
+        if self.surrogate.optimisation is not None:
+            return self.surrogate.optimisation
+        return tuple(name for name in PAPER_MODELS[-1] if name in self.names) or self.names
+
+    def design_variables(self, case: str) -> Names:
+        """Z of a case: inputs of the optimisation that are not random wherever the design is."""
+        rows = {row.name: row for row in self.random}
+        random = self.case(case).random
+        return tuple(
+            name for name in self.optimisation if not (name in random and rows[name].absolute)
+        )
+
+
+def _with_paths(row: Any, variable: Any) -> Any:
+    """A random input with the path or paths of the variable of the same name, unless it has its own."""
+    if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
+        return row
+    if "path" in row or "paths" in row:
+        return row
+    return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
+
+
+def _enough(inputs: int, order: int, samples: int, key: str) -> None:
+    terms = math.comb(inputs + order, order)
+    if samples < terms:
+        raise problem(
+            f"a surface of order {order} in {inputs} inputs has {terms} terms, more than the {samples} samples",
+            f"Ask for at least {2 * terms} samples, or lower the order",
+            key=key,
+            value=samples,
+        )

@@ -1,0 +1,241 @@
+"""Study variables, random inputs and cases: which numbers of a scene vary, and how."""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import model_validator
+from pydantic_core import PydanticCustomError
+
+from hpcclear.scene.fields import Quantity, Table, nearest, problem
+from hpcclear.scene.paths import quantities
+
+PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
+    "m1": ("mechanism.crank.mass",),
+    "u1": ("mechanism.crank.mass_center",),
+    "I1": ("mechanism.crank.inertia",),
+    "m2": ("mechanism.rod.mass",),
+    "u2": ("mechanism.rod.mass_center",),
+    "I2": ("mechanism.rod.inertia",),
+    "m3": ("mechanism.slider.mass",),
+    "C": ("joints.crank_rod.clearance", "joints.rod_slider.clearance"),
+    "C12": ("joints.crank_rod.clearance",),
+    "C23": ("joints.rod_slider.clearance",),
+}
+"""The paper's names (Table 3), and one name for each clearance."""
+
+RESERVED = frozenset(
+    "sample joint objective objective_spread objective_uncertainty mean_gap peak_contact_force latched "
+    "rhs_evaluations status flags case run solution design model mean deviation".split()
+)
+"""Names of dimensions and results in the datasets."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+Range = tuple[float, float]
+
+
+def _resolve_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
+    """The paths a named row drives, from `paths`, `path` or its name."""
+    name = data.get("name")
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or name in RESERVED:
+        reason = "is taken by a result" if name in RESERVED else "is not a name"
+        raise problem(
+            reason, "Use a letter, then letters, digits or _, and give the path as path = ..."
+        )
+    if "path" in data and "paths" in data:
+        raise problem("path and paths contradict each other", "Keep one of them", key="path")
+    given = data.get("paths", data.get("path"))
+    key = "path" if "path" in data else "paths"
+    if given is None:
+        if name not in PAPER_PATHS:
+            raise problem(
+                "is not one of the known names, so it needs a path",
+                f'Add path = "drive.speed", say; known names are {", ".join(PAPER_PATHS)}',
+            )
+        return PAPER_PATHS[name]
+    paths = (given,) if isinstance(given, str) else given
+    if (
+        not isinstance(paths, (list, tuple))
+        or not paths
+        or any(not isinstance(p, str) for p in paths)
+    ):
+        raise problem(
+            "a dotted path, or a list of them, is expected here", "Write it in quotes", key=key
+        )
+    for path in paths:
+        if path not in quantities():
+            raise problem(
+                f"{path!r} is not a physical number of a scene",
+                nearest(path, tuple(quantities())),
+                key=key,
+            )
+    if len(set(paths)) < len(paths):
+        raise problem("a path stands there twice", "Remove one", key=key)
+    if len({quantities()[path].unit for path in paths}) > 1:
+        raise problem("the paths have different units", "Use a variable for each unit", key=key)
+    return tuple(paths)
+
+
+def _number(value: Any, quantity: Quantity, key: str) -> float:
+    """`Quantity.convert` with the key in its error."""
+    try:
+        return quantity.convert(value)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise problem(context["reason"], context["remedy"], key=key) from None
+
+
+def _range(value: Any, quantity: Quantity, key: str) -> Range:
+    """A pair in rising order."""
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise problem("two bounds are expected here", "Write [lower, upper]", key=key)
+    lower, upper = (_number(bound, quantity, key) for bound in value)
+    if not lower < upper:
+        reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
+        raise problem(reason, "Write the smaller bound first; leave a constant out", key=key)
+    return lower, upper
+
+
+class Variable(Table):
+    """One column of a design: a name, the scene entries it drives, and its bounds in SI."""
+
+    name: str
+    paths: tuple[str, ...]
+    """Scene entries that all get its value."""
+    range: Range | None = None
+    """Bounds, SI."""
+    ratio: Range | None = None
+    """For an inertia: bounds of r = I / (m L^2 / 12), sampled in place of I."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _resolve(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        paths = _resolve_paths(data)
+        row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
+        if ("range" in row) == ("ratio" in row):
+            raise problem(
+                "a variable needs either a range or, for an inertia, a ratio",
+                "Add range = [lower, upper]",
+            )
+        if "range" in row:
+            row["range"] = _range(row["range"], quantities()[paths[0]], "range")
+            for path in paths[1:]:
+                _range(row["range"], quantities()[path], "range")
+        else:
+            if len(paths) != 1 or not is_link_inertia(paths[0]):
+                raise problem(
+                    "only the inertia of crank or rod can be given as a ratio to m L^2/12",
+                    "Write range = [lower, upper] instead",
+                    key="ratio",
+                )
+            row["ratio"] = _range(row["ratio"], Quantity("", above=0), "ratio")
+        return row
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its value, "" for none."""
+        return quantities()[self.paths[0]].unit
+
+    @property
+    def bounds(self) -> Range:
+        """Bounds of what is sampled: the range in SI, or the ratio."""
+        bounds = self.range if self.ratio is None else self.ratio
+        assert bounds is not None  # one of the two is there, by validation
+        return bounds
+
+
+def is_link_inertia(path: str) -> bool:
+    """Whether the path is the inertia of crank or rod, which scales with m L^2/12."""
+    return path in (*PAPER_PATHS["I1"], *PAPER_PATHS["I2"])
+
+
+class RandomInput(Table):
+    """A random number of the scene: about the design's value, or wherever the design is (`absolute`)."""
+
+    name: str
+    paths: tuple[str, ...]
+    distribution: Literal["uniform", "normal", "truncated-normal"]
+    range: Range | None = None
+    """Bounds of an absolute uniform distribution, SI."""
+    mean: float | None = None
+    """Centre, SI; left out, the distribution lies about the value of the design."""
+    half_width: float | None = None
+    """Of "uniform" and "truncated-normal", SI."""
+    deviation: float | None = None
+    """Standard deviation of "normal", and of "truncated-normal" before it is cut, SI."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _resolve(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        paths = _resolve_paths(data)
+        row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
+        quantity = quantities()[paths[0]]
+        if "range" in row:
+            row["range"] = _range(row["range"], quantity, "range")
+        if "mean" in row:
+            row["mean"] = _number(row["mean"], quantity, "mean")
+        for key in ("half_width", "deviation"):
+            if key in row:
+                row[key] = _number(row[key], Quantity(quantity.unit, above=0), key)
+        return row
+
+    @model_validator(mode="after")
+    def _parameters_fit(self) -> "RandomInput":
+        needed = {
+            "uniform": {"range"} if self.range is not None else {"half_width"},
+            "normal": {"deviation"},
+            "truncated-normal": {"deviation", "half_width"},
+        }[self.distribution]
+        allowed = needed if "range" in needed else needed | {"mean"}
+        for key in ("range", "mean", "half_width", "deviation"):
+            value = getattr(self, key)
+            if key in needed and value is None:
+                raise problem(
+                    f"the distribution {self.distribution!r} needs it", "Add it", key, None
+                )
+            if key not in allowed and value is not None:
+                raise problem(
+                    f"does not belong to this {self.distribution!r} distribution", "Remove it", key
+                )
+        return self
+
+    @property
+    def absolute(self) -> bool:
+        """Whether the distribution stays where it is when the design moves."""
+        return self.range is not None or self.mean is not None
+
+    @property
+    def centre(self) -> float | None:
+        """Middle of an absolute distribution, SI; None when it follows the design."""
+        return self.mean if self.range is None else (self.range[0] + self.range[1]) / 2
+
+    @property
+    def reach(self) -> float:
+        """How far from its centre values count, SI: the half-width, or four standard deviations of a normal."""
+        if self.range is not None:
+            return (self.range[1] - self.range[0]) / 2
+        if self.half_width is not None:
+            return self.half_width
+        assert self.deviation is not None  # by validation
+        return 4 * self.deviation
+
+
+class Case(Table):
+    """One optimisation: which of the random inputs are random in it."""
+
+    name: str
+    random: tuple[str, ...]
+
+    @model_validator(mode="after")
+    def _some_random(self) -> "Case":
+        if not self.random:
+            raise problem(
+                "a case without random inputs has no deviation to minimise", "Name some", "random"
+            )
+        if len(set(self.random)) < len(self.random):
+            raise problem("a random input is named twice", "Remove one", key="random")
+        return self
