@@ -1,0 +1,198 @@
+"""Sets of non-dominated points: archive, spread, hypervolume. All objectives are minimised."""
+
+from dataclasses import dataclass
+
+import moocore
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Front:
+    """Result of a search: ``points (k, d)``, ``values (k, m)`` by rising first objective.
+
+    `failed` counts points whose objectives were not finite, `infeasible` the others that broke a
+    constraint; both are part of `evaluations`. `history` is the archive's hypervolume after each
+    iteration (empty without a reference point). `gain` is the share of the hypervolume won in the
+    last tenth of the iterations, NaN if unknown; `settled` says that all iterations were done and
+    the gain is below 1e-3. A settled search may still sit on a local front: compare several seeds.
+    `remark` says this in words.
+    """
+
+    points: Floats
+    values: Floats
+    evaluations: int
+    failed: int
+    infeasible: int
+    history: Floats
+    gain: float
+    settled: bool
+    remark: str
+
+
+class Archive:
+    """Non-dominated points met so far, at most `capacity` (but never fewer than objectives).
+
+    `positions (k, d)` and `values (k, m)` belong together. When it is full the point with the
+    nearest neighbour goes (objectives scaled to the archive's extent; between ties the second
+    nearest decides); the best point of each objective stays. Of equal objective vectors the first
+    one stays.
+    """
+
+    def __init__(self, capacity: int, positions: Floats, values: Floats) -> None:
+        self.capacity = capacity
+        self.positions = positions
+        self.values = values
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def add(self, positions: Floats, values: Floats) -> None:
+        """Merge feasible points with finite objectives."""
+        if not len(values):
+            return
+        merged = np.concatenate([self.values.reshape(-1, values.shape[1]), values])
+        where = np.concatenate([self.positions, positions])
+        best = moocore.is_nondominated(merged)
+        merged, where = merged[best], where[best]
+        alive, _ = _thin(merged, max(self.capacity, values.shape[1]))
+        self.positions, self.values = where[alive], merged[alive]
+
+    def loneliness(self) -> Floats:
+        """Distance of each point to its nearest neighbour, objectives scaled to their extent."""
+        return _thin(self.values, len(self.values))[1]
+
+
+def hypervolume(values: Floats, reference: Floats) -> float:
+    """Hypervolume dominated below `reference`: exact to five objectives, then approximate.
+
+    The approximation (moocore's Rphi-FWE+) is deterministic. An empty set has none.
+    """
+    if values.size == 0:
+        return 0.0
+    if len(reference) <= 5:
+        return float(moocore.hypervolume(values, reference))
+    return float(moocore.hv_approx(values, reference, method="Rphi-FWE+"))
+
+
+def relative_gain(before: Floats, now: Floats) -> float:
+    """Share of the hypervolume of `now` that `before` lacks; NaN if either is empty.
+
+    Scaled to the extent of `now` (where it has none, to its size), reference point 1.1 times that.
+    """
+    if not (before.size and now.size):
+        return float("nan")
+    low = now.min(axis=0)
+    extent = np.ptp(now, axis=0)
+    extent = np.where(extent > 0.0, extent, np.abs(low))
+    extent = np.where(extent > 0.0, extent, 1.0)
+    reference = np.full(len(low), 1.1)
+    final = hypervolume((now - low) / extent, reference)
+    return 1.0 - hypervolume((before - low) / extent, reference) / final
+
+
+def cut(values: Floats, size: int) -> NDArray[np.intp]:
+    """Indices of at most `size` rows of a non-dominated set, well spread.
+
+    With two and three objectives the smallest hypervolume contribution is dropped each time
+    (reference point 1.1 times the extent), with more the point with the nearest neighbour; the best
+    of each objective stays.
+    """
+    count, objectives = values.shape
+    if count <= size:
+        return np.arange(count)
+    if objectives == 2:
+        return np.flatnonzero(_cut_two(values, size))
+    if objectives > 3:  # exact contributions grow too dear
+        return np.flatnonzero(_thin(values, size)[0])
+    low = values.min(axis=0)
+    extent = np.ptp(values, axis=0)
+    unit = (values - low) / np.where(extent > 0.0, extent, 1.0)
+    kept = np.arange(count)
+    best = values.argmin(axis=0)
+    while len(kept) > size:
+        share = moocore.hv_contributions(unit[kept], np.full(objectives, 1.1))
+        share[np.isin(kept, best)] = np.inf
+        kept = np.delete(kept, share.argmin())
+    return kept
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cut_two(values, size):  # type: ignore[no-untyped-def]
+    """Rows to keep of a two-objective front: the least rectangle between neighbours goes first.
+
+    Scaling an objective scales all rectangles alike and both ends stay: no reference is needed.
+    """
+    order = np.argsort(values[:, 0])
+    alive = np.ones(len(values), np.bool_)
+    while len(order) > size:
+        first, second = values[order, 0], values[order, 1]
+        area = (first[2:] - first[1:-1]) * (second[:-2] - second[1:-1])
+        gone = 1 + np.argmin(area)
+        alive[order[gone]] = False
+        order = np.concatenate((order[:gone], order[gone + 1 :]))
+    return alive
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _thin(values, capacity):  # type: ignore[no-untyped-def]
+    """Drop the most crowded rows until `capacity` are left; the best of each objective stays.
+
+    Returns which rows are alive, and of these the distance to the nearest neighbour, objectives
+    scaled to their extent.
+    """
+    count, objectives = values.shape
+    square = np.zeros((count, count))
+    pinned = np.zeros(count, np.bool_)
+    for k in range(objectives):
+        column = values[:, k].copy()
+        pinned[np.argmin(column)] = True
+        extent = column.max() - column.min()
+        if extent > 0.0:
+            column = column / extent
+        for i in range(count):
+            for j in range(i):
+                square[i, j] += (column[i] - column[j]) ** 2
+    alive = np.ones(count, np.bool_)
+    distance = np.full((count, 2), np.inf)
+    neighbour = np.full((count, 2), -1)
+    for i in range(count):
+        square[i, i] = np.inf
+        for j in range(i):
+            square[j, i] = square[i, j]
+    for i in range(count):
+        _nearest(square, alive, i, distance, neighbour)
+    for _ in range(count - capacity):
+        gone = -1
+        for i in range(count):
+            if alive[i] and not pinned[i] and (gone < 0 or _closer(distance, i, gone)):
+                gone = i
+        alive[gone] = False
+        for i in range(count):
+            if alive[i] and (neighbour[i, 0] == gone or neighbour[i, 1] == gone):
+                _nearest(square, alive, i, distance, neighbour)
+    return alive, np.sqrt(distance[alive, 0])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _closer(distance, i, j):  # type: ignore[no-untyped-def]
+    if distance[i, 0] != distance[j, 0]:
+        return distance[i, 0] < distance[j, 0]
+    return distance[i, 1] < distance[j, 1]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _nearest(square, alive, i, distance, neighbour):  # type: ignore[no-untyped-def]
+    """Write the two nearest living neighbours of row i."""
+    distance[i, :] = np.inf
+    neighbour[i, :] = -1
+    for j in range(len(alive)):
+        if alive[j] and j != i:
+            if square[i, j] < distance[i, 0]:
+                distance[i, 1], neighbour[i, 1] = distance[i, 0], neighbour[i, 0]
+                distance[i, 0], neighbour[i, 0] = square[i, j], j
+            elif square[i, j] < distance[i, 1]:
+                distance[i, 1], neighbour[i, 1] = square[i, j], j
