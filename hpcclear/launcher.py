@@ -1,0 +1,73 @@
+"""What started this process: mpiexec, srun or a person; and one thread for each process."""
+
+import importlib
+import os
+import sys
+from collections.abc import Mapping
+
+_SIZE = (
+    "PMI_SIZE",  # MPICH, Intel MPI, Cray
+    "OMPI_COMM_WORLD_SIZE",  # Open MPI, Fujitsu, jsrun
+    "MV2_COMM_WORLD_SIZE",  # MVAPICH
+    "SLURM_STEP_NUM_TASKS",  # srun; SLURM_NTASKS would also stand in a batch script without srun
+)
+_RANK = (
+    "PMI_RANK",
+    "OMPI_COMM_WORLD_RANK",
+    "MV2_COMM_WORLD_RANK",
+    "PMIX_RANK",
+    "PALS_RANKID",
+    "MPIRUN_RANK",
+    "ALPS_APP_PE",
+)
+_THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
+def launched_size(environment: Mapping[str, str] = os.environ) -> tuple[str, int]:
+    """Number of processes a launcher says it started, and the variable that says so.
+
+    Returns
+    -------
+    tuple of str and int
+        ``("", 1)`` when no launcher left a trace.
+    """
+    for name in _SIZE:
+        if environment.get(name, "").isdigit() and int(environment[name]) > 1:
+            return name, int(environment[name])
+    return "", 1
+
+
+def launched_rank(environment: Mapping[str, str] = os.environ) -> int | None:
+    """Rank that the launcher gave to this process, known before MPI starts; None without one."""
+    names = _RANK if launched_size(environment)[0] != "SLURM_STEP_NUM_TASKS" else ("SLURM_PROCID",)
+    for name in names:
+        if environment.get(name, "").isdigit():
+            return int(environment[name])
+    return None
+
+
+def is_launched(environment: Mapping[str, str] = os.environ) -> bool:
+    """Whether a launcher started this process, so that MPI is needed."""
+    return launched_rank(environment) is not None
+
+
+def pin_threads() -> None:
+    """Keep BLAS, OpenMP and Numba of this process to one thread.
+
+    Ranks share a node's cores, and sums over several threads differ in the last bit. Libraries that
+    are not loaded yet read the environment; those that are get told.
+    """
+    for name in _THREADS:
+        os.environ[name] = "1"
+    if "numpy" in sys.modules:
+        importlib.import_module("threadpoolctl").threadpool_limits(1)
+    if "numba" in sys.modules:
+        sys.modules["numba"].set_num_threads(1)
+    else:  # Numba refuses a change of this variable once its threads run
+        os.environ["NUMBA_NUM_THREADS"] = "1"

@@ -1,0 +1,133 @@
+"""Messages between ranks that never block; in one process there is nobody to write to.
+
+Knows MPI only as an object that is handed in, so that it loads without an MPI library.
+"""
+
+import os
+import sys
+import time
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+_SHORTEST = 2e-4  # s
+
+
+class Tag(IntEnum):
+    """What a message says; the first four come from root."""
+
+    STAGE = 1  # a stage begins: (name, kind, payload)
+    BLOCK = 2  # samples: (index, points, ask_below)
+    END = 3  # the stage is over, drop what is unfinished
+    LEAVE = 4  # the program is over: exit code
+    ASK = 5  # wants samples: (finished records or None, need)
+    RECORDS = 6  # finished records
+    DONE = 7  # the stage is over here: (finished records or None, busy seconds, set-up seconds)
+    STOP = 8  # was told to stop: reason
+    ERROR = 9  # failed: (report or InputError, finished records or None)
+    LEFT = 10  # has heard LEAVE
+
+
+class Message(NamedTuple):
+    """A message that arrived."""
+
+    source: int
+    tag: int
+    body: Any
+
+
+class Nap:
+    """Sleeps longer and longer while nothing happens, so that waiting costs no processor time."""
+
+    def __init__(self, longest: float = 0.01) -> None:
+        self._longest = longest
+        self._seconds = _SHORTEST
+
+    def take(self) -> None:
+        """Sleep, half as long again as last time."""
+        time.sleep(self._seconds)
+        self._seconds = min(1.5 * self._seconds, self._longest)
+
+    def reset(self) -> None:
+        """Something happened: more may follow soon."""
+        self._seconds = _SHORTEST
+
+
+class Mail:
+    """One rank's mailbox.
+
+    Parameters
+    ----------
+    mpi : module, optional
+        ``mpi4py.MPI``, initialised; every rank makes its mailbox at the same time.
+    finalizes : bool, optional
+        Whether this job ends MPI, which it does if it began it.
+
+    Attributes
+    ----------
+    rank, size : int
+        This process, and how many there are.
+    node_rank, node_size, node_cores : int
+        The same within this node, and the cores its ranks may use together.
+    """
+
+    def __init__(self, mpi: Any = None, finalizes: bool = True) -> None:
+        self._mpi = mpi
+        self._finalizes = finalizes
+        self._sent: list[tuple[Any, bytes]] = []
+        cores = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
+        if mpi is None:
+            self.rank, self.size = 0, 1
+            self.node_rank, self.node_size, self.node_cores = 0, 1, len(cores)
+            return
+        self._comm = mpi.COMM_WORLD.Dup()  # messages of our own, whatever else the process does
+        self.rank, self.size = self._comm.rank, self._comm.size
+        self._node = self._comm.Split_type(mpi.COMM_TYPE_SHARED)
+        self.node_rank, self.node_size = self._node.rank, self._node.size
+        self.node_cores = len(set().union(*self._node.allgather(set(cores))))
+
+    def send(self, to: int, tag: Tag, body: object = None) -> None:
+        """Post a message."""
+        if self._mpi is not None:
+            self._post(to, tag, self._mpi.pickle.dumps(body))
+
+    def tell_others(self, tag: Tag, body: object = None) -> None:
+        """Post one message to every other rank."""
+        if self._mpi is not None:
+            data = self._mpi.pickle.dumps(body)
+            for other in range(self.size):
+                if other != self.rank:
+                    self._post(other, tag, data)
+
+    def _post(self, to: int, tag: Tag, data: bytes) -> None:
+        # MPI reads the bytes until the request is complete: hold on to them
+        self._sent = [(request, held) for request, held in self._sent if not request.Test()]
+        self._sent.append((self._comm.Isend([data, self._mpi.BYTE], to, tag), data))
+
+    def poll(self) -> Message | None:
+        """Next message, if one is there."""
+        if self._mpi is None:
+            return None
+        status = self._mpi.Status()
+        message = self._comm.improbe(status=status)
+        if message is None:
+            return None
+        return Message(status.source, status.tag, message.recv())
+
+    def meet_on_node(self) -> None:
+        """Wait until every rank of this node is here."""
+        if self._mpi is not None:
+            request, nap = self._node.Ibarrier(), Nap()
+            while not request.Test():
+                nap.take()
+
+    def finalize(self) -> None:
+        """Leave MPI; every rank must come."""
+        if self._mpi is not None and self._finalizes:
+            self._mpi.Finalize()
+
+    def abort(self, code: int) -> None:
+        """End all ranks now; does not return."""
+        sys.stderr.flush()
+        if self._mpi is not None:
+            self._comm.Abort(code)
+        os._exit(code)

@@ -1,0 +1,238 @@
+"""Who simulates what: how many samples a rank gets at a time, and the books that are kept of them.
+
+Free of MPI, so that a scaling model can run the same policy on ranks that do not exist.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+QUANTUM = 0.03
+"""Seconds of work between two looks into the mailbox; the longest a request waits at root."""
+
+TAIL = 2.0
+"""A block is at most 1/TAIL of a rank's fair share of what is left (guided self-scheduling)."""
+
+
+class Worker(Protocol):
+    """A stream of simulations in one process: samples go in, finished records come out."""
+
+    @property
+    def lanes(self) -> int:
+        """Samples worked on at once."""
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished."""
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        """Queue samples: `index` int64 (m,), their `points` float64 (m, d)."""
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Work for about `seconds`, or until idle; return the finished records (may be empty)."""
+
+
+class Points(Protocol):
+    """A design: an array (n, d), or anything that makes the rows asked for."""
+
+    def __len__(self) -> int:
+        """Number of samples."""
+
+    def __getitem__(self, index: np.ndarray, /) -> np.ndarray:
+        """Rows of the samples `index`, float64 (m, d)."""
+
+
+class Need(NamedTuple):
+    """What a rank says of itself when it asks for samples."""
+
+    lanes: int  # samples it works on at once
+    pending: int  # samples it still has
+    rate: float  # samples it finishes a second; 0 = not known yet
+
+
+class Allotment(NamedTuple):
+    """What it gets: so many samples, and the stock below which it asks again."""
+
+    size: int
+    ask_below: int
+
+
+def allot(remaining: int, ranks: int, need: Need) -> Allotment:
+    """Size of the next block for one rank: enough to stay busy, less and less towards the end.
+
+    Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank
+    does in about half a second (longer on many ranks, so that root is not swamped by requests),
+    never more than half its fair share of what is left, never less than fills its lanes: samples in
+    lockstep lanes take the time of the longest one, so an empty lane saves nothing.
+    Stock for the time a request takes is kept while there is enough to do; at the end it would only
+    sit behind one rank while another is idle, and a lane waits for its next sample instead.
+
+    Parameters
+    ----------
+    remaining : int
+        Samples not handed out yet.
+    ranks : int
+        Ranks that work.
+    need : Need
+        Lanes, stock and speed of the rank that asks.
+
+    Returns
+    -------
+    Allotment
+        ``size`` is between 1 and `remaining`, or 0 when nothing remains.
+
+    Notes
+    -----
+    Guided self-scheduling: Polychronopoulos and Kuck, IEEE Trans. Computers C-36 (1987),
+    doi:10.1109/TC.1987.5009495.
+    """
+    horizon = max(0.5, 2e-4 * ranks)  # s; 10 000 ranks send root some 5000 requests a second
+    lead = need.rate * 0.2 * horizon  # samples finished while a request is under way
+    stock = max(2.0 * need.lanes, need.lanes + need.rate * horizon)
+    guided = math.ceil(remaining / (TAIL * ranks))
+    wanted = max(math.ceil(stock) - need.pending, 1)
+    to_fill = min(need.lanes - need.pending, math.ceil(remaining / ranks))
+    size = min(remaining, max(min(wanted, guided), to_fill))
+    ends_soon = remaining - size < ranks * stock
+    ask_below = max(need.lanes, int(lead)) if ends_soon else need.lanes + math.ceil(max(lead, 1.0))
+    return Allotment(size, ask_below)
+
+
+class HandOut:
+    """Root's books of one design: what is left, what is out, what is finished.
+
+    Parameters
+    ----------
+    total : int
+        Samples of the design.
+    completed : ndarray of int64
+        Samples finished in an earlier run; they are not handed out.
+    ranks : int
+        Ranks that work.
+
+    Raises
+    ------
+    ValueError
+        If `completed` names a sample twice or one that is not in the design.
+    """
+
+    def __init__(self, total: int, completed: np.ndarray, ranks: int) -> None:
+        if completed.size and not (completed.min() >= 0 and completed.max() < total):
+            raise ValueError(f"completed samples lie outside 0..{total - 1}")
+        if np.unique(completed).size != completed.size:
+            raise ValueError("a sample is completed twice")
+        self._ranks = ranks
+        self._out = np.zeros(total, bool)
+        waiting = np.ones(total, bool)
+        waiting[completed] = False
+        self._queue = np.flatnonzero(waiting)
+        self._next = 0
+        self.outstanding = 0
+
+    @property
+    def remaining(self) -> int:
+        """Samples not handed out yet."""
+        return self._queue.size - self._next
+
+    @property
+    def done(self) -> bool:
+        """Whether every sample is finished."""
+        return self.remaining == 0 and self.outstanding == 0
+
+    def grant(self, need: Need) -> tuple[np.ndarray, int]:
+        """Samples for the rank that asks (none when nothing is left), and when to ask again."""
+        size, ask_below = allot(self.remaining, self._ranks, need)
+        index = self._queue[self._next : self._next + size]
+        self._next += size
+        self._out[index] = True
+        self.outstanding += size
+        return index, ask_below
+
+    def accept(self, records: np.ndarray) -> None:
+        """Book finished records.
+
+        Raises
+        ------
+        RuntimeError
+            If a record's sample was not handed out, or came back before: an error of the worker.
+        """
+        samples = records["sample"]
+        strange = samples[(samples < 0) | (samples >= self._out.size)]
+        if not strange.size:
+            strange = samples[~self._out[samples]]
+        self._out[samples if not strange.size else []] = False
+        if strange.size or np.unique(samples).size != samples.size:
+            culprit = int(strange[0]) if strange.size else int(samples[0])
+            raise RuntimeError(f"a record of sample {culprit} came back that nobody waits for")
+        self.outstanding -= samples.size
+
+
+class Desk:
+    """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
+
+    Parameters
+    ----------
+    worker : Worker
+        The simulations of this rank.
+    clock : callable
+        Seconds; replaced by tests.
+    """
+
+    def __init__(self, worker: Worker, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._worker = worker
+        self._clock = clock
+        self._in_hand: set[int] = set()
+        self._recent = np.zeros(2)  # finished samples and busy seconds, the older the less weight
+        self._ask_below = 1
+        self._inside = False
+        self.busy = 0.0
+        self.exhausted = False
+
+    @property
+    def need(self) -> Need:
+        """What to tell root."""
+        finished, seconds = self._recent
+        rate = float(finished / seconds) if seconds > 0.0 else 0.0
+        return Need(self._worker.lanes, self._worker.pending, rate)
+
+    @property
+    def hungry(self) -> bool:
+        """Whether it is time to ask for more."""
+        return not self.exhausted and self._worker.pending < self._ask_below
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing to work on."""
+        return self._worker.pending == 0
+
+    @property
+    def suspects(self) -> list[int]:
+        """Samples in hand, ascending, if the worker raised an exception; else none."""
+        return sorted(self._in_hand) if self._inside else []
+
+    def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
+        """Queue a block; an empty one says that there is no more."""
+        self._ask_below = ask_below
+        if index.size == 0:
+            self.exhausted = True
+            return
+        self._in_hand.update(index.tolist())
+        self._inside = True
+        self._worker.submit(index, points)
+        self._inside = False
+
+    def work(self, seconds: float = QUANTUM) -> np.ndarray:
+        """Let the worker advance; return what it finished."""
+        started = self._clock()
+        self._inside = True
+        records = self._worker.advance(seconds)
+        self._inside = False
+        spent = self._clock() - started
+        self.busy += spent
+        self._recent *= math.exp(-spent / 2.0)  # costs change over a design: two seconds of memory
+        self._recent += records.size, spent
+        self._in_hand.difference_update(records["sample"].tolist())
+        return records

@@ -1,0 +1,149 @@
+"""Why a run ends early: signals and a time limit become one flag, with a last resort behind it."""
+
+import os
+import select
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+from enum import IntEnum
+from types import FrameType, TracebackType
+
+STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
+"""What batch systems and people send to end a job."""
+
+GRACE = 3.8
+"""Seconds a rank has to flush and leave once it was told to; the promise is 5."""
+
+
+class Exit(IntEnum):
+    """Exit codes of every command."""
+
+    DONE = 0
+    FAILED = 1
+    BAD_INPUT = 2
+    STOPPED = 3
+
+
+class Stopped(Exception):
+    """The run was asked to end early; everything finished is saved, the same command goes on."""
+
+
+class StopSwitch:
+    """Collects the signals and the time limit of one process; loops poll `is_set`.
+
+    A thread of its own listens, since Python runs signal handlers only between two bytecodes of the
+    main thread, which a long fit in compiled code may not reach in time. Once told to stop, the
+    process has `GRACE` seconds before `last_resort` ends it: files are written whole and renamed,
+    so that nothing breaks. A second SIGINT ends it at once.
+
+    Use as a context manager in the main thread, as early as possible: until then a signal kills.
+
+    Parameters
+    ----------
+    time_limit : float, optional
+        Seconds from now after which to stop.
+    """
+
+    def __init__(self, time_limit: float | None = None) -> None:
+        self._limit = None if time_limit is None else time.monotonic() + time_limit
+        self._reason: str | None = None
+        self._leave_at: float | None = None
+        self._code: int = Exit.STOPPED
+        self._interrupted_at: float | None = None
+        self._closing = False
+        self._previous: dict[int, object] = {}
+        self._mouth: socket.socket | None = None
+        self.last_resort: Callable[[int], object] = os._exit
+
+    @property
+    def reason(self) -> str:
+        """What asked to stop; empty while nothing did."""
+        if self._reason is None and self._limit is not None and time.monotonic() >= self._limit:
+            self.request("the time limit was reached")
+        return self._reason or ""
+
+    def is_set(self) -> bool:
+        """Whether to stop."""
+        return self.reason != ""
+
+    def request(self, reason: str) -> None:
+        """Ask to stop; the first reason counts."""
+        if self._reason is None:
+            self._reason = reason
+            self.leave_within(GRACE, Exit.STOPPED)
+
+    def leave_within(self, seconds: float, code: int) -> None:
+        """Make sure that the process ends in time with `code`, come what may."""
+        due = time.monotonic() + seconds
+        self._leave_at = due if self._leave_at is None else min(due, self._leave_at)
+        self._code = code
+        self._rouse()
+
+    def __enter__(self) -> "StopSwitch":
+        self._ear, mouth = socket.socketpair()
+        self._ear.setblocking(False)
+        mouth.setblocking(False)
+        self._mouth = mouth
+        self._previous_fd = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+        for number in STOP_SIGNALS:
+            self._previous[number] = signal.signal(number, _leave_it_to_the_thread)
+        self._thread = threading.Thread(target=self._listen, name="stop-switch", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        signal.set_wakeup_fd(self._previous_fd)
+        self._closing = True
+        self._rouse()
+        self._thread.join()
+        self._ear.close()
+        if self._mouth is not None:
+            self._mouth.close()
+
+    def _rouse(self) -> None:
+        """Let the thread look at the clock again (before `__enter__` there is none to rouse)."""
+        if self._mouth is not None:
+            self._mouth.send(b"\0")
+
+    def _listen(self) -> None:
+        while not self._closing:
+            dues = [due for due in (self._leave_at, self._limit_ahead()) if due is not None]
+            wait = max(0.0, min(dues) - time.monotonic()) if dues else None
+            ready, _, _ = select.select([self._ear], [], [], wait)
+            for number in self._ear.recv(4096) if ready else b"":
+                self._heard(number)
+            if self._leave_at is not None and time.monotonic() >= self._leave_at:
+                self._end(self._code)
+            self.is_set()  # looks at the time limit
+
+    def _limit_ahead(self) -> float | None:
+        return self._limit if self._reason is None else None
+
+    def _heard(self, number: int) -> None:
+        if number not in STOP_SIGNALS:
+            return
+        now = time.monotonic()
+        if number == signal.SIGINT:
+            # one Ctrl-C may arrive twice, from the terminal and from mpiexec
+            if self._interrupted_at is not None and now - self._interrupted_at > 0.5:
+                self._end(Exit.STOPPED)
+            self._interrupted_at = self._interrupted_at or now
+        self.request(f"{signal.Signals(number).name} was received")
+
+    def _end(self, code: int) -> None:
+        threading.Thread(target=self.last_resort, args=(code,), daemon=True).start()
+        time.sleep(0.5)  # the last resort may be an MPI call, and hang
+        os._exit(code)
+
+
+def _leave_it_to_the_thread(number: int, frame: FrameType | None) -> None:
+    """Python writes the signal's number to the wake-up socket before it calls this."""
