@@ -28,3 +28,26 @@ class InputError(ValueError):
         if len(shown) > 80:
             shown = shown[:77] + "..."
         return f"{self.key} = {shown}: {self.reason}. {self.remedy}"
+
+
+class StorageError(RuntimeError):
+    """The disk refused a write; what was there before is intact. Exit code 1.
+
+    Parameters
+    ----------
+    path : str
+        The file that was to be written.
+    reason : str
+        What the operating system said.
+    remedy : str
+        What to do about it.
+    """
+
+    def __init__(self, path: str, reason: str, remedy: str) -> None:
+        self.path = path
+        self.reason = reason
+        self.remedy = remedy
+        super().__init__(path, reason, remedy)  # args, so that pickling keeps all three
+
+    def __str__(self) -> str:
+        return f"cannot write {self.path}: {self.reason}. {self.remedy}"

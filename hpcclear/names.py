@@ -1,0 +1,232 @@
+"""The one table of what stands in every result file: names, dimensions, units and what they mean.
+
+Each line reads: name, dimensions, unit, long name. A star marks what may not be missing. A row
+named as its only dimension is a coordinate. In the place of the unit, ``count`` stands for a whole
+number, ``flag`` for a small code whose meanings are attributes, ``text`` for text; everything else
+is a number of double precision in that unit. Units are written so that UDUNITS (CF), pint and
+cf-xarray all read them ("kg m^2", not "kg m2").
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .status import Flag, Status
+
+
+class Variable(NamedTuple):
+    """A row of the table."""
+
+    dims: tuple[str, ...]
+    units: str  # "" for text and flags, which have none
+    long_name: str
+    dtype: str  # "f8", "i8", "i1" or "text"
+
+
+class Kind(NamedTuple):
+    """A file of the table."""
+
+    title: str
+    coords: dict[str, Variable]
+    data: dict[str, Variable]
+    required: frozenset[str]  # data variables; coordinates always are
+    design_dims: tuple[str, ...] | None  # dimensions of its design variables; None: it has none
+
+
+DESIGN_VARIABLES = {
+    "m1": ("kg", "mass of the crank"),
+    "u1": ("m", "position of the mass centre of the crank, from its first joint"),
+    "I1": ("kg m^2", "inertia of the crank about its mass centre"),
+    "m2": ("kg", "mass of the rod"),
+    "u2": ("m", "position of the mass centre of the rod, from its first joint"),
+    "I2": ("kg m^2", "inertia of the rod about its mass centre"),
+    "m3": ("kg", "mass of the slider"),
+    "C": ("m", "radial clearance"),
+}
+"""Units and long names of the design variables of the paper (its Table 3)."""
+
+_NO_YES = np.array([0, 1], np.int8)
+
+FURTHER: dict[str, dict[str, object]] = {
+    "status": {
+        "flag_values": np.array([int(status) for status in Status], np.int8),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
+    },
+    "flags": {
+        "flag_masks": np.array([int(flag) for flag in Flag], np.int8),
+        "flag_meanings": " ".join(flag.name.lower() for flag in Flag),
+    },
+    "latched": {"flag_values": _NO_YES, "flag_meanings": "free latched"},
+    "converged": {"flag_values": _NO_YES, "flag_meanings": "not_determined determined"},
+    "selected": {"flag_values": _NO_YES, "flag_meanings": "left_out selected"},
+    "used": {"flag_values": _NO_YES, "flag_meanings": "not_an_input input"},
+    "accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
+    "verified": {"flag_values": _NO_YES, "flag_meanings": "not_simulated simulated"},
+}
+"""CF attributes beyond units and long name: what the codes mean."""
+
+_OUTCOME = """
+objective*            | sample       | m     | objective f, mean distance from the clearance circle
+objective_spread*     | sample       | m     | standard deviation of f between averaged revolutions
+objective_uncertainty | sample       | m     | scatter of f over kicked copies
+mean_gap              | sample joint | m     | time mean of the distance from the clearance circle
+peak_contact_force    | sample joint | N     | largest contact force over the averaged revolutions
+latched               | sample joint | flag  | whole revolutions in contact, impact speed frozen
+rhs_evaluations*      | sample       | count | number of evaluations of the equations of motion
+status*               | sample       | flag  | how the simulation ended
+flags                 | sample       | flag  | what to mind when reading the result
+"""
+
+_RESPONSE = """
+time                | time       | s     | time since the start
+joint               | joint      | text  | joint with clearance, O12 and O23
+crank_angle         | time       | rad   | crank angle
+slider_position     | time       | m     | slider position
+slider_velocity     | time       | m/s   | slider velocity
+slider_acceleration | time       | m/s^2 | slider acceleration
+rod_x               | time       | m     | x position of the mass centre of the rod
+rod_y               | time       | m     | y position of the mass centre of the rod
+rod_angle           | time       | rad   | rod angle
+eccentricity_x      | time joint | m     | x distance of the journal centre from the bearing centre
+eccentricity_y      | time joint | m     | y distance of the journal centre from the bearing centre
+penetration         | time joint | m     | overlap of journal and bearing
+contact_force       | time joint | N     | normal contact force
+friction_force      | time joint | N     | tangential contact force
+crank_moment        | time       | N m   | reaction moment on the crank
+kinetic_energy      | time       | J     | kinetic energy
+elastic_energy      | time       | J     | energy stored in the contacts
+driving_work        | time       | J     | work done by the drive since the start
+dissipated_energy   | time       | J     | energy dissipated since the start
+energy_residual     | time       | J     | what the energy balance leaves unexplained
+""" + _OUTCOME.replace("| sample joint |", "| joint |").replace("| sample ", "| ")
+
+_SAMPLES = (
+    """
+sample | sample | count | number of the sample in the design
+joint  | joint  | text  | joint with clearance, O12 and O23
+"""
+    + _OUTCOME
+)
+
+_FIT = """
+r2*          | {dims} | 1     | 1 - SSE/SST on test points
+rmae*        | {dims} | 1     | largest test error over their standard deviation
+r2_explained | {dims} | 1     | explained variance ratio, eq. 26 as printed
+rmae_mean    | {dims} | 1     | largest test error over their mean, eq. 27 as printed
+points       | {dims} | count | number of points fitted
+"""
+
+_SENSITIVITY = """
+surface           | surface                              | text | inputs of the response surface
+interval          | interval                             | 1    | interval, fraction of the range
+clearance         | clearance                            | m    | radial clearance
+parameter         | parameter                            | text | design variable
+sensitivity*      | surface interval clearance parameter | m    | slope at midpoint, times range
+standard_error*   | surface interval clearance parameter | m    | standard error of it
+converged*        | surface clearance parameter          | flag | whether it is determined
+sobol_first       | clearance parameter                  | 1    | first-order Sobol index
+sobol_first_error | clearance parameter                  | 1    | its standard error
+sobol_total       | clearance parameter                  | 1    | total Sobol index
+sobol_total_error | clearance parameter                  | 1    | its standard error
+influence         | parameter                            | m    | what the parameters are ranked by
+selected          | parameter                            | flag | whether its influence is great
+""" + _FIT.format(dims="surface interval clearance")
+
+_KRIGING = """
+model           | model                   | text  | name of the model
+point           | point                   | count | number of the training point
+other_point     | other_point             | count | number of the training point, again
+parameter       | parameter               | text  | design variable
+training_input* | model point parameter   | 1     | training point, in the unit cube
+training_output | model point             | m     | objective at the training point
+weight*         | model point             | 1     | weight of the training point in a prediction
+cholesky        | model point other_point | 1     | factor of the covariance of the points
+length_scale*   | model parameter         | 1     | correlation length, in the unit cube
+used            | model parameter         | flag  | whether the parameter is an input of the model
+signal_variance | model                   | 1     | variance of the process, in output_scale^2
+noise_variance  | model                   | 1     | variance of the noise, in output_scale^2
+output_mean     | model                   | m     | mean taken off before the fit
+output_scale    | model                   | m     | deviation divided by before the fit
+accepted        | model                   | flag  | whether the model passed on its test points
+""" + _FIT.format(dims="model")
+
+_FRONT = """
+case        | case              | text  | case of the robust design
+run         | run               | count | number of the run of the optimiser
+solution    | solution          | count | number of the solution in its run
+mean*       | case run solution | m     | mean of the objective, by the surrogate
+deviation*  | case run solution | m     | standard deviation of the objective, by the surrogate
+verified    | case run solution | flag  | whether the solution was simulated directly
+hypervolume | case run          | m^2   | area that the front dominates
+"""
+
+_VERIFICATION = """
+design              | design | text  | name of the design
+case                | design | text  | case of the robust design
+mean_true*          | design | m     | mean of the objective, by direct simulation
+mean_lower          | design | m     | lower confidence limit of the mean
+mean_upper          | design | m     | upper confidence limit of the mean
+mean_surrogate      | design | m     | mean of the objective, by the surrogate
+mean_error          | design | 1     | error of the surrogate mean, relative to the true one
+mean_paper          | design | m     | mean as printed in the paper, its Table 4
+deviation_true*     | design | m     | standard deviation, by direct simulation
+deviation_lower     | design | m     | lower confidence limit of the deviation
+deviation_upper     | design | m     | upper confidence limit of the deviation
+deviation_surrogate | design | m     | standard deviation, by the surrogate
+deviation_error     | design | 1     | error of the surrogate deviation, relative
+deviation_paper     | design | m     | deviation as printed in the paper, its Table 4
+samples             | design | count | number of simulations
+failed              | design | count | number of simulations that failed
+"""
+
+_CLAIMS = """
+claim    | claim | count | number of the claim
+text*    | claim | text  | what is claimed
+verdict* | claim | text  | holds, does not hold, or cannot be told
+figure*  | claim | text  | the number that decides
+"""
+
+_TIMING = """
+rank     | rank       | count | MPI rank
+stage    | stage      | text  | stage of the run
+busy*    | rank stage | s     | time spent computing
+idle*    | rank stage | s     | time spent waiting for other ranks
+compile* | rank stage | s     | time spent compiling
+write*   | rank stage | s     | time spent writing checkpoints and results
+samples  | rank stage | count | number of samples simulated
+command* |            | text  | the command that was run
+"""
+
+_DTYPES = {"count": ("1", "i8"), "flag": ("", "i1"), "text": ("", "text")}
+
+
+def _kind(
+    title: str, table: str, design_dims: tuple[str, ...] | None = None, *, whole: bool = False
+) -> Kind:
+    coords: dict[str, Variable] = {}
+    data: dict[str, Variable] = {}
+    required = set()
+    for line in filter(None, table.splitlines()):
+        starred, dims, units, long_name = (cell.strip() for cell in line.split("|"))
+        name = starred.rstrip("*")
+        units, dtype = _DTYPES.get(units, (units, "f8"))
+        row = Variable(tuple(dims.split()), units, long_name, dtype)
+        (coords if row.dims == (name,) else data)[name] = row
+        if starred != name:
+            required.add(name)
+    return Kind(title, coords, data, frozenset(data if whole else required), design_dims)
+
+
+KINDS = {
+    "response": _kind("Response of a mechanism with clearance joints", _RESPONSE),
+    "samples": _kind(
+        "Samples of a mechanism with clearance joints", _SAMPLES, ("sample",), whole=True
+    ),
+    "sensitivity": _kind("Sensitivity of the objective against clearance", _SENSITIVITY),
+    "kriging": _kind("Kriging models of the objective", _KRIGING, ("model",)),
+    "front": _kind("Fronts of mean and deviation", _FRONT, ("case", "run", "solution")),
+    "verification": _kind("Designs simulated directly", _VERIFICATION, ("design",)),
+    "claims": _kind("What the paper claims, tested on our data", _CLAIMS),
+    "timing": _kind("Where the time went", _TIMING),
+}
+"""Every result file by its kind."""
