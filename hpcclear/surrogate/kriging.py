@@ -1,14 +1,16 @@
-"""Kriging with a squared-exponential kernel: fitted by scikit-learn, predicted and stored without it.
+"""Kriging with a squared-exponential kernel: fitted by scikit-learn, used without it.
 
 The model is ordinary Kriging with a constant mean and a fitted noise term,
 
-    y(x) = mean + scale * (z(x) + noise),   cov(z(x), z(x')) = s2 exp(-sum_d (x_d - x'_d)^2 / (2 l_d^2)),
+    y(x) = mean + scale * (z(x) + noise),
+    cov(z(x), z(x')) = s2 exp(-sum_d (x_d - x'_d)^2 / (2 l_d^2)),
 
-in inputs scaled to the unit cube. A linear or a quadratic trend was tried on the clearance objective
-in five inputs (200 points, five seeds) and gained nothing: median R2 0.9971, 0.9971 and 0.9961.
+in inputs scaled to the unit cube. A linear or a quadratic trend was tried on the clearance
+objective in five inputs (200 points, five seeds) and gained nothing: median R2 0.9971 without,
+0.9971 and 0.9961 with.
 
-Sources: J. Sacks et al., "Design and analysis of computer experiments", Statistical Science 4 (1989),
-doi:10.1214/ss/1177012413; C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine
+Sources: J. Sacks et al., "Design and analysis of computer experiments", Statistical Science 4
+(1989), doi:10.1214/ss/1177012413; C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine
 Learning" (2006), section 2.2 and algorithm 2.1.
 """
 
@@ -25,7 +27,7 @@ from hpcclear.errors import InputError
 from hpcclear.surrogate.predictor import kernel_sum, pad
 
 LENGTH_BOUNDS = (1e-2, 1e2)
-"""Length scales in the unit cube; with scikit-learn's own (1e-5 to 1e5) noisy data collapse to a constant."""
+"""Length scales in the unit cube; over scikit-learn's own (1e-5 to 1e5) noisy fits can collapse."""
 SIGNAL_BOUNDS = (1e-3, 1e3)
 """Signal variance, in units of the variance of the values."""
 NOISE_BOUNDS = (1e-8, 1e1)
@@ -104,7 +106,7 @@ class Kriging:
 
     @cached_property
     def packed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled training points ``(d, p)`` and weights ``(p,)`` as the compiled predictor reads them."""
+        """Scaled training points ``(d, p)`` and weights ``(p,)`` for the compiled predictor."""
         weights = self.scale * self.signal_variance * self.alpha
         return pad(self.to_unit(self.inputs) / self.length_scales, weights)
 
@@ -132,7 +134,7 @@ class Kriging:
         )
 
     def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
-        """Kriging variance at ``(n, d)`` points, of the smooth part or with the `noise` of one evaluation.
+        """Kriging variance at ``(n, d)`` points, of the smooth part or of one noisy evaluation.
 
         Returns
         -------
@@ -256,8 +258,8 @@ def fit_kriging(
 def _maximise_likelihood(
     unit: np.ndarray, normalised: np.ndarray, rng: np.random.Generator, restarts: int
 ) -> tuple[np.ndarray, float, float, np.ndarray]:
-    """Length scales, signal variance, noise variance and alpha of normalised data in the unit cube."""
-    # Imported here: only fitting needs scikit-learn, and it takes longer to load than a stored model to answer.
+    """Length scales, signal and noise variance, and alpha, of normalised data in the unit cube."""
+    # Imported here: only fitting needs scikit-learn, and loading it takes a second.
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -285,7 +287,7 @@ def _maximise_likelihood(
 def inside(
     points: np.ndarray, names: Sequence[str], lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
-    """Points ``(n, d)`` as floats, after checking that none lies outside the box by more than round-off.
+    """Points ``(n, d)`` as floats, after checking that none lies outside the box (but for round-off).
 
     Raises
     ------
@@ -358,7 +360,7 @@ def _check_samples(
 def _check_array(
     arrays: Mapping[str, np.ndarray], name: str, dims: tuple[str, ...], sizes: dict[str, int]
 ) -> None:
-    """Refuse a stored array that is missing, of the wrong shape or kind; learn the dimensions on the way."""
+    """Refuse a stored array that is missing, of the wrong shape or kind; note its dimensions."""
     remedy = "use a file written by this package"
     if name not in arrays:
         raise InputError(name, None, "missing from the stored model", remedy)

@@ -1,4 +1,4 @@
-"""Compiled sums of squared-exponential kernels: Kriging means at points, and their moments over tensor rules.
+"""Compiled sums of squared-exponential kernels: Kriging means, and their moments over tensor rules.
 
 Everything runs along the training points, the one long dimension, so that a design's result does
 not depend on which other designs are in the batch. Numba has no vectorised exponential of its own;
@@ -14,10 +14,10 @@ REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
 
 STEEPEST = 300.0
-"""Exponents are cut here (exp(-300) = 5e-131), which keeps products of a few factors out of the slow denormals."""
+"""Exponents are cut here: exp(-300) = 5e-131 is as good as 0 and no (slow) denormal number."""
 
 LANES = 8
-"""Training points are padded to a multiple of this with weightless ones, so that no loop has a tail."""
+"""Training points are padded to a multiple of this, so that vectorised loops have no tail."""
 
 
 @intrinsic
@@ -42,7 +42,7 @@ def _float_as_bits(typingctx, value):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def gaussian(square: float) -> float:
-    """exp(-square / 2) for square >= 0, to 2e-16 relative, branch-free so that loops over it vectorise.
+    """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise.
 
     Range reduction to |r| <= ln(2)/2 and a Taylor polynomial of degree 13; the power of two is put
     together from its bits. Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits.
@@ -71,7 +71,7 @@ def gaussian(square: float) -> float:
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
-    """Fill `row` with the kernel between one place and every training point, over the inputs `dims`."""
+    """Fill `row` with the kernel, over the inputs `dims`, between a place and all training points."""
     count = row.size
     row[:] = 0.0
     for k in range(dims.size):
@@ -123,7 +123,7 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
 
 
 def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Training points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)`` with p a multiple of `LANES`."""
+    """Training points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)``, p whole `LANES`."""
     count, dims = points.shape
     padded = -(-count // LANES) * LANES
     transposed, filled = np.zeros((dims, padded)), np.zeros(padded)
@@ -176,7 +176,8 @@ def tensor_moments(  # type: ignore[no-untyped-def]
     starts, dims : (g + 1,) and (starts[-1],) arrays of int
         Group k holds the inputs ``dims[starts[k] : starts[k + 1]]``.
     steady : (q, p) array
-        Weights of the training points times the kernel rows of the q steady nodes, q a multiple of 4.
+        Weights of the training points times the kernel rows of the q steady nodes (padded to
+        a multiple of 4).
     steady_shares : (q,) array
         Their probabilities (0 for padding).
     scaled, lengths

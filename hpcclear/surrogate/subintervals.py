@@ -1,7 +1,7 @@
 """Kriging over a wide domain as a product of models, each on its own subinterval of the inputs.
 
-The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's interval, L'_i that of its
-subintervals). A box is accepted by R2 and RMAE on test points of its own; a refused one gets more
+The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's interval, L'_i that of
+its subintervals). A box is accepted by R2 and RMAE on test points of its own; a refused one gets more
 training points, then is cut in half across the input that varies fastest, down to a stated depth.
 A query uses the model of the box it is in. A single model is the case of one box.
 """
@@ -23,7 +23,7 @@ RAGGED = ("inputs", "values", "alpha")
 PIECEWISE_FIELDS: dict[str, tuple[str, ...]] = {
     name: dims if name in SHARED + RAGGED else ("leaf", *dims) for name, dims in FIELDS.items()
 } | {"training_points": ("leaf",), "r2": ("leaf",), "rmae": ("leaf",), "accepted": ("leaf",)}
-"""What is stored, with dimensions; the leaves' training points lie end to end, `training_points` of each."""
+"""What is stored, with dimensions; the leaves' training points lie end to end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class PiecewiseKriging:
         return index
 
     def predict(self, points: np.ndarray) -> np.ndarray:
-        """Kriging mean at ``(n, d)`` points, each from the model of its box; see `Kriging.predict`."""
+        """Kriging mean at ``(n, d)`` points, each by its box's model; see `Kriging.predict`."""
         return self._by_leaf(points, lambda leaf, part: leaf.predict(part))
 
     def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
