@@ -13,8 +13,9 @@ variable on its own:
    (Lepski's choice of a bandwidth, DOI 10.1137/1135065.)
 3. The uncertainty of an estimate joins its standard error with the truncation that may be left: the
    change since the interval before it, extrapolated to length 0.
-4. A derivative is determined in an interval if it differs from 0 by more than t uncertainties, and
-   in the interval before it by more than t standard errors with the same sign.
+4. A derivative is determined in an interval if it differs from 0 by more than t' uncertainties, and
+   in the interval before it by more than t' standard errors with the same sign. t' is t corrected
+   for the number of intervals looked at (Bonferroni): whoever looks often finds something.
 5. The convergence interval is the widest one after the beginning of the plateau in which the
    derivative is determined. As in the paper, it is the second of two that agree.
 
@@ -99,12 +100,13 @@ def convergence_intervals(
     for c, j in np.ndindex(*shape):
         usable = np.flatnonzero(np.isfinite(history.standard_error[:, c, j]))
         slope, error = history.sensitivity[usable, c, j], history.standard_error[usable, c, j]
-        critical = stdtrit(history.degrees_of_freedom[usable, c], 0.5 + confidence / 2.0)
-        start = _plateau_start(slope, error, critical, tolerance)
+        freedom = history.degrees_of_freedom[usable, c]
+        start = _plateau_start(slope, error, _student(freedom, 1.0 - confidence), tolerance)
         if start >= len(usable) - 1:
             continue  # a plateau needs two
         plateau[c, j] = usable[start]
         uncertainty = _uncertainty(slope, error, lengths[usable] ** history.order)
+        critical = _student(freedom, (1.0 - confidence) / (len(usable) - 1))
         at = _first_determined(slope, error, uncertainty, critical, start)
         if at is not None:
             interval[c, j] = usable[at]
@@ -150,6 +152,11 @@ def best_estimates(
         np.where(bounded, slope, intervals.sensitivity),
         np.where(bounded, error, intervals.uncertainty),
     )
+
+
+def _student(freedom: NDArray[np.int64], doubt: float) -> FloatArray:
+    """Two-sided Student quantiles that chance passes with probability `doubt`."""
+    return np.asarray(stdtrit(freedom, 1.0 - doubt / 2.0))
 
 
 def _plateau_start(

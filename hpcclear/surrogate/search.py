@@ -104,7 +104,7 @@ def fit_until_accepted(
     limits = check_bounds(bounds)
     _check_search(orders, n_points, n_test, max_points)
     test = sample(n_test, limits, rng)
-    true = evaluate(test)
+    true = _test_values(evaluate(test))
     attempts: list[Attempt] = []
     best: tuple[ResponseSurface, Accuracy] | None = None
     for points, values in _growing_sample(evaluate, sample, limits, rng, n_points, max_points):
@@ -134,6 +134,18 @@ def fit_until_accepted(
         f"RMAE = {best[1].rmae:.3g}"
     )
     return SurfaceSearch(*best, False, reason, tuple(attempts))
+
+
+def _test_values(values: FloatArray) -> FloatArray:
+    """The test values, refused before anything is spent on training if most of them failed."""
+    if np.count_nonzero(np.isfinite(values)) < 2:
+        raise InputError(
+            "test points",
+            len(values),
+            "fewer than two of them have a finite value",
+            "take more test points or mend the failing simulations",
+        )
+    return values
 
 
 def _growing_sample(

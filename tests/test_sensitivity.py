@@ -1,0 +1,478 @@
+"""Sensitivity against functions with known derivatives and known Sobol indices."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from SALib.test_functions import Ishigami, Sobol_G
+
+from hpcclear.errors import InputError
+from hpcclear.sensitivity import (
+    Influence,
+    IntervalSettings,
+    SensitivityHistory,
+    SobolIndices,
+    analyse_intervals,
+    analyse_sobol,
+    best_estimates,
+    convergence_intervals,
+    design_intervals,
+    select_influential,
+    sensitivity_history,
+    sobol_design,
+    sobol_indices,
+)
+
+BOUNDS = np.array([[0.105, 0.42], [1.3e-4, 5.0e-4]])  # a mass and an inertia
+MIDDLE, HALF = BOUNDS.mean(axis=1), np.ptp(BOUNDS, axis=1) / 2
+CLEARANCES = np.array([0.3e-3, 0.65e-3, 1.0e-3])
+Function = Callable[[np.ndarray], np.ndarray]
+
+
+def curved(points: np.ndarray) -> np.ndarray:
+    """No polynomial, and clearance sets the slopes: at the midpoint 3 C u and -2 C v."""
+    u, v = ((points[:, :2] - MIDDLE) / HALF).T
+    return points[:, 2] * (np.sin(3 * u) + np.exp(-2 * v) + 0.5 * u * v)
+
+
+def slopes(clearances: np.ndarray) -> np.ndarray:
+    return np.outer(clearances, [3.0, -2.0]) / HALF
+
+
+def with_noise(function: Function, sigma: float, seed: int) -> Function:
+    rng = np.random.default_rng(10_000 + seed)
+    return lambda points: function(points) + sigma * rng.standard_normal(len(points))
+
+
+def history(function: Function, seed: int = 0, **settings: float) -> SensitivityHistory:
+    rng = np.random.default_rng(seed)
+    return sensitivity_history(
+        function,
+        BOUNDS,
+        CLEARANCES,
+        rng,
+        IntervalSettings(**settings),  # type: ignore[arg-type]
+    )
+
+
+# the design ---------------------------------------------------------------------------------------
+
+
+def test_intervals_shrink_together_about_their_midpoints() -> None:
+    design = design_intervals(
+        BOUNDS, CLEARANCES, np.random.default_rng(0), IntervalSettings(steps=5, shrink=0.2)
+    )
+    assert design.intervals.shape == (5, 2, 2)
+    np.testing.assert_array_equal(design.intervals[0], BOUNDS)
+    np.testing.assert_allclose(design.intervals.mean(axis=2), np.tile(MIDDLE, (5, 1)), rtol=1e-14)
+    lengths = np.ptp(design.intervals, axis=2) / np.ptp(BOUNDS, axis=1)
+    np.testing.assert_allclose(lengths, np.outer(0.8 ** np.arange(5), [1, 1]), rtol=1e-12)
+    blocks = design.points.reshape(5, 3, 50, 3)
+    assert (blocks[..., 2] == CLEARANCES[:, np.newaxis]).all()
+    inside = blocks[..., :2] - design.intervals[:, np.newaxis, np.newaxis, :, 0]
+    assert (inside >= 0).all()
+    assert (inside <= np.ptp(design.intervals, axis=2)[:, np.newaxis, np.newaxis]).all()
+    assert len(np.unique(design.points, axis=0)) == len(design.points)  # every surface its own
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        ({"steps": 0}, "steps"),
+        ({"shrink": 0.0}, "shrink"),
+        ({"shrink": 1.0}, "shrink"),
+        ({"order": 0}, "order"),
+        ({"n_test": 1}, "n_test"),
+        ({"n_points": 10}, "n_points"),
+    ],
+)
+def test_refuses_settings(settings: dict, key: str) -> None:
+    with pytest.raises(InputError, match=key):
+        history(curved, **settings)
+
+
+@pytest.mark.parametrize("clearances", [[], [np.nan], [[1.0]]])
+def test_refuses_clearances(clearances: list) -> None:
+    with pytest.raises(InputError, match="clearances"):
+        design_intervals(BOUNDS, clearances, np.random.default_rng(0))
+
+
+# midpoint sensitivity -----------------------------------------------------------------------------
+
+
+def test_midpoint_sensitivity_of_a_cubic_is_exact_at_every_clearance() -> None:
+    def cubic(points: np.ndarray) -> np.ndarray:
+        u, v = ((points[:, :2] - MIDDLE) / HALF).T
+        return points[:, 2] * (1 + 3 * u - 2 * v + u * v + u**3 - 2 * u * v**2)
+
+    found = history(cubic, steps=1)
+    assert found.sensitivity.shape == (1, 3, 2)
+    np.testing.assert_allclose(found.sensitivity[0], slopes(CLEARANCES), rtol=1e-10)
+    np.testing.assert_allclose(found.r2, 1, atol=1e-12)
+    np.testing.assert_allclose(found.rmae, 0, atol=1e-10)
+    assert (found.degrees_of_freedom == 35).all()
+    assert (found.failed == 0).all()
+    verdict = convergence_intervals(found)
+    assert not verdict.found.any()  # one interval shows no convergence
+
+
+def test_a_cubic_converges_at_once() -> None:
+    verdict = convergence_intervals(history(lambda p: p[:, 2] + p[:, 0] ** 3 - p[:, 1]))
+    assert (verdict.interval == 1).all()
+    assert (verdict.plateau == 0).all()
+    expected = np.tile([3 * MIDDLE[0] ** 2, -1.0], (3, 1))
+    np.testing.assert_allclose(verdict.sensitivity, expected, rtol=1e-8)
+
+
+# the convergence loop -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-6, 1e-5, 5e-5])
+def test_loop_finds_the_interval_and_the_derivative(sigma: float) -> None:
+    truth, n_seeds = slopes(CLEARANCES), 30
+    score, found, steps = [], [], []
+    for seed in range(n_seeds):
+        verdict = convergence_intervals(history(with_noise(curved, sigma, seed), seed))
+        found.append(verdict.found)
+        score.append((verdict.sensitivity - truth) / verdict.uncertainty)
+        steps.append(verdict.interval[verdict.found])
+    within = np.abs(np.array(score)[np.array(found)])
+    assert np.mean(found) > 0.93
+    assert np.mean(within <= 2) > 0.93  # 95 % by right, 180 cases
+    assert within.max() < 4.5
+    # short enough for sin(3 u) where f is clean, and no shorter than the noise leaves sense in
+    wanted = {0.0: 2.0, 1e-6: 2.0, 1e-5: 1.5, 5e-5: 1.0}[sigma]
+    assert np.concatenate(steps).mean() > wanted
+
+
+def test_wide_interval_alone_would_be_wrong() -> None:
+    """The loop is there for a reason: over the global interval truncation exceeds the error."""
+    found = history(with_noise(curved, 1e-6, 0))
+    off = np.abs(found.sensitivity - slopes(CLEARANCES)) / found.standard_error
+    verdict = convergence_intervals(found)
+    assert (off[0, :, 0] > 4).all()
+    assert (verdict.interval[:, 0] >= 2).all()
+    assert verdict.found.all()
+
+
+def test_noise_amplification_in_short_intervals_is_in_the_standard_error() -> None:
+    runs = [history(with_noise(lambda p: p[:, 0], 1e-3, s), s) for s in range(60)]
+    error = np.sqrt(np.mean([r.standard_error**2 for r in runs], axis=(0, 2)))
+    scatter = np.std([r.sensitivity for r in runs], axis=(0, 2))
+    np.testing.assert_allclose(error / scatter, 1, atol=4 / np.sqrt(2 * 180))
+    np.testing.assert_allclose(error[1:] / error[:-1], 1 / 0.7, rtol=0.1)
+
+
+@pytest.mark.parametrize("steps", [2, 6, 10])
+def test_pure_noise_is_not_determined(steps: int) -> None:
+    for seed in range(60):
+        verdict = convergence_intervals(
+            history(with_noise(lambda p: np.zeros(len(p)), 1e-4, seed), seed, steps=steps)
+        )
+        assert not verdict.found.any()
+        assert (verdict.interval == -1).all()
+        assert np.isnan(verdict.sensitivity).all()
+        assert np.isnan(verdict.uncertainty).all()
+        assert not verdict.converged.any()
+
+
+def test_a_variable_without_influence_is_not_determined_beside_one_with() -> None:
+    found = history(with_noise(lambda p: p[:, 2] * (p[:, 0] / HALF[0]) ** 2, 1e-6, 1), 1)
+    verdict = convergence_intervals(found)
+    assert verdict.found[:, 0].all()
+    assert not verdict.found[:, 1].any()
+    assert (verdict.plateau[:, 1] >= 0).all()
+    slope, error = best_estimates(found, verdict)
+    np.testing.assert_array_equal(slope[:, 0], verdict.sensitivity[:, 0])
+    assert (np.abs(slope[:, 1]) < 4 * error[:, 1]).all()
+    assert (error[:, 1] * HALF[1] < 1e-5).all()
+
+
+def test_a_kink_at_the_midpoint_has_no_slope() -> None:
+    def kink(points: np.ndarray) -> np.ndarray:
+        return np.abs((points[:, 0] - MIDDLE[0]) / HALF[0])
+
+    for seed in range(10):
+        assert not convergence_intervals(history(kink, seed)).found.any()
+
+
+def test_constant_function_is_not_determined() -> None:
+    found = history(lambda p: np.full(len(p), 2.7e-4))
+    assert (found.sensitivity == 0.0).all()
+    assert np.isnan(found.r2).all()
+    verdict = convergence_intervals(found)
+    assert not verdict.found.any()
+    chosen = select_influential(["m2", "I2"], *best_estimates(found, verdict), 2 * HALF)
+    assert chosen.selected == ()
+    assert (chosen.influence == Influence.UNDECIDED).all()
+
+
+def test_still_changing_is_told_from_not_distinguishable() -> None:
+    """Slope 1/length: it never stops changing, and says so."""
+    design = design_intervals(BOUNDS, CLEARANCES, np.random.default_rng(0))
+    scale = np.repeat(0.7 ** np.arange(6), 150)
+    u = (design.points[:, 0] - MIDDLE[0]) / HALF[0] / scale
+    found = analyse_intervals(design, u)
+    verdict = convergence_intervals(found)
+    assert not verdict.found[:, 0].any()
+    assert (verdict.plateau[:, 0] == -1).all()
+    assert np.isnan(best_estimates(found, verdict)[0][:, 0]).all()
+
+
+def test_converged_marks_the_interval_and_all_shorter_ones() -> None:
+    verdict = convergence_intervals(history(with_noise(curved, 1e-6, 3), 3))
+    for c, j in np.ndindex(3, 2):
+        at = verdict.interval[c, j]
+        assert at > 0
+        np.testing.assert_array_equal(verdict.converged[:, c, j], np.arange(6) >= at)
+
+
+def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
+    design = design_intervals(BOUNDS, CLEARANCES, np.random.default_rng(5))
+    values = curved(design.points).reshape(6, 3, 50)
+    values[0, 0, :5] = np.nan  # enough are left
+    values[1, 1, :40] = np.nan  # 5 training points for 10 terms
+    values[2, 2, 46:] = np.nan  # one test point
+    found = analyse_intervals(design, values.ravel())
+    assert (found.failed[0, 0], found.failed[1, 1], found.failed[2, 2]) == (5, 40, 4)
+    assert found.degrees_of_freedom[0, 0] == 30
+    assert np.isnan(found.sensitivity[1, 1]).all()
+    assert np.isnan(found.standard_error[1, 1]).all()
+    assert np.count_nonzero(np.isnan(found.sensitivity[..., 0])) == 1
+    assert np.isnan(found.r2[2, 2])
+    assert np.isfinite(found.sensitivity[2, 2]).all()
+    verdict = convergence_intervals(found)
+    assert verdict.found.all()  # the gap is stepped over
+    assert (verdict.interval[1] != 1).all()
+
+
+def test_all_failed_is_refused() -> None:
+    with pytest.raises(InputError, match="no surface"):
+        history(lambda p: np.full(len(p), np.nan))
+    design = design_intervals(BOUNDS, CLEARANCES, np.random.default_rng(0))
+    with pytest.raises(InputError, match="values"):
+        analyse_intervals(design, np.zeros(3))
+    found = history(curved)
+    for wrong in ({"confidence": 1.0}, {"confidence": 0.0}, {"tolerance": -0.1}, {"tolerance": 1}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            convergence_intervals(found, **wrong)
+
+
+def test_history_repeats_bit_for_bit_and_points_do_not_depend_on_values() -> None:
+    one, two = history(curved, 0), history(curved, 0)
+    np.testing.assert_array_equal(one.sensitivity, two.sensitivity)
+    np.testing.assert_array_equal(one.standard_error, two.standard_error)
+
+
+# selection ----------------------------------------------------------------------------------------
+
+
+def test_selection_compares_effects_over_the_interval_not_slopes() -> None:
+    slope = [[2e-4, 1.0, 1e-6]]  # per kg, per kg m2, per m
+    chosen = select_influential(["m2", "I2", "u2"], slope, [[1e-6] * 3], [0.3, 4e-4, 0.12])
+    np.testing.assert_allclose(chosen.effect, [[6e-5, 4e-4, 1.2e-7]])
+    np.testing.assert_array_equal(chosen.rank, [[2, 1, 3]])
+    assert chosen.selected == ("I2", "m2")
+    np.testing.assert_array_equal(
+        chosen.influence,
+        [[Influence.INFLUENTIAL, Influence.INFLUENTIAL, Influence.NEGLIGIBLE]],
+    )
+
+
+def test_selection_respects_standard_errors() -> None:
+    names, lengths = ["sure", "noisy", "small", "vague"], [1.0] * 4
+    slope, error = [[1.0, 0.5, 0.01, 0.02]], [[0.01, 0.4, 0.001, 0.5]]
+    chosen = select_influential(names, slope, error, lengths)
+    np.testing.assert_array_equal(
+        chosen.influence[0],
+        [Influence.INFLUENTIAL, Influence.UNDECIDED, Influence.NEGLIGIBLE, Influence.UNDECIDED],
+    )
+    assert chosen.selected == ("sure",)
+
+
+def test_the_largest_effect_must_itself_be_sure() -> None:
+    """A wild estimate must not push the real variables below the fraction."""
+    chosen = select_influential(["wild", "real"], [[100.0, 1.0]], [[90.0, 0.01]], [1.0, 1.0])
+    assert chosen.selected == ("real",)
+
+
+def test_selection_is_stable_across_clearances() -> None:
+    names, lengths = ["a", "b", "c"], [1.0] * 3
+    slope = np.tile([1.0, 0.5, 0.01], (8, 1))
+    error = np.full((8, 3), 1e-3)
+    slope[3] = [1.0, 0.01, 0.6]  # one clearance says otherwise
+    chosen = select_influential(names, slope, error, lengths)
+    assert chosen.selected == ("a", "b")
+    np.testing.assert_allclose(chosen.share, [1, 7 / 8, 1 / 8])
+    assert not chosen.order_stable
+    calm = select_influential(names, np.delete(slope, 3, axis=0), error[1:], lengths)
+    assert calm.order_stable
+    blurred = select_influential(names, slope, error * 300, lengths)
+    assert blurred.order_stable  # no change that the errors do not explain
+
+
+def test_missing_estimates_neither_help_nor_harm() -> None:
+    slope = np.array([[1.0, 0.5, np.nan], [np.nan, np.nan, np.nan], [1.0, np.nan, np.nan]])
+    chosen = select_influential(["a", "b", "c"], slope, np.full((3, 3), 1e-3), [1.0] * 3)
+    assert chosen.selected == ("a", "b")
+    np.testing.assert_array_equal(chosen.share, [1, 1, np.nan])
+    np.testing.assert_array_equal(chosen.rank, [[1, 2, 0], [0, 0, 0], [1, 0, 0]])
+    assert np.isnan(chosen.effect[0, 2])
+
+
+def test_a_variable_in_two_surfaces_is_selected_once() -> None:
+    names = ["m1", "m2", "m2", "m3"]
+    chosen = select_influential(names, [[0.0, 1.0, 0.02, 0.4]], [[1e-3] * 4], [1.0] * 4)
+    assert chosen.selected == ("m2", "m3")
+    assert chosen.influence[0, 0] == Influence.NEGLIGIBLE
+
+
+def test_selection_of_a_constant_is_empty() -> None:
+    chosen = select_influential(["a", "b"], np.zeros((4, 2)), np.full((4, 2), 1e-18), [1.0, 1.0])
+    assert chosen.selected == ()
+    assert chosen.order_stable
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        ("names", {"names": ["a"]}),
+        ("names", {"names": []}),
+        ("names", {"lengths": [1.0]}),
+        ("lengths", {"lengths": [1.0, 0.0]}),
+        ("sensitivity", {"standard_error": [[1.0]]}),
+        ("sensitivity", {"sensitivity": np.empty((0, 2)), "standard_error": np.empty((0, 2))}),
+        ("standard_error", {"standard_error": [[1.0, -1.0]]}),
+        ("fraction", {"fraction": 0.0}),
+        ("share", {"share": 1.5}),
+        ("confidence", {"confidence": 1.0}),
+    ],
+)
+def test_selection_refuses(key: str, change: dict) -> None:
+    good = {
+        "names": ["a", "b"],
+        "sensitivity": [[1.0, 2.0]],
+        "standard_error": [[0.1, 0.1]],
+        "lengths": [1.0, 1.0],
+    }
+    select_influential(**good)
+    with pytest.raises(InputError) as refusal:
+        select_influential(**{**good, **change})
+    assert refusal.value.key == key
+
+
+# Sobol indices ------------------------------------------------------------------------------------
+
+TORUS = np.tile([-np.pi, np.pi], (3, 1))
+G_WEIGHTS = np.array([0, 1, 4.5, 9, 99, 99, 99, 99.0])
+UNIT = np.tile([0.0, 1.0], (8, 1))
+
+
+def ishigami_truth() -> tuple[np.ndarray, np.ndarray]:
+    """Closed form, a = 7, b = 0.1 (Ishigami and Homma 1990, DOI 10.1109/ISUMA.1990.151285)."""
+    first = np.array([0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2, 49 / 8, 0.0])
+    both = 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
+    variance = first.sum() + both
+    return first / variance, (first + np.array([both, 0, both])) / variance
+
+
+def sobol_g_truth() -> tuple[np.ndarray, np.ndarray]:
+    """Closed form (Saltelli and Sobol 1995)."""
+    part = 1 / (3 * (1 + G_WEIGHTS) ** 2)
+    rest = np.prod(1 + part) / (1 + part)
+    variance = np.prod(1 + part) - 1
+    return part / variance, part * rest / variance
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    ("function", "bounds", "truth"),
+    [
+        (Ishigami.evaluate, TORUS, ishigami_truth),
+        (lambda x: Sobol_G.evaluate(x, a=G_WEIGHTS), UNIT, sobol_g_truth),
+    ],
+    ids=["Ishigami", "Sobol G"],
+)
+def test_known_indices(
+    function: Function,
+    bounds: np.ndarray,
+    truth: Callable[[], tuple[np.ndarray, np.ndarray]],
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    found = sobol_indices(function, bounds, rng, 2**14, n_resamples=20)
+    first, total = truth()
+    np.testing.assert_allclose(found.first, first, atol=0.01, rtol=0)
+    np.testing.assert_allclose(found.total, total, atol=0.01, rtol=0)
+    assert (found.n_rows, found.n_dropped) == (2**14, 0)
+
+
+def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -> SobolIndices:
+    rng = np.random.default_rng(seed)
+    return sobol_indices(function, TORUS, rng, 256, **options)  # type: ignore[arg-type]
+
+
+def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say() -> None:
+    truth = np.concatenate(ishigami_truth())
+    held = []
+    for seed in range(40):
+        found = small(seed)
+        limits = np.vstack([found.first_limits, found.total_limits])
+        held.append((limits[:, 0] <= truth + 1e-12) & (truth - 1e-12 <= limits[:, 1]))
+    assert np.mean(held) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 240)
+
+
+def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
+    narrow, wide = small(1, confidence=0.5), small(1, confidence=0.99)
+    np.testing.assert_array_equal(narrow.first, wide.first)
+    assert (np.ptp(wide.total_limits, axis=1) > np.ptp(narrow.total_limits, axis=1)).all()
+    assert ((wide.total_limits[:, 0] < wide.total) & (wide.total < wide.total_limits[:, 1])).all()
+
+
+def test_additive_function_on_a_skewed_box_shares_its_variance_exactly() -> None:
+    bounds = np.array([[0.0, 1.0], [5.0, 7.0], [-1e-3, 1e-3]])
+    found = sobol_indices(
+        lambda x: 1e6 + x.sum(axis=1), bounds, np.random.default_rng(0), 4096
+    )  # a large mean must not spoil it
+    variances = np.ptp(bounds, axis=1) ** 2 / 12
+    np.testing.assert_allclose(found.first, variances / variances.sum(), atol=2e-3)
+    np.testing.assert_allclose(found.total, variances / variances.sum(), atol=2e-3)
+    assert found.variance == pytest.approx(variances.sum(), rel=1e-2)
+    assert found.mean == pytest.approx(1e6 + 6.5, rel=1e-8)
+
+
+def test_failed_rows_are_dropped_whole_and_counted() -> None:
+    rng = np.random.default_rng(0)
+    points = sobol_design(TORUS, 1024, rng)
+    values = Ishigami.evaluate(points)
+    broken = values.copy()
+    broken[[3, 1024 + 10, 2 * 1024 + 3, 4 * 1024 + 99]] = np.nan  # rows 3, 10 and 99
+    found = analyse_sobol(broken, 3, np.random.default_rng(1))
+    kept = np.delete(values.reshape(5, -1), [3, 10, 99], axis=1).ravel()
+    same = analyse_sobol(kept, 3, np.random.default_rng(1))
+    assert (found.n_rows, found.n_dropped) == (1021, 3)
+    np.testing.assert_array_equal(found.first, same.first)
+    np.testing.assert_array_equal(found.total_limits, same.total_limits)
+
+
+def test_constant_has_no_indices_and_a_seed_of_zero_is_a_seed() -> None:
+    found = small(0, lambda x: np.full(len(x), 0.1))
+    assert np.isnan(found.first).all()
+    assert np.isnan(found.total_limits).all()
+    np.testing.assert_array_equal(small(0).total_limits, small(0).total_limits)
+    assert (small(0).first != small(1).first).any()
+
+
+def test_sobol_refuses() -> None:
+    rng = np.random.default_rng(0)
+    for n_rows in (0, 1, 1000, -4):
+        with pytest.raises(InputError, match="powers of two"):
+            sobol_design(TORUS, n_rows, rng)
+    with pytest.raises(InputError, match="values"):
+        analyse_sobol(np.zeros(11), 3, rng)
+    with pytest.raises(InputError, match="nearly every row"):
+        analyse_sobol(np.full(50, np.nan), 3, rng)
+    with pytest.raises(InputError, match="confidence"):
+        analyse_sobol(np.zeros(10), 3, rng, confidence=95)
+    with pytest.raises(InputError, match="n_resamples"):
+        analyse_sobol(np.zeros(10), 3, rng, n_resamples=1)
