@@ -13,7 +13,8 @@ NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
 
 
 def slender_inertia(mass: float, length: float) -> float:
-    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass would have."""
+    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass
+    would have."""
     return mass * length**2 / 12
 
 
@@ -52,22 +53,26 @@ def warnings(scene: "Scene") -> Iterator[str]:
         least = slender_inertia(link.mass, link.length)
         if link.inertia < least * (1 - 1e-12):
             yield (
-                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is less than a thin uniform rod of that mass and "
-                f"length has ({least:g} kg m2)"
+                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is less than a thin uniform "
+                f"rod of that mass and length has ({least:g} kg m2)"
             )
         if not 0 <= link.mass_center <= link.length:
             yield (
-                f"mechanism.{name}.mass_center = {link.mass_center:g} m lies beyond the pins, which are at 0 and "
-                f"{link.length:g} m"
+                f"mechanism.{name}.mass_center = {link.mass_center:g} m lies beyond the pins, "
+                f"which are at 0 and {link.length:g} m"
             )
     for name in scene.clearance_joints():
         joint = getattr(scene.joints, name)
         if sum(part**2 for part in joint.start_eccentricity) > joint.clearance**2 * (1 + 1e-12):
-            yield f"joints.{name}.start_eccentricity lies outside the clearance, so the run starts in contact"
+            yield (
+                f"joints.{name}.start_eccentricity lies outside the clearance, "
+                "so the run starts in contact"
+            )
 
 
 def differences(first: "Scene", second: "Scene") -> list[str]:
-    """Dotted keys in which two scenes differ, each with both values; empty when their hashes are equal."""
+    """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
+    equal."""
     ours, theirs = dict(flatten(first.resolved())), dict(flatten(second.resolved()))
     lines = [
         f"{key}: {ours.get(key, '(not set)')!r} -> {theirs.get(key, '(not set)')!r}"

@@ -1,7 +1,7 @@
 """The box a study samples: bounds of its variables, widened by the random inputs about them.
 
-Its coordinates are the values themselves (SI), except that an inertia given as a ratio is sampled as
-r = I / (m L^2/12), because its bounds depend on the mass.
+Its coordinates are the values themselves (SI), except that an inertia given as a ratio is sampled
+as r = I / (m L^2/12), because its bounds depend on the mass.
 """
 
 import itertools
@@ -50,8 +50,8 @@ def box(scene: "Scene", names: Sequence[str] | None = None, widen: Iterable[str]
     names : sequence of str, optional
         Study variables, in the order of the columns; all of them by default.
     widen : iterable of str
-        Random inputs by whose reach the box grows, so that a surrogate trained on it never extrapolates. Those that are
-        absolute, or no variables among `names`, change nothing.
+        Random inputs by whose reach the box grows, so that a surrogate trained on it never
+        extrapolates. Those that are absolute, or no variables among `names`, change nothing.
 
     Raises
     ------
@@ -85,8 +85,8 @@ def _bounds(
     width = reach.get(variable.paths[0], 0.0)
     if variable.ratio is None:
         return lower - width, upper + width
-    # The random inputs move I, m and L separately; r = 12 I/(m L^2) is monotonic in each of them and in the design,
-    # so its extremes are at corners.
+    # The random inputs move I, m and L separately; r = 12 I/(m L^2) is monotonic in each of them
+    # and in the design, so its extremes are at corners.
     link = variable.paths[0].rpartition(".")[0]
     masses, lengths = (_span(scene, f"{link}.{part}", names) for part in ("mass", "length"))
     dm, dl = reach.get(f"{link}.mass", 0.0), reach.get(f"{link}.length", 0.0)
@@ -106,7 +106,8 @@ def _bounds(
 
 
 def _span(scene: "Scene", path: str, names: tuple[str, ...]) -> tuple[float, float]:
-    """Range of the design values at a path: its variable's, if that is among `names`, else the scene's."""
+    """Range of the design values at a path: its variable's, if that is among `names`, else the
+    scene's."""
     for name in names:
         variable = study_of(scene).variable(name)
         if path in variable.paths and variable.range is not None:
@@ -116,7 +117,7 @@ def _span(scene: "Scene", path: str, names: tuple[str, ...]) -> tuple[float, flo
 
 
 def to_physical(scene: "Scene", names: Sequence[str], coordinates: Array) -> Array:
-    """Sampling coordinates to SI values: ratios become inertias by the mass and length of the same row.
+    """Sampling coordinates to SI values: ratios become inertias by mass and length of the same row.
 
     Both arrays have shape ``(n, d)``, a column a name.
     """
@@ -129,20 +130,35 @@ def to_coordinates(scene: "Scene", names: Sequence[str], values: Array) -> Array
 
 
 def _scaled(scene: "Scene", names: Sequence[str], columns: Array, inverse: bool) -> Array:
-    study = study_of(scene)
+    variables = [study_of(scene).variable(name) for name in names]
     result = np.array(columns, dtype=np.float64)
-    owner = {
-        path: column for column, name in enumerate(names) for path in study.variable(name).paths
-    }
-    for column, name in enumerate(names):
-        variable = study.variable(name)
-        if variable.ratio is None:
-            continue
-        link = variable.paths[0].rpartition(".")[0]
-        mass, length = (
-            result[:, owner[path]] if path in owner else scene.number(path)
-            for path in (f"{link}.mass", f"{link}.length")
-        )
-        unit = mass * length**2 / 12
-        result[:, column] = result[:, column] / unit if inverse else result[:, column] * unit
+    paths = [variable.paths for variable in variables]
+    for column, variable in enumerate(variables):
+        if variable.ratio is not None:
+            unit = slender_inertias(scene, paths, result, variable.paths[0])
+            result[:, column] = result[:, column] / unit if inverse else result[:, column] * unit
     return result
+
+
+def slender_inertias(
+    scene: "Scene", paths: Sequence[Sequence[str]], values: Array, inertia: str
+) -> Array | float:
+    """m L^2/12 of the link whose inertia stands at the path `inertia`, of each row (kg m2).
+
+    `values` has shape ``(n, d)``, and column i drives the scene entries ``paths[i]``; mass and
+    length come from the row where a column drives them, and from the scene where none does.
+    """
+    link = inertia.rpartition(".")[0]
+    mass, length = (entries(scene, paths, values, f"{link}.{part}") for part in ("mass", "length"))
+    return mass * length**2 / 12
+
+
+def entries(
+    scene: "Scene", paths: Sequence[Sequence[str]], values: Array, path: str
+) -> Array | float:
+    """What stands at `path` in each row: the column that drives it, shape (n,), or the scene's
+    number."""
+    for column, driven in enumerate(paths):
+        if path in driven:
+            return values[:, column]
+    return scene.number(path)

@@ -168,7 +168,8 @@ class Effects(Table):
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """m/s2, towards -y; 0 is off."""
     slider_load: Annotated[Curve, CurveOf("N")] | None = None
-    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or left out is off."""
+    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or
+    left out is off."""
     guide_friction: GuideFriction | None = None
     """Friction of the slider in its guide; left out is off."""
 

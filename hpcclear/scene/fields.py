@@ -1,8 +1,10 @@
-"""The building blocks of scene models: strict frozen tables, quantities with a unit and bounds, counts, curves."""
+"""The building blocks of scene models: strict frozen tables, quantities with a unit and bounds,
+counts, curves."""
 
 import difflib
 import itertools
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -20,10 +22,12 @@ from hpcclear.scene.units import UnitError, to_si
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LONGEST_CURVE = 10_000
+MOST_LISTED = 20
 
 
 def problem(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
-    """An error for validators: `key` is relative to the table that is validated; `...` means "look it up"."""
+    """An error for validators: `key` is relative to the table that is validated; `...` means "look
+    it up"."""
     return PydanticCustomError(
         "scene",
         "{reason}. {remedy}",
@@ -36,7 +40,10 @@ def nearest(word: str, words: Sequence[str]) -> str:
     close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)
     if close:
         return f"Did you mean {close[0]!r}?"
-    return "Use one of: " + ", ".join(words) if words else "Remove it"
+    if not words:
+        return "Remove it"
+    more = len(words) - MOST_LISTED
+    return "Use one of: " + ", ".join(words[:MOST_LISTED]) + (f" ({more} more)" if more > 0 else "")
 
 
 class Table(BaseModel):
@@ -68,7 +75,8 @@ class Table(BaseModel):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A finite float in an SI unit, given as a number or as a string with a unit; open or closed bounds."""
+    """A finite float in an SI unit, given as a number or as a string with a unit; open or closed
+    bounds."""
 
     unit: str = ""
     above: float | None = None
@@ -80,12 +88,7 @@ class Quantity:
     def convert(self, value: Any) -> float:
         """The value in SI; raises PydanticCustomError."""
         number = self.number(value)
-        if (
-            (self.above is not None and not number > self.above)
-            or (self.least is not None and not number >= self.least)
-            or (self.below is not None and not number < self.below)
-            or (self.most is not None and not number <= self.most)
-        ):
+        if not self.holds(number):
             raise problem(
                 f"must be {self.bounds()}" + (f": {self.why}" if self.why else ""), self._remedy()
             )
@@ -97,7 +100,7 @@ class Quantity:
             try:
                 value = to_si(value, self.unit)
             except UnitError as error:
-                raise problem(error.reason, error.remedy[0].upper() + error.remedy[1:]) from None
+                raise problem(error.reason, error.remedy) from None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise problem("a number is expected here", self._remedy())
         try:
@@ -107,6 +110,14 @@ class Quantity:
         if not math.isfinite(number):
             raise problem("the number must be finite", self._remedy())
         return number
+
+    def holds(self, value: Any) -> Any:
+        """Whether a float is finite and within the bounds; elementwise for an array."""
+        lower = -math.inf if self.above is None else self.above
+        upper = math.inf if self.below is None else self.below
+        least = -sys.float_info.max if self.least is None else self.least
+        most = sys.float_info.max if self.most is None else self.most
+        return (value > lower) & (value < upper) & (value >= least) & (value <= most)
 
     def bounds(self) -> str:
         """The bounds in words."""
@@ -186,7 +197,8 @@ class Count:
 
 
 Curve = float | tuple[tuple[float, float], ...]
-"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn, linear between."""
+"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn,
+linear between."""
 
 
 @dataclass(frozen=True)

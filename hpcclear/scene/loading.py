@@ -18,7 +18,8 @@ LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
 _TAGGED = (("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
-# tomllib takes quadratic time over one key with very many dots, so such a key is refused before it is parsed.
+# tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
+# is parsed.
 _DOTTED = re.compile(
     r"""(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){17}"""
 )
@@ -32,13 +33,14 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     source : path or mapping
         A TOML file, or its parsed content.
     overrides : sequence of str
-        ``"key.path=value"`` entries that replace what the file says; the value is read as TOML if it can be, else as a
-        string, so ``joints.crank_rod.clearance=0.5 mm`` needs no quotes.
+        ``"key.path=value"`` entries that replace what the file says; the value is read as TOML if
+        it can be, else as a string, so ``joints.crank_rod.clearance=0.5 mm`` needs no quotes.
 
     Raises
     ------
     InputError
-        If the file cannot be read or the content makes no mechanism; it names key, value, reason and remedy.
+        If the file cannot be read or the content makes no mechanism; it names key, value, reason
+        and remedy.
     """
     if isinstance(source, Mapping):
         text, content = None, dict(source)
@@ -189,7 +191,8 @@ def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ..
 
 
 def _follow(location: tuple[int | str, ...], content: Any) -> tuple[tuple[str, ...], Any]:
-    """The keys along a location, and what stands there in the raw content (None if nothing does)."""
+    """The keys along a location, and what stands there in the raw content (None if nothing
+    does)."""
     names: list[str] = []
     for step in location:
         if isinstance(content, Mapping):

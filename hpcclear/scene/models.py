@@ -28,7 +28,8 @@ class Link(Table):
     inertia: Inertia
     """Moment of inertia about its mass centre, kg m2."""
     mass_center: Length
-    """Distance of the mass centre from its first joint along the link, m; may lie beyond either pin."""
+    """Distance of the mass centre from its first joint along the link, m; may lie beyond either
+    pin."""
 
 
 class Slider(Table):
@@ -50,7 +51,8 @@ class Mechanism(Table):
     def _assembles(self) -> "Mechanism":
         if self.rod.length <= self.crank.length:
             raise problem(
-                f"the rod must be longer than the crank ({self.crank.length:g} m), or the crank cannot turn round",
+                f"the rod must be longer than the crank ({self.crank.length:g} m), "
+                "or the crank cannot turn round",
                 "Lengthen the rod or shorten the crank",
                 key="rod.length",
                 value=self.rod.length,
@@ -129,8 +131,8 @@ class ClearanceJoint(Table):
     def _journal_fits(self) -> "ClearanceJoint":
         if self.clearance >= self.bearing_radius:
             raise problem(
-                f"the clearance must be smaller than the bearing radius ({self.bearing_radius:g} m), "
-                "or no journal is left",
+                "the clearance must be smaller than the bearing radius "
+                f"({self.bearing_radius:g} m), or no journal is left",
                 "Write the radial clearance R_B - R_J",
                 key="clearance",
                 value=self.clearance,
@@ -146,8 +148,9 @@ class IdealJoint(Table):
     @model_validator(mode="before")
     @classmethod
     def _no_dimensions(cls, data: Any) -> Any:
-        # What a clearance joint needs may stay in the file, so that `--set joints.crank_rod.kind=ideal` is enough
-        # to switch one off; it is dropped here, so that it cannot make two equal scenes look different.
+        # What a clearance joint needs may stay in the file, so that `--set
+        # joints.crank_rod.kind=ideal` is enough to switch one off; it is dropped here, so that it
+        # cannot make two equal scenes look different.
         if isinstance(data, Mapping):
             return {
                 key: value

@@ -21,9 +21,11 @@ class Numerics(Table):
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
-    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled alike (see the manual)."""
+    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled alike (see
+    the manual)."""
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
-    """Relative error of the objective to aim at; chooses tolerance and revolutions in place of the entries here."""
+    """Relative error of the objective to aim at; chooses tolerance and revolutions in place of the
+    entries here."""
     transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
     """Revolutions before the average starts."""
     averaged_revolutions: Annotated[int | Literal["auto"], Count(1, 10**9, word="auto")] = 5
@@ -33,7 +35,8 @@ class Numerics(Table):
     max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
     """For "auto": the cap."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
-    """Accepted and rejected steps of one sample together; beyond it the sample ends with status STEP_CAP."""
+    """Accepted and rejected steps of one sample together; beyond it the sample ends with status
+    STEP_CAP."""
     uncertainty: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also reports the scatter of its objective under kicks of 1e-10."""
     energy: Annotated[bool, Field(strict=True)] = False

@@ -1,4 +1,5 @@
-"""Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or replace one."""
+"""Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or
+replace one."""
 
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
@@ -58,7 +59,8 @@ def quantities() -> Mapping[str, Quantity]:
 def replace(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
-    What is not a table on the way to it is replaced by one; the model then says what is wrong with that.
+    What is not a table on the way to it is replaced by one; the model then says what is wrong with
+    that.
     """
     head, _, rest = path.partition(".")
     copy = dict(content)

@@ -66,7 +66,8 @@ class Scene(Table):
         if clearance and self.effects.contact is None:
             raise problem(
                 "a clearance joint needs a contact law",
-                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, or make both joints ideal',
+                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
+                "or make both joints ideal",
                 key="effects.contact",
                 value=None,
             )
@@ -101,7 +102,8 @@ class Scene(Table):
         return self
 
     def _check_corners(self) -> None:
-        """Each bound of each variable, widened by its random half-width, must still make a mechanism."""
+        """Each bound of each variable, widened by its random half-width, must still make a
+        mechanism."""
         assert self.study is not None
         content = {name: _plain(getattr(self, name)) for name in (*PHYSICAL, "numerics")}
         reach = {row.name: 0.0 if row.absolute else row.reach for row in self.study.random}
@@ -156,14 +158,16 @@ class Scene(Table):
 
     @property
     def hash(self) -> str:
-        """SHA-256 of the resolved content: spelling, comments and units of the file do not matter."""
-        # The order of keys stays as it is: tables have the model's order, and the order of study variables is the
-        # order of the columns of their design, so it has to count.
+        """SHA-256 of the resolved content: spelling, comments and units of the file do not
+        matter."""
+        # The order of keys stays as it is: tables have the model's order, and the order of study
+        # variables is the order of the columns of their design, so it has to count.
         content = json.dumps(self.resolved(), ensure_ascii=True, allow_nan=False)
         return hashlib.sha256(content.encode()).hexdigest()
 
     def resolved(self) -> dict[str, Any]:
-        """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled in."""
+        """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
+        in."""
         return _plain(self)
 
     def to_toml(self) -> str:
@@ -176,8 +180,8 @@ class Scene(Table):
         Parameters
         ----------
         changes, more : mapping of dotted path to value
-            ``with_({"joints.crank_rod.clearance": 1e-3})``; values may be strings with a unit, tables replace what stood
-            there, None removes an entry.
+            ``with_({"joints.crank_rod.clearance": 1e-3})``; values may be strings with a unit,
+            tables replace what stood there, None removes an entry.
 
         Raises
         ------

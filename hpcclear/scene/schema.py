@@ -10,7 +10,8 @@ def scene_schema() -> dict[str, Any]:
     schema = Scene.model_json_schema()
     for name in ("Variable", "RandomInput", "Case"):
         row = schema["$defs"][name]
-        # The name of a row is the key it stands under; `path` and `paths` are two spellings of one entry.
+        # The name of a row is the key it stands under; `path` and `paths` are two spellings of one
+        # entry.
         del row["properties"]["name"]
         row["required"] = [key for key in row.get("required", []) if key not in ("name", "paths")]
         if "paths" in row["properties"]:

@@ -37,7 +37,8 @@ class Sensitivity(Table):
     resamplings: Annotated[int, Count(0, 20)] = 3
     """How often the sample is doubled before a surface counts as not fitted."""
     shrink: Share = 0.1
-    """Share of the interval taken off at both limits together, in each round of the convergence loop."""
+    """Share of the interval taken off at both limits together, in each round of the convergence
+    loop."""
     rounds: Annotated[int, Count(1, 50)] = 8
     """Rounds of that loop at most."""
     influence: Share = 0.1
@@ -61,7 +62,8 @@ class Surrogate(Table):
     models: tuple[Names, ...] | None = None
     """Inputs of each model; default the paper's five, as far as they are study variables."""
     optimisation: Names | None = None
-    """The model the swarm searches; default m2, m3, u2, I2, C as far as they are study variables, else all."""
+    """The model the swarm searches; default m2, m3, u2, I2, C as far as they are study variables,
+    else all."""
     r2: Accuracy = 0.99
     """Least 1 - SSE/SST on the test points."""
     rmae: Positive = 0.4

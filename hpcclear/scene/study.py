@@ -50,7 +50,8 @@ class Study(Table):
     @model_validator(mode="before")
     @classmethod
     def _fill_in(cls, data: Any) -> Any:
-        """Cases as plain lists of names, and random inputs with the paths of the variable of that name."""
+        """Cases as plain lists of names, and random inputs with the paths of the variable of that
+        name."""
         if not isinstance(data, Mapping):
             return data
         data = dict(data)
@@ -134,7 +135,8 @@ class Study(Table):
             )
         if not inside:
             raise problem(
-                f"the distribution is wider than its domain, {row.name} from {lower:g} to {upper:g}",
+                "the distribution is wider than its domain, "
+                f"{row.name} from {lower:g} to {upper:g}",
                 f"Narrow it, or widen study.variables.{row.name}.range",
                 key=f"random.{row.name}",
             )
@@ -150,13 +152,14 @@ class Study(Table):
                     )
                 if name not in self.optimisation:
                     raise problem(
-                        f"the surrogate of the optimisation does not know the random input {name!r}",
+                        f"the surrogate of the optimisation does not know {name!r}",
                         "Add it to study.variables and to study.surrogate.optimisation",
                         key=f"cases.{case.name}",
                     )
             if not self.design_variables(case.name):
                 raise problem(
-                    "every variable of this case is random wherever the design is, so nothing can be chosen",
+                    "every variable of this case is random wherever the design is, "
+                    "so nothing can be chosen",
                     "Add a study variable, or give a half_width instead of a range",
                     key=f"cases.{case.name}",
                 )
@@ -252,7 +255,7 @@ class Study(Table):
         models = self.surrogate.models
         if models is None:
             models = tuple(model for model in PAPER_MODELS if set(model) <= set(self.names))
-        return tuple(model for model in models if model != self.optimisation) + (self.optimisation,)
+        return (*(model for model in models if model != self.optimisation), self.optimisation)
 
     @property
     def optimisation(self) -> Names:
@@ -271,7 +274,8 @@ class Study(Table):
 
 
 def _with_paths(row: Any, variable: Any) -> Any:
-    """A random input with the path or paths of the variable of the same name, unless it has its own."""
+    """A random input with the path or paths of the variable of the same name, unless it has its
+    own."""
     if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
         return row
     if "path" in row or "paths" in row:
@@ -283,7 +287,8 @@ def _enough(inputs: int, order: int, samples: int, key: str) -> None:
     terms = math.comb(inputs + order, order)
     if samples < terms:
         raise problem(
-            f"a surface of order {order} in {inputs} inputs has {terms} terms, more than the {samples} samples",
+            f"a surface of order {order} in {inputs} inputs has {terms} terms, "
+            f"more than the {samples} samples",
             f"Ask for at least {2 * terms} samples, or lower the order",
             key=key,
             value=samples,

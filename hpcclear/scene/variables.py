@@ -24,9 +24,16 @@ PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
 }
 """The paper's names (Table 3), and one name for each clearance."""
 
+TAIL = 6.0
+"""A normal input counts up to this many standard deviations: 2e-9 of it lies beyond, and is
+clipped."""
+
 RESERVED = frozenset(
-    "sample joint objective objective_spread objective_uncertainty mean_gap peak_contact_force latched "
-    "rhs_evaluations status flags case run solution design model mean deviation".split()
+    (
+        *("sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap"),
+        *("peak_contact_force", "latched", "rhs_evaluations", "status", "flags"),
+        *("case", "run", "solution", "design", "model", "mean", "deviation"),
+    )
 )
 """Names of dimensions and results in the datasets."""
 
@@ -152,7 +159,8 @@ def is_link_inertia(path: str) -> bool:
 
 
 class RandomInput(Table):
-    """A random number of the scene: about the design's value, or wherever the design is (`absolute`)."""
+    """A random number of the scene: about the design's value, or wherever the design is
+    (`absolute`)."""
 
     name: str
     paths: tuple[str, ...]
@@ -215,13 +223,14 @@ class RandomInput(Table):
 
     @property
     def reach(self) -> float:
-        """How far from its centre values count, SI: the half-width, or four standard deviations of a normal."""
+        """How far from its centre values count, SI: the half-width, or six standard deviations of a
+        normal."""
         if self.range is not None:
             return (self.range[1] - self.range[0]) / 2
         if self.half_width is not None:
             return self.half_width
         assert self.deviation is not None  # by validation
-        return 4 * self.deviation
+        return TAIL * self.deviation
 
 
 class Case(Table):
