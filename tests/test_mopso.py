@@ -1,0 +1,515 @@
+"""The swarm against known fronts, brute force and its own promises."""
+
+import moocore
+import numpy as np
+import pytest
+
+from hpcclear import rng as rng_state
+from hpcclear.errors import InputError
+from hpcclear.mopso import Swarm, SwarmSettings, minimise
+from hpcclear.pareto import Archive, cut, hypervolume, relative_gain
+
+
+def zdt1(x):
+    g = 1 + 9 * x[:, 1:].mean(axis=1)
+    return np.stack([x[:, 0], g * (1 - np.sqrt(x[:, 0] / g))], axis=1)
+
+
+def zdt2(x):
+    g = 1 + 9 * x[:, 1:].mean(axis=1)
+    return np.stack([x[:, 0], g * (1 - (x[:, 0] / g) ** 2)], axis=1)
+
+
+def zdt3(x):
+    g = 1 + 9 * x[:, 1:].mean(axis=1)
+    r = x[:, 0] / g
+    return np.stack([x[:, 0], g * (1 - np.sqrt(r) - r * np.sin(10 * np.pi * x[:, 0]))], axis=1)
+
+
+def dtlz2(x):
+    g = 1 + ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
+    a, b = x[:, 0] * np.pi / 2, x[:, 1] * np.pi / 2
+    return np.stack([g * np.cos(a) * np.cos(b), g * np.cos(a) * np.sin(b), g * np.sin(a)], axis=1)
+
+
+def bnh(x):
+    """Binh and Korn's constrained problem: objectives and violations."""
+    first, second = x[:, 0], x[:, 1]
+    values = np.stack([4 * first**2 + 4 * second**2, (first - 5) ** 2 + (second - 5) ** 2], axis=1)
+    violations = np.stack(
+        [(first - 5) ** 2 + second**2 - 25, 7.7 - (first - 8) ** 2 - (second + 3) ** 2], axis=1
+    )
+    return values, violations
+
+
+def narrow(x):
+    """ZDT1 where only 0.4 <= x1 <= 0.6 is allowed and a random start is mostly infeasible."""
+    return zdt1(x), np.abs(x[:, 0] - 0.5) - 0.1
+
+
+def unit(dimensions):
+    return [(0.0, 1.0)] * dimensions
+
+
+def brute_force_front(values):
+    return np.array(
+        [not any((b <= a).all() and (b < a).any() for b in values) for a in values], dtype=bool
+    )
+
+
+def run(function, dimensions, seed, iterations, **options):
+    rng = np.random.default_rng(seed)
+    return minimise(function, unit(dimensions), iterations=iterations, rng=rng, **options)
+
+
+def one_point_nan(x):
+    values = zdt1(x)
+    values[x[:, 0] > 0.5] = np.nan
+    return values
+
+
+PROBLEMS = {
+    "zdt1": (zdt1, 30, 0.8700),
+    "zdt2": (zdt2, 30, 0.5379),
+    "zdt3": (zdt3, 30, 1.3265),
+    "dtlz2": (dtlz2, 12, 0.7290),
+}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_full_budget_hypervolume(name):
+    function, dimensions, least = PROBLEMS[name]
+    reached = []
+    for seed in range(1, 6):
+        front = run(function, dimensions, seed, 250)
+        assert front.evaluations == 25_000
+        assert len(front.points) == 100
+        reached.append(moocore.hypervolume(front.values, 1.1))
+    assert np.median(reached) >= least
+    assert min(reached) >= 0.99 * least  # no seed collapsed
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("zdt1", 0.868), ("zdt2", 0.534), ("zdt3", 1.320), ("dtlz2", 0.725)]
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_reduced_budget_hypervolume(name, least, seed):
+    function, dimensions, _ = PROBLEMS[name]
+    front = run(function, dimensions, seed, 100)
+    assert moocore.hypervolume(front.values, 1.1) >= least
+
+
+def test_front_is_the_closed_form():
+    front = run(zdt1, 30, 3, 100)
+    f1 = np.linspace(0, 1, 500)
+    known = np.stack([f1, 1 - np.sqrt(f1)], axis=1)
+    assert moocore.igd_plus(front.values, known) < 4e-3
+    assert np.allclose(zdt1(front.points), front.values, rtol=0, atol=1e-14)
+
+
+def test_without_mutation_it_is_still_a_swarm():
+    front = run(zdt1, 30, 1, 250, settings=SwarmSettings(mutation_share=0.0))
+    assert moocore.hypervolume(front.values, 1.1) >= 0.8700
+
+
+def test_velocity_follows_equations_22_and_23():
+    # one objective, so P_g is known: the archive's only point. With three variables the two pulls
+    # span a plane, and the change of velocity stays in it only if r1 and r2 are scalars
+    settings = SwarmSettings(mutation_share=0.0, particles=20)
+    target = np.array([0.3, 0.6, 0.8])
+    swarm = Swarm(unit(3), 5, np.random.default_rng(0), settings=settings)
+    for _ in range(3):
+        before, state = swarm.ask(), swarm.state()
+        swarm.tell(((before - target) ** 2).sum(axis=1))
+        after = swarm.state()
+        leader = after["archive_positions"][0]
+        weight = 1.2 - (state["counts"][1] + 1) * 1.1 / 5
+        inside = np.all((after["positions"] > 0) & (after["positions"] < 1), axis=1)
+        free = inside & np.all(np.abs(after["velocities"]) < 0.5, axis=1)
+        assert free.sum() >= 5
+        for i in np.flatnonzero(free):
+            rest = after["velocities"][i] - weight * state["velocities"][i]
+            pulls = np.stack(
+                [after["personal_positions"][i] - before[i], leader - before[i]], axis=1
+            )
+            shares, *_ = np.linalg.lstsq(pulls, rest, rcond=1e-10)
+            assert np.allclose(pulls @ shares, rest, atol=1e-12)
+            assert np.all(shares >= -1e-9)
+            assert np.all(shares <= 1.8 + 1e-9)
+
+
+def test_speed_is_limited_and_turned_back_at_bounds():
+    settings = SwarmSettings(mutation_share=0.0, speed_limit=0.3)
+    swarm = Swarm(unit(5), 30, np.random.default_rng(2), settings=settings)
+    turned = 0
+    for _ in range(29):
+        swarm.tell(zdt1(swarm.ask()))
+        state = swarm.state()
+        low, high = state["positions"] == 0.0, state["positions"] == 1.0
+        assert np.abs(state["velocities"]).max() <= 0.3
+        assert state["velocities"][low].min(initial=0.0) >= 0.0
+        assert state["velocities"][high].max(initial=0.0) <= 0.0
+        turned += np.count_nonzero(state["velocities"][low | high])
+    assert turned > 50
+
+
+def test_without_feasible_points_the_least_violation_leads():
+    settings = SwarmSettings(mutation_share=0.0, tournament=2000)  # all but sure to draw the best
+    swarm = Swarm(unit(3), 5, np.random.default_rng(0), settings=settings)
+    points = swarm.ask()
+    violations = 1.0 + points.sum(axis=1)
+    swarm.tell(points[:, :2], violations)
+    toward = points[violations.argmin()] - points
+    velocities = swarm.state()["velocities"]
+    free = np.abs(velocities).max(axis=1) < 0.5
+    assert free.sum() > 20
+    assert np.allclose(np.cross(velocities, toward)[free], 0.0, atol=1e-14)
+    assert np.all((velocities * toward).sum(axis=1) >= 0.0)
+
+
+def test_archive_is_the_brute_force_front_of_all_points_told():
+    seen = []
+    swarm = Swarm(unit(4), 3, np.random.default_rng(4))
+    while not swarm.done:
+        values = np.round(dtlz2(swarm.ask()), 2)  # rounding makes ties and duplicates
+        seen.append(values)
+        swarm.tell(values)
+    everything = np.concatenate(seen)
+    expected = np.unique(everything[brute_force_front(everything)], axis=0)
+    archive = swarm.state()["archive_values"]
+    assert len(archive) < 400  # nothing was thinned
+    assert np.array_equal(np.unique(archive, axis=0), expected)
+    assert len(archive) == len(expected)
+
+
+@pytest.mark.parametrize("function", [zdt3, dtlz2])
+def test_archive_never_holds_dominated_points_and_keeps_its_size(function):
+    settings = SwarmSettings(archive_capacity=60)
+    swarm = Swarm(unit(8), 40, np.random.default_rng(1), settings=settings)
+    best = np.full(3, np.inf)
+    while not swarm.done:
+        values = function(swarm.ask())
+        swarm.tell(values)
+        archive = swarm.state()["archive_values"]
+        assert brute_force_front(archive).all()
+        assert len(archive) <= 60
+        best = np.minimum(best[: values.shape[1]], values.min(axis=0))
+        assert np.array_equal(archive.min(axis=0), best)  # alpha and beta are never lost
+
+
+def test_of_equal_objectives_the_first_stays():
+    archive = Archive(10, np.empty((0, 1)), np.empty((0, 0)))
+    archive.add(np.array([[0.1], [0.2]]), np.array([[1.0, 2.0], [1.0, 2.0]]))
+    archive.add(np.array([[0.3]]), np.array([[1.0, 2.0]]))
+    assert archive.positions.tolist() == [[0.1]]
+
+
+def test_full_archive_drops_the_most_crowded():
+    first = np.array([0.0, 0.3, 0.31, 0.6, 1.0])
+    archive = Archive(4, np.empty((0, 1)), np.empty((0, 0)))
+    archive.add(first[:, None], np.stack([first, 1000 * (1 - first)], axis=1))
+    assert archive.positions[:, 0].tolist() == [0.0, 0.3, 0.6, 1.0]  # 0.31 is nearer to 0.6
+    assert np.allclose(archive.loneliness(), np.sqrt(2) * np.array([0.3, 0.3, 0.3, 0.4]))
+
+
+@pytest.mark.parametrize("objectives", [2, 3])
+def test_cut_drops_the_least_hypervolume_contribution(objectives):
+    values = np.abs(np.random.default_rng(7).normal(size=(25, objectives))) + 1e-3
+    values /= np.linalg.norm(values, axis=1)[:, None]
+    low, extent = values.min(axis=0), np.ptp(values, axis=0)
+    scaled = (values - low) / extent
+    kept = list(range(25))
+    while len(kept) > 8:
+        whole = hypervolume(scaled[kept], np.full(objectives, 1.1))
+        loss = [
+            np.inf
+            if i in values.argmin(axis=0)
+            else whole - hypervolume(scaled[[j for j in kept if j != i]], np.full(objectives, 1.1))
+            for i in kept
+        ]
+        kept.pop(int(np.argmin(loss)))
+    assert cut(values, 8).tolist() == kept
+
+
+def test_cut_of_many_objectives_keeps_the_best_of_each():
+    values = np.abs(np.random.default_rng(7).normal(size=(60, 5)))
+    values /= np.linalg.norm(values, axis=1)[:, None]
+    kept = cut(values, 12)
+    assert len(kept) == 12
+    assert np.array_equal(values[kept].min(axis=0), values.min(axis=0))
+
+
+def test_hypervolume_of_known_sets():
+    assert hypervolume(np.array([[0.25, 0.5]]), np.ones(2)) == pytest.approx(0.375, abs=1e-15)
+    six = np.full((1, 6), 0.5)
+    assert hypervolume(six, np.ones(6)) == pytest.approx(0.5**6, rel=1e-3)
+    assert hypervolume(np.empty((0, 2)), np.ones(2)) == 0.0
+    assert np.isnan(relative_gain(np.empty((0, 2)), np.ones((1, 2))))
+    # one objective, small numbers: half the value left to win is half of what counts
+    assert relative_gain(np.array([[2.05e-4]]), np.array([[2e-4]])) == pytest.approx(0.025 / 1.1)
+
+
+def test_constrained_front_of_bnh():
+    rng = np.random.default_rng(5)
+    front = minimise(bnh, [(0, 5), (0, 3)], iterations=100, rng=rng)
+    _, violations = bnh(front.points)
+    assert violations.max() <= 0.0
+    assert 0 < front.infeasible < front.evaluations
+    # Pareto set: x1 = x2 up to 3, then x2 = 3 (Binh and Korn 1997)
+    along = np.linspace(0, 5, 2000)
+    known, _ = bnh(np.stack([along, np.minimum(along, 3)], axis=1))
+    scale = known.max(axis=0)
+    assert moocore.igd_plus(front.values / scale, known / scale) < 3e-3
+    assert hypervolume(front.values, np.array([140.0, 50.0])) == pytest.approx(
+        hypervolume(known, np.array([140.0, 50.0])), rel=5e-3
+    )
+
+
+def test_swarm_finds_a_narrow_feasible_band():
+    front = run(narrow, 10, 2, 100)
+    assert np.all(np.abs(front.points[:, 0] - 0.5) <= 0.1)
+    f1 = np.linspace(0.4, 0.6, 300)
+    known = np.stack([f1, 1 - np.sqrt(f1)], axis=1)
+    assert moocore.igd_plus(front.values, known) < 1e-3
+
+
+def test_violations_lead_to_the_feasible_region_when_none_is_known():
+    def far_corner(x):  # feasible where all ten are at most 0.02: a share of 1e-17 of the box
+        return x[:, :2], x - 0.02
+
+    front = run(far_corner, 10, 1, 100)
+    assert len(front.points) >= 1
+    assert front.points.max() <= 0.02
+
+
+def test_no_feasible_point_is_said_and_not_invented():
+    front = run(lambda x: (zdt1(x), np.full(len(x), 0.25)), 5, 1, 10)
+    assert front.points.shape == (0, 5)
+    assert len(front.values) == 0
+    assert not front.settled
+    assert "no feasible point in 1000 evaluations" in front.remark
+    assert "0.25" in front.remark
+
+
+def test_among_infeasible_points_the_smaller_violation_is_remembered():
+    settings = SwarmSettings(particles=3)
+    swarm = Swarm(unit(2), 5, np.random.default_rng(0), settings=settings)
+    first = swarm.ask()
+    swarm.tell(np.ones((3, 2)), [0.5, 0.5, 0.0])
+    second = swarm.ask()
+    # worse violation with better objectives; better violation with worse ones; feasible but dominated
+    swarm.tell([[0.0, 0.0], [9.0, 9.0], [2.0, 2.0]], [[0.3, 0.3], [0.3, 0.1], [0.0, -5.0]])
+    state = swarm.state()
+    assert np.array_equal(state["personal_positions"], np.stack([first[0], second[1], first[2]]))
+    assert np.allclose(state["personal_violations"], [0.5, 0.4, 0.0])
+
+
+def test_bounds_hold_for_every_point_asked():
+    bounds = np.array([(-1e-4, 3e-4), (1e6, 1e6 + 1), (-5.0, 0.1), (0.1, 0.3)])
+    swarm = Swarm(bounds, 60, np.random.default_rng(3))
+    met = np.zeros((4, 2), bool)
+    while not swarm.done:
+        points = swarm.ask()
+        assert np.all((points >= bounds[:, 0]) & (points <= bounds[:, 1]))
+        met |= np.stack([(points == side).any(axis=0) for side in bounds.T], axis=1)
+        scaled = (points - bounds[:, 0]) / np.ptp(bounds, axis=1)
+        swarm.tell(np.stack([scaled.sum(axis=1), -scaled[:, 0] + scaled[:, 1]], axis=1))
+    assert met[:, 0].all()  # optima on a bound are reached exactly
+
+
+def test_bad_bounds_are_refused():
+    rng = np.random.default_rng(0)
+    for bounds in (
+        [(1, 1)],
+        [(0, 1), (2, 1)],
+        [(0, np.nan)],
+        [(0, np.inf)],
+        [],
+        [(0, 1, 2)],
+        [0, 1],
+    ):
+        with pytest.raises(InputError, match="bounds"):
+            Swarm(bounds, 10, rng)
+
+
+def test_bad_settings_and_arguments_are_refused():
+    rng = np.random.default_rng(0)
+    for option in (
+        {"particles": 0},
+        {"tournament": 1.5},
+        {"archive_capacity": True},
+        {"c1": -1.0},
+        {"inertia_first": np.nan},
+        {"mutation_share": 1.2},
+        {"speed_limit": 2.0},
+    ):
+        with pytest.raises(InputError, match=next(iter(option))):
+            SwarmSettings(**option)
+    with pytest.raises(InputError, match="iterations"):
+        Swarm(unit(2), 0, rng)
+    with pytest.raises(InputError, match="outside the bounds"):
+        Swarm(unit(2), 5, rng, start=[[0.5, 1.5]])
+    with pytest.raises(InputError, match="start"):
+        Swarm(unit(2), 5, rng, start=[[0.5, 0.5, 0.5]])
+    with pytest.raises(InputError, match="size"):
+        run(zdt1, 5, 0, 2, size=1)
+
+
+def test_wrong_shapes_told_are_refused():
+    swarm = Swarm(unit(3), 5, np.random.default_rng(0), reference=[1.0, 1.0])
+    for values in (np.zeros((99, 2)), np.zeros((100, 3)), np.zeros((100, 0)), np.zeros((1, 2, 2))):
+        with pytest.raises(InputError):
+            swarm.tell(values)
+    with pytest.raises(InputError, match="violations"):
+        swarm.tell(np.zeros((100, 2)), np.zeros(99))
+    assert swarm.evaluations == 0
+
+
+def test_finished_swarm_refuses_more():
+    swarm = Swarm(unit(3), 1, np.random.default_rng(0))
+    swarm.tell(zdt1(swarm.ask()))
+    with pytest.raises(InputError, match="all its iterations"):
+        swarm.tell(zdt1(swarm.ask()))
+
+
+def test_same_seed_same_bits_and_other_seed_other_bits():
+    for seed in (0, 11):
+        first, second = run(zdt3, 6, seed, 20), run(zdt3, 6, seed, 20)
+        assert first.points.tobytes() == second.points.tobytes()
+        assert first.values.tobytes() == second.values.tobytes()
+    assert run(zdt3, 6, 0, 20).points.tobytes() != run(zdt3, 6, 11, 20).points.tobytes()
+
+
+def test_asking_twice_changes_nothing():
+    swarm = Swarm(unit(3), 5, np.random.default_rng(0))
+    points = swarm.ask()
+    points[:] = 7.0  # what a caller does with the points is no concern of the swarm
+    assert np.all(swarm.ask() <= 1.0)
+    assert swarm.ask().tobytes() == swarm.ask().tobytes()
+
+
+@pytest.mark.parametrize("kind", ["PCG64", "PCG64DXSM", "MT19937", "Philox", "SFC64"])
+@pytest.mark.parametrize("stop", [0, 1, 13, 30])
+def test_interrupted_run_continues_bit_for_bit(kind, stop, tmp_path):
+    def begin():
+        rng = np.random.Generator(getattr(np.random, kind)(0))
+        return Swarm(unit(6), 30, rng, reference=[140.0, 50.0])
+
+    def advance(swarm, until):
+        while swarm.iteration < until:
+            points = swarm.ask()
+            swarm.tell(zdt3(points), points[:, 1] - 0.8)
+        return swarm
+
+    whole = advance(begin(), 30)
+    np.savez(tmp_path / "swarm.npz", **advance(begin(), stop).state())
+    with np.load(tmp_path / "swarm.npz", allow_pickle=False) as saved:
+        resumed = advance(Swarm.from_state(saved), 30)
+    for key, array in whole.state().items():
+        assert array.tobytes() == resumed.state()[key].tobytes(), key
+    assert whole.front().remark == resumed.front().remark
+    assert whole.front(20).points.tobytes() == resumed.front(20).points.tobytes()
+
+
+def test_settings_travel_with_the_state():
+    settings = SwarmSettings(particles=17, c1=1.5, archive_capacity=50, mutation_share=0.0)
+    swarm = Swarm(unit(2), 5, np.random.default_rng(0), settings=settings)
+    assert Swarm.from_state(swarm.state()).settings == settings
+
+
+def test_broken_state_is_refused():
+    state = Swarm(unit(2), 5, np.random.default_rng(0)).state()
+    with pytest.raises(InputError, match="missing"):
+        Swarm.from_state({key: value for key, value in state.items() if key != "velocities"})
+    with pytest.raises(InputError, match="shapes"):
+        Swarm.from_state({**state, "positions": state["positions"][:50]})
+    unknown = np.frombuffer(b'{"bit_generator": "os.system"}', dtype=np.uint8)
+    for generator in (unknown, unknown[:9], np.frombuffer(b"[1]", dtype=np.uint8)):
+        with pytest.raises(InputError, match="generator state"):
+            Swarm.from_state({**state, "generator": generator})
+
+
+def test_generator_state_includes_the_half_used_word():
+    rng = np.random.default_rng(0)
+    rng.integers(5, dtype=np.int32)  # leaves 32 buffered bits
+    copy = rng_state.from_array(rng_state.to_array(rng))
+    assert np.array_equal(
+        rng.integers(99, size=5, dtype=np.int32), copy.integers(99, size=5, dtype=np.int32)
+    )
+
+
+def test_failed_points_never_enter_the_archive():
+    front = run(one_point_nan, 5, 1, 60)
+    assert front.failed > 0
+    assert np.isfinite(front.values).all()
+    assert front.points[:, 0].max() <= 0.5
+    assert f"{front.failed} of 6000 points failed" in front.remark
+    f1 = np.linspace(0, 0.5, 300)
+    assert moocore.igd_plus(front.values, np.stack([f1, 1 - np.sqrt(f1)], axis=1)) < 3e-3
+
+
+def test_infinite_values_and_nan_violations_are_infeasible():
+    swarm = Swarm(unit(2), 2, np.random.default_rng(0), settings=SwarmSettings(particles=4))
+    values = np.array([[1.0, 1.0], [-np.inf, 0.0], [0.5, np.inf], [0.0, 0.0]])
+    swarm.tell(values, [0.0, 0.0, 0.0, np.nan])
+    front = swarm.front()
+    assert front.values.tolist() == [[1.0, 1.0]]
+    assert (front.failed, front.infeasible) == (2, 1)
+
+
+def test_all_points_failed():
+    front = run(lambda x: np.full((len(x), 2), np.nan), 3, 0, 10)
+    assert front.failed == front.evaluations == 1000
+    assert front.points.shape == (0, 3)
+    assert "no feasible point" in front.remark
+
+
+def test_failed_points_still_lead_by_their_violation():
+    """A model may leave the objectives of an infeasible point NaN and give the violation alone."""
+
+    def function(x):
+        broken = np.maximum(x.max(axis=1) - 0.05, 0.0)
+        return np.where(broken[:, None] > 0, np.nan, x[:, :2]), broken
+
+    assert len(run(function, 8, 0, 60).points) >= 1
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_one_objective(seed):
+    def rosenbrock(x):
+        return (100 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1 - x[:, :-1]) ** 2).sum(axis=1)
+
+    rng = np.random.default_rng(seed)
+    front = minimise(rosenbrock, [(-2, 2)] * 2, iterations=150, rng=rng)
+    assert front.points.shape == (1, 2)
+    assert np.allclose(front.points, 1.0, atol=1e-2)
+
+
+def test_start_designs_are_evaluated_first():
+    swarm = Swarm([(2, 4), (-1, 1)], 5, np.random.default_rng(0), start=[[2.5, 0.25], [4.0, -1.0]])
+    assert np.allclose(swarm.ask()[:2], [[2.5, 0.25], [4.0, -1.0]], rtol=0, atol=1e-15)
+
+
+def test_history_grows_and_ends_at_the_archive():
+    front = run(zdt1, 5, 0, 40, reference=[1.1, 1.1], size=400)
+    assert front.history.shape == (40,)
+    assert front.history[-1] == pytest.approx(hypervolume(front.values, np.full(2, 1.1)), abs=1e-12)
+    assert np.diff(front.history).min() > -2e-4  # thinning may cost a little
+    assert front.history[-1] > front.history[0]
+    assert run(zdt1, 5, 0, 3).history.size == 0
+
+
+def test_remark_is_honest():
+    assert run(zdt1, 5, 0, 100).settled
+    assert run(zdt1, 5, 0, 100).remark.startswith("settled")
+    early = run(zdt1, 30, 0, 10)
+    assert not early.settled
+    assert early.remark.startswith("still improving")
+    assert early.gain > 1e-3
+    unfinished = Swarm(unit(5), 10, np.random.default_rng(0))
+    unfinished.tell(zdt1(unfinished.ask()))
+    assert unfinished.front().remark.startswith("not finished: 1 of 10")
+    assert not unfinished.front().settled
+    alone = run(lambda x: np.stack([x.sum(axis=1), x.sum(axis=1)], axis=1), 3, 0, 60)
+    assert "one point only" in alone.remark
