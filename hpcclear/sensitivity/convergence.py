@@ -14,8 +14,8 @@ variable on its own:
 3. The uncertainty of an estimate joins its standard error with the truncation that may be left: the
    change since the interval before it, extrapolated to length 0.
 4. A derivative is determined in an interval if it differs from 0 by more than t' uncertainties, and
-   in the interval before it by more than t' standard errors with the same sign. t' is t corrected
-   for the number of intervals looked at (Bonferroni): whoever looks often finds something.
+   in the interval before it by more than t' standard errors (of the same sign, or they would not
+   agree). t' is t corrected for the number of intervals looked at (Bonferroni).
 5. The convergence interval is the widest one after the beginning of the plateau in which the
    derivative is determined. As in the paper, it is the second of two that agree.
 
@@ -190,12 +190,9 @@ def _first_determined(
     slope: FloatArray, error: FloatArray, uncertainty: FloatArray, critical: FloatArray, start: int
 ) -> int | None:
     """The widest interval after `start` in which, and before which, the slope is surely not 0."""
+    sure = np.abs(slope) > critical * uncertainty
+    sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
     for at in range(start + 1, len(slope)):
-        before = at - 1
-        if (
-            abs(slope[at]) > critical[at] * uncertainty[at]
-            and abs(slope[before]) > critical[before] * error[before]
-            and slope[at] * slope[before] > 0.0
-        ):
+        if sure[at] and sure_before[at - 1]:
             return at
     return None
