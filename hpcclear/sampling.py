@@ -4,74 +4,22 @@ Every number follows from the study's seed, a purpose ("train", "test", ...) and
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
 """
 
-import csv
 import hashlib
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hpcclear.errors import InputError
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import box, entries, slender_inertias, study_of, to_physical
-from hpcclear.scene.fields import nearest
-from hpcclear.scene.paths import quantities
-from hpcclear.scene.units import UnitError, decimal, factor, to_si
-from hpcclear.scene.variables import PAPER_PATHS, TAIL, RandomInput
+from hpcclear.scene.design_table import read_points
+from hpcclear.scene.domain import box, slender_inertias, study_of, to_physical
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.variables import TAIL, RandomInput
+
+__all__ = ["Points", "check_points", "latin_hypercube", "monte_carlo", "read_points", "unit_lhs"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Points:
-    """Designs to simulate, in SI.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Column names, length d.
-    values : ndarray of float, shape (n, d)
-        Read-only, in the SI unit of each column.
-    paths : tuple of tuple of str
-        Scene entries that each column drives.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    paths: tuple[tuple[str, ...], ...]
-
-    def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
-        if (
-            values.ndim != 2
-            or values.shape[1] != len(self.names)
-            or len(self.paths) != len(self.names)
-        ):
-            raise InputError(
-                "points", values.shape, "one column a name is needed", "Give an (n, d) array"
-            )
-        values.flags.writeable = False
-        object.__setattr__(self, "values", values)
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """SI unit of each column, "" for none."""
-        return tuple(quantities()[paths[0]].unit for paths in self.paths)
-
-    def column(self, name: str) -> Array:
-        """Values of one column, shape (n,)."""
-        return self.values[:, self.names.index(name)]
-
-    def take(self, rows: slice | ArrayLike) -> "Points":
-        """Some of the points: a slice, indices or a mask."""
-        chosen = rows if isinstance(rows, slice) else np.asarray(rows)
-        return Points(self.names, self.values[chosen], self.paths)
 
 
 def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
@@ -192,33 +140,39 @@ def monte_carlo(
         reason = "at least one sample, from index 0 on, is needed"
         raise InputError("samples", count, reason, "Ask for 1 or more")
     inputs = {row.name: row for row in study.random}
-    chosen = tuple(inputs) if random is None else tuple(random)
-    for name, known in [
-        *((n, tuple(inputs)) for n in chosen),
-        *((n, study.names) for n in design or ()),
-    ]:
-        if name not in known:
-            raise InputError("study", name, "is not one of its inputs", f"Use {', '.join(known)}")
-    free = tuple(name for name in study.names if design is None or name in design)
+    chosen = _known("random", inputs if random is None else random, inputs)
+    fixed = (
+        None if design is None else {n: design[n] for n in _known("design", design, study.names)}
+    )
+    free = tuple(name for name in study.names if fixed is None or name in fixed)
     names = (*free, *(name for name in chosen if name not in free))
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
     for column, name in enumerate(names):
-        uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
         if name in chosen:
-            centre = design[name] if design and name in design else scene.number(paths[column][0])
+            centre = (fixed or {}).get(name, scene.number(paths[column][0]))
+            uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
             values[:, column] = _quantile(inputs[name], centre, uniform)
-        elif design is not None:
-            values[:, column] = design[name]
+        elif fixed is not None:
+            values[:, column] = fixed[name]
         else:
             lower, upper = study.variable(name).bounds
+            uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
             values[:, column] = lower + uniform * (upper - lower)
     for column, name in enumerate(names):
-        if name not in chosen and design is None and study.variable(name).ratio is not None:
+        if fixed is None and name not in chosen and study.variable(name).ratio is not None:
             values[:, column] *= slender_inertias(scene, paths, values, paths[column][0])
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row}")
     return points
+
+
+def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str, ...]:
+    chosen = tuple(names)
+    for name in chosen:
+        if name not in known:
+            raise InputError(what, name, "is not one of the study's", f"Use {', '.join(known)}")
+    return chosen
 
 
 def _words(text: str) -> tuple[int, ...]:
@@ -259,157 +213,3 @@ def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
     cut = row.reach / deviation
     below = ndtr(-cut)
     return middle + deviation * np.clip(ndtri(below + uniform * (1 - 2 * below)), -cut, cut)
-
-
-def check_points(
-    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
-) -> None:
-    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
-        radius, or a rod is not longer than its crank.
-    """
-    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
-        for path in paths:
-            bounds = quantities()[path].bounds()
-            reason = f"must be finite and {bounds}" if bounds else "must be finite"
-            _refuse(~quantities()[path].holds(column), column, name, reason, label)
-    pairs = [("mechanism.crank.length", "mechanism.rod.length", "the rod no longer than the crank")]
-    for joint in scene.clearance_joints():
-        key, reason = f"joints.{joint}", "the clearance as large as the bearing"
-        pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
-    for small, large, reason in pairs:
-        lower, upper = (
-            entries(scene, points.paths, points.values, path) for path in (small, large)
-        )
-        gap = np.broadcast_to(np.asarray(upper - lower), len(points))
-        _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
-
-
-def _refuse(
-    bad: NDArray[np.bool_], values: Array, name: str, reason: str, label: Callable[[int], str]
-) -> None:
-    if bad.any():
-        row = int(np.argmax(bad))
-        key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or mend that row")
-
-
-def read_points(path: str | Path, scene: Scene) -> Points:
-    """A user's table of designs, a CSV file.
-
-    The first row names the columns: study variables, the paper's names (m2, C, ...), or dotted
-    scene paths, each with an optional unit, as in ``C [mm]``. Every further row is a design; lines
-    that are empty or begin with # are left out.
-
-    Parameters
-    ----------
-    path : path
-        The file, in UTF-8.
-    scene : Scene
-        What the columns change; a study is not needed.
-
-    Returns
-    -------
-    Points
-        In SI.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a cell is no number; it names row (line of the file) and
-        column.
-    """
-    key = str(path)
-    lines = _csv_lines(Path(path))
-    columns = [_column(cell, scene, key) for cell in lines[0][1]]
-    names, paths = tuple(c.name for c in columns), tuple(c.paths for c in columns)
-    driven = [path for column in paths for path in column]
-    for path_ in driven:
-        if driven.count(path_) > 1:
-            raise InputError(
-                key, ", ".join(names), f"two columns drive {path_}", "Remove one of them"
-            )
-    values = np.empty((len(lines) - 1, len(columns)))
-    for row, (line, cells) in enumerate(lines[1:]):
-        if len(cells) != len(columns):
-            reason = f"has {len(cells)} cells instead of {len(columns)}"
-            raise InputError(
-                f"{key}, line {line}", ",".join(cells), reason, "Give each column a value"
-            )
-        for column, cell in enumerate(cells):
-            where = f"{key}, line {line}, column {names[column]}"
-            values[row, column] = columns[column].read(cell, where)
-    points = Points(names, values, paths)
-    check_points(scene, points, lambda row: f"{key}, line {lines[row + 1][0]}")
-    return points
-
-
-def _csv_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of the header and the points."""
-    remedy = "Give a CSV file in UTF-8"
-    try:
-        if not path.is_file():
-            raise InputError("table of points", str(path), "there is no such regular file", remedy)
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream, strict=True)
-            lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
-    except (OSError, UnicodeError, csv.Error) as error:
-        reason = f"cannot be read ({error})"
-        raise InputError("table of points", str(path), reason, remedy) from None
-    lines = [(line, cells) for line, cells in lines if any(cells) and cells[0][:1] != "#"]
-    if len(lines) < 2:
-        remedy = "Write a row of names, then a row for each point"
-        raise InputError("table of points", str(path), "holds no points", remedy)
-    return lines
-
-
-@dataclass(frozen=True)
-class _Column:
-    name: str
-    paths: tuple[str, ...]
-    unit: str  # as written, "" for SI
-
-    def read(self, cell: str, where: str) -> float:
-        """The cell in SI, within the bounds of every entry it drives."""
-        quantity = quantities()[self.paths[0]]
-        try:
-            value = decimal(cell)
-            if self.unit:
-                value = to_si(f"{cell} {self.unit}", quantity.unit)
-        except UnitError as error:
-            raise InputError(where, cell, error.reason, error.remedy) from None
-        for path in self.paths:
-            if not quantities()[path].holds(value):
-                reason = f"must be {quantities()[path].bounds()}"
-                raise InputError(where, cell, reason, "Mend the value or the unit of its column")
-        return value
-
-
-def _column(cell: str, scene: Scene, key: str) -> _Column:
-    """A header cell such as ``C [mm]``."""
-    found = re.fullmatch(r"([^\s\[\]]{1,200})\s*(?:\[\s*([^\[\]]{0,40}?)\s*\])?", cell)
-    if found is None:
-        raise InputError(
-            key, cell, "is not a column name", 'Write a name, and its unit as in "C [mm]"'
-        )
-    name, unit = found.group(1), found.group(2) or ""
-    numbers = scene.numeric_paths()
-    of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
-    named = {**PAPER_PATHS, **of_study}
-    paths = tuple(path for path in named.get(name, (name,)) if path in numbers)
-    if not paths:
-        remedy = nearest(name, (*named, *numbers))
-        raise InputError(key, name, "is neither a variable nor a number of this scene", remedy)
-    column = _Column(name, paths, unit)
-    column_unit = quantities()[paths[0]].unit
-    if unit and unit != column_unit:
-        try:
-            factor(unit, column_unit)
-        except UnitError as error:
-            raise InputError(key, cell, error.reason, error.remedy) from None
-        return column
-    return _Column(name, paths, "")

@@ -11,12 +11,13 @@ from pydantic_core import ErrorDetails
 
 from hpcclear.errors import InputError
 from hpcclear.scene.fields import nearest
-from hpcclear.scene.paths import replace
+from hpcclear.scene.paths import quantities, replace
 from hpcclear.scene.scene import Scene
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
 _TAGGED = (("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
+_KINDS = {"drive": '"constant-speed" or "torque"', "joints": '"clearance" or "ideal"'}
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 # tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
 # is parsed.
@@ -172,7 +173,9 @@ def _translated(error: ErrorDetails, content: Mapping[str, Any], more: int) -> I
         if context["value"] is not ...:
             found = context["value"]
     else:
-        reason, remedy = _explained(error, found)
+        if error["type"].startswith("union_tag"):
+            names, found = (*names, "kind"), found.get("kind")
+        reason, remedy = _explained(error, found, ".".join(names))
     if more:
         remedy = f"{remedy} ({more} more after this)"
     return InputError(".".join(names) or "scene", found, reason, remedy)
@@ -209,12 +212,14 @@ def _follow(location: tuple[int | str, ...], content: Any) -> tuple[tuple[str, .
     return tuple(names), content
 
 
-def _explained(error: ErrorDetails, found: Any) -> tuple[str, str]:
+def _explained(error: ErrorDetails, found: Any, path: str) -> tuple[str, str]:
     """Reason and remedy for the errors that pydantic finds by itself."""
     context = error.get("ctx", {})
     match error["type"]:
-        case "missing":
-            return "is missing", "Add it"
+        case "missing" if not isinstance(error["loc"][-1], int):
+            quantity = quantities().get(path)
+            unit = f" in {quantity.unit}" if quantity and quantity.unit else ""
+            return "is missing", f"Add it, a number{unit}" if quantity else "Add it"
         case "literal_error" | "union_tag_invalid":
             expected = str(context.get("expected") or context.get("expected_tags"))
             words = re.findall(r"'([^']*)'", expected)
@@ -222,12 +227,12 @@ def _explained(error: ErrorDetails, found: Any) -> tuple[str, str]:
                 found, str
             ) else (f"Write {expected}")
         case "union_tag_not_found":
-            return "the entry 'kind' is missing", "Add kind = ..."
+            return "is missing", f"Add kind = {_KINDS[path.partition('.')[0]]}"
         case "bool_type":
             return "true or false is expected here", "Write true or false"
         case "string_type":
             return "a string is expected here", "Write text in quotes"
-        case "too_short" | "too_long" | "tuple_type" | "missing_argument":
+        case "missing" | "too_short" | "too_long" | "tuple_type":
             return "a list of the right length is expected here", "Write it as [first, second]"
         case _:
             return error["msg"][:1].lower() + error["msg"][

@@ -118,8 +118,10 @@ class Scene(Table):
                 reach[row.name] = row.reach
                 spans[row.name] = ("random", row.paths, (centre, centre))
         for name, (table, paths, (lower, upper)) in spans.items():
-            width = reach.get(name, 0.0)
-            for value in (lower - width, upper + width):
+            corners = [(table, lower), (table, upper)]
+            if width := reach.get(name, 0.0):
+                corners += [("random", lower - width), ("random", upper + width)]
+            for key, value in corners:
                 corner: Mapping[str, Any] = content
                 for path in paths:
                     corner = replace(corner, path, value)
@@ -127,11 +129,11 @@ class Scene(Table):
                     Scene.model_validate(corner)
                 except ValidationError as error:
                     context = error.errors(include_url=False)[0].get("ctx", {})
+                    reason = context.get("reason", "it is not valid")
                     raise problem(
-                        f"reaches {name} = {value:g}, which makes no mechanism: "
-                        + context.get("reason", "it is not valid"),
-                        "Narrow the range" + (" or the distribution" if width else ""),
-                        key=f"study.{table}.{name}",
+                        f"reaches {name} = {value:g}, which makes no mechanism: {reason}",
+                        "Narrow it",
+                        key=f"study.{key}.{name}",
                     ) from None
 
     def clearance_joints(self) -> tuple[str, ...]:

@@ -76,9 +76,8 @@ def factor(unit: str, target: str) -> Fraction:
     except UndefinedUnitError:
         raise UnitError(f"{unit!r} is not a known unit", expected) from None
     except (DimensionalityError, OffsetUnitCalculusError):
-        raise UnitError(
-            f"the unit {unit!r} does not fit: this is a quantity in {target or '1'}", expected
-        ) from None
+        what = f"a quantity in {target}" if target else "a number without a unit"
+        raise UnitError(f"the unit {unit!r} does not fit: this is {what}", expected) from None
     except (DefinitionSyntaxError, ValueError, AttributeError, TypeError, KeyError):
         raise UnitError(f"{unit!r} cannot be read as a unit", expected) from None
     # One hertz passes for one radian a second in dimensional analysis, and is off by 2 pi in every

@@ -1,0 +1,100 @@
+"""Designs to simulate: an array with a name and scene entries for each column."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hpcclear.errors import InputError
+from hpcclear.scene.domain import entries
+from hpcclear.scene.paths import quantities
+from hpcclear.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Designs to simulate, in SI.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Column names, length d.
+    values : ndarray of float, shape (n, d)
+        Read-only, in the SI unit of each column.
+    paths : tuple of tuple of str
+        Scene entries that each column drives.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    paths: tuple[tuple[str, ...], ...]
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, dtype=np.float64)
+        if (
+            values.ndim != 2
+            or values.shape[1] != len(self.names)
+            or len(self.paths) != len(self.names)
+        ):
+            raise InputError(
+                "points", values.shape, "one column a name is needed", "Give an (n, d) array"
+            )
+        values.flags.writeable = False
+        object.__setattr__(self, "values", values)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each column, "" for none."""
+        return tuple(quantities()[paths[0]].unit for paths in self.paths)
+
+    def column(self, name: str) -> Array:
+        """Values of one column, shape (n,)."""
+        return self.values[:, self.names.index(name)]
+
+    def take(self, rows: slice | ArrayLike) -> "Points":
+        """Some of the points: a slice, indices or a mask."""
+        chosen = rows if isinstance(rows, slice) else np.asarray(rows)
+        return Points(self.names, self.values[chosen], self.paths)
+
+
+def check_points(
+    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
+) -> None:
+    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
+        radius, or a rod is not longer than its crank.
+    """
+    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
+        for path in paths:
+            bounds = quantities()[path].bounds()
+            reason = f"must be finite and {bounds}" if bounds else "must be finite"
+            _refuse(~quantities()[path].holds(column), column, name, reason, label)
+    pairs = [("mechanism.crank.length", "mechanism.rod.length", "the rod no longer than the crank")]
+    for joint in scene.clearance_joints():
+        key, reason = f"joints.{joint}", "the clearance as large as the bearing"
+        pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
+    for small, large, reason in pairs:
+        lower, upper = (
+            entries(scene, points.paths, points.values, path) for path in (small, large)
+        )
+        gap = np.broadcast_to(np.asarray(upper - lower), len(points))
+        _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
+
+
+def _refuse(
+    bad: NDArray[np.bool_], values: Array, name: str, reason: str, label: Callable[[int], str]
+) -> None:
+    if bad.any():
+        row = int(np.argmax(bad))
+        key = f"{label(row)}, {name}"
+        raise InputError(key, float(values[row]), reason, "Narrow its range, or mend that row")

@@ -1,0 +1,581 @@
+"""Scene files: what is accepted, what is refused and how, units, overrides, equality."""
+
+import copy
+import json
+import math
+import pickle
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pint
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from hpcclear.errors import InputError
+from hpcclear.scene import Scene, differences, load_scene, scene_schema
+from hpcclear.scene import units as scene_units
+from hpcclear.scene.domain import box
+from hpcclear.scene.paths import flatten, replace
+
+ROOT = Path(__file__).parent.parent
+JOBS = sorted((ROOT / "jobs").glob("*.toml"))
+BROKEN = sorted((Path(__file__).parent / "broken_scenes").glob("*.toml"))
+SLIDER_CRANK = ROOT / "jobs" / "slider_crank.toml"
+ROBUST = ROOT / "jobs" / "robust_slider_crank.toml"
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return load_scene(SLIDER_CRANK)
+
+
+@pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
+def test_broken_scene_is_refused_with_key_and_remedy(path: Path) -> None:
+    expected = path.read_text().partition("\n")[0].removeprefix("# expect: ")
+    key, _, fragment = expected.partition(" | ")
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    error = caught.value
+    assert (error.key, fragment in f"{error.reason}. {error.remedy}") == (key, True), str(error)
+    assert error.reason
+    assert error.remedy
+    assert error.__cause__ is None
+    assert error.__suppress_context__
+
+
+def test_there_are_enough_broken_scenes() -> None:
+    assert len(BROKEN) >= 100
+
+
+@pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
+def test_shipped_scene_survives_a_round_trip(path: Path, tmp_path: Path) -> None:
+    scene = load_scene(path)
+    copied = tmp_path / "copy.toml"
+    copied.write_text(scene.to_toml())
+    for again in (load_scene(copied), load_scene(scene.resolved())):
+        assert again == scene
+        assert again.hash == scene.hash
+    assert scene.text == path.read_text()
+
+
+def test_formatting_and_spelling_do_not_change_the_hash(scene: Scene, tmp_path: Path) -> None:
+    text = SLIDER_CRANK.read_text()
+    text = (
+        text.replace('"0.3 mm"', "3e-4").replace("0.12", "1.2e-1").replace('"0.5 GPa"', '"500 MPa"')
+    )
+    text = "# a comment\n" + text.replace("rod = { length", "rod = {  length")
+    respelled = tmp_path / "respelled.toml"
+    respelled.write_text(text)
+    again = load_scene(respelled)
+    assert again.text != scene.text
+    assert again.hash == scene.hash
+    assert again == scene
+    assert hash(again) == hash(scene)
+
+
+def test_every_number_changes_the_hash(scene: Scene) -> None:
+    hashes = {scene.hash}
+    for path in scene.numeric_paths():
+        hashes.add(scene.with_({path: scene.number(path) * 0.99 + 1e-9}).hash)
+    assert len(hashes) == len(scene.numeric_paths()) + 1
+
+
+def test_order_of_variables_counts() -> None:
+    first = load_scene(ROBUST)
+    content = first.resolved()
+    variables = content["study"]["variables"]
+    content["study"]["variables"] = dict(reversed(variables.items()))
+    second = load_scene(content)
+    assert second.hash != first.hash
+    assert differences(first, second) == ["study: the order of variables or random inputs"]
+
+
+def test_differences_name_key_and_both_values(scene: Scene) -> None:
+    other = scene.with_({"mechanism.rod.mass": 0.3, "numerics.atol": 1e-9})
+    assert differences(scene, other) == [
+        "mechanism.rod.mass: 0.21 -> 0.3",
+        "numerics.atol: '(not set)' -> 1e-09",
+    ]
+    assert differences(scene, scene) == []
+
+
+def test_the_paper_values(scene: Scene) -> None:
+    assert scene.drive.speed == 5000 * 2 * math.pi / 60
+    joint = scene.joints.crank_rod
+    assert (joint.clearance, joint.bearing_radius, joint.journal_radius) == (3e-4, 0.02, 0.0197)
+    assert joint.journal.youngs_modulus == 206.8e9
+    assert scene.numerics.absolute_tolerance == 1e-9
+    assert scene.clearance_joints() == ("crank_rod", "rod_slider")
+    assert any("mechanism.rod.inertia" in text for text in scene.warnings)
+
+
+def test_nothing_can_be_changed_in_place(scene: Scene) -> None:
+    for table, name in ((scene, "drive"), (scene.mechanism.rod, "mass"), (scene.numerics, "rtol")):
+        with pytest.raises(ValidationError, match="frozen"):
+            setattr(table, name, 1.0)
+
+    def containers(value: object) -> list[object]:
+        fields = type(value).model_fields if isinstance(value, type(scene).__mro__[1]) else ()
+        found = [getattr(value, name) for name in fields]
+        found += list(value) if isinstance(value, tuple) else []
+        return found + [inner for item in found for inner in containers(item)]
+
+    everything = containers(load_scene(ROBUST))
+    assert len(everything) > 200
+    assert not [item for item in everything if isinstance(item, (dict, list, set))]
+
+
+def test_resolved_is_a_copy(scene: Scene) -> None:
+    content = scene.resolved()
+    content["mechanism"]["rod"]["mass"] = 99.0
+    assert scene.mechanism.rod.mass == 0.21
+
+
+def test_a_mapping_is_left_as_it_was(scene: Scene) -> None:
+    content = load_scene(ROBUST).resolved()
+    before = copy.deepcopy(content)
+    load_scene(content, ["joints.crank_rod.kind=ideal", "study.seed=7"])
+    assert content == before
+
+
+def test_scene_travels_through_pickle_and_copy(scene: Scene) -> None:
+    for again in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
+        assert again == scene
+        assert again.text == scene.text
+
+
+def test_with_validates_and_keeps_the_original(scene: Scene) -> None:
+    changed = scene.with_(**{"joints.crank_rod.clearance": 1e-3})
+    assert changed.joints.crank_rod.clearance == 1e-3
+    assert scene.joints.crank_rod.clearance == 3e-4
+    assert changed.with_({"joints.crank_rod.clearance": "0.3 mm"}) == scene
+    assert scene.with_({"effects.friction": None}).effects.friction.law == "none"
+    with pytest.raises(InputError, match="bearing radius"):
+        scene.with_({"joints.crank_rod.clearance": 0.03})
+    with pytest.raises(InputError, match="not a dotted path"):
+        scene.with_({"joints..clearance": 0.03})
+
+
+def test_with_keeps_the_study() -> None:
+    study = load_scene(ROBUST)
+    changed = study.with_({"study.samples": 77, "study.variables.m2.range": [0.2, 0.3]})
+    assert changed.study is not None
+    assert changed.study.samples == 77
+    assert changed.study.variable("m2").range == (0.2, 0.3)
+    assert changed.study.names == study.study.names
+
+
+def test_number_and_unit(scene: Scene) -> None:
+    assert scene.number("mechanism.rod.mass") == 0.21
+    assert scene.unit("joints.crank_rod.clearance") == "m"
+    assert scene.unit("effects.contact.restitution") == ""
+    with pytest.raises(InputError, match="Did you mean 'mechanism.rod.mass'"):
+        scene.number("mechanism.rod.mas")
+    assert "numerics.rtol" not in scene.numeric_paths()
+
+
+@pytest.mark.parametrize(
+    ("override", "path", "value"),
+    [
+        ("mechanism.rod.mass=0.25", "mechanism.rod.mass", 0.25),
+        ("joints.crank_rod.clearance=0.5 mm", "joints.crank_rod.clearance", 5e-4),
+        ('joints.crank_rod.clearance="0.5 mm"', "joints.crank_rod.clearance", 5e-4),
+        ("drive.speed = 600 rpm", "drive.speed", 20 * math.pi),
+        ('effects.contact={law="hunt-crossley", damping=0.5}', "effects.contact.damping", 0.5),
+        ("numerics.averaged_revolutions=auto", "numerics.averaged_revolutions", "auto"),
+        ("numerics.energy=true", "numerics.energy", True),
+        ("joints.rod_slider.kind=ideal", "joints.rod_slider.kind", "ideal"),
+        (
+            "effects.slider_load=[[0, 1.0], [3.0, 2.0]]",
+            "effects.slider_load",
+            [[0.0, 1.0], [3.0, 2.0]],
+        ),
+    ],
+)
+def test_override(override: str, path: str, value: object) -> None:
+    scene = load_scene(SLIDER_CRANK, [override])
+    assert dict(flatten(scene.resolved()))[path] == value
+    assert scene.text.startswith(f"# set: {override}\n")
+    assert scene.text.endswith(SLIDER_CRANK.read_text())
+
+
+def test_override_of_a_table_replaces_it() -> None:
+    scene = load_scene(SLIDER_CRANK, ['effects.contact={law="hertz"}'])
+    assert scene.effects.contact is not None
+    assert scene.effects.contact.restitution is None
+
+
+def test_last_override_wins() -> None:
+    scene = load_scene(SLIDER_CRANK, ["mechanism.rod.mass=1", "mechanism.rod.mass=2"])
+    assert scene.mechanism.rod.mass == 2
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "mechanism.rod.mass",
+        "=3",
+        "a b=3",
+        ".x=1",
+        "mechanism..rod=1",
+        "x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x.x=1",
+    ],
+)
+def test_malformed_override_is_refused(override: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(SLIDER_CRANK, [override])
+    assert caught.value.key == "--set"
+
+
+def test_override_cannot_smuggle_in_a_second_key() -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(SLIDER_CRANK, ["mechanism.rod.mass=1\nvalue2=2"])
+    assert caught.value.key == "mechanism.rod.mass"
+
+
+def test_c_drives_the_clearances_there_are() -> None:
+    both = load_scene(ROBUST)
+    one = load_scene(ROBUST, ["joints.crank_rod.kind=ideal"])
+    assert both.study is not None
+    assert one.study is not None
+    assert both.study.variable("C").paths == (
+        "joints.crank_rod.clearance",
+        "joints.rod_slider.clearance",
+    )
+    assert one.study.variable("C").paths == ("joints.rod_slider.clearance",)
+    assert one.study.random_input("C").paths == ("joints.rod_slider.clearance",)
+    with pytest.raises(InputError, match="no number there"):
+        load_scene(
+            ROBUST,
+            [
+                "joints.crank_rod.kind=ideal",
+                "joints.rod_slider.kind=ideal",
+                'effects.friction="none"',
+                'effects.friction={law="none"}',
+            ],
+        )
+
+
+def test_study_of_the_paper() -> None:
+    study = load_scene(ROBUST).study
+    assert study is not None
+    assert study.groups == (("m1", "m2"), ("m2", "m3"), ("u1", "u2"), ("I1", "I2"))
+    assert len(study.models) == 5
+    assert study.models[-1] == study.optimisation == ("m2", "m3", "u2", "I2", "C")
+    for case in ("deterministic", "robust"):
+        assert study.design_variables(case) == ("m2", "m3", "u2", "I2")
+    assert (study.swarm.c1, study.swarm.c2, study.swarm.inertia) == (1.8, 1.8, (1.2, 0.1))
+
+
+def test_stage_defaults_are_the_papers() -> None:
+    written = load_scene(ROBUST)
+    content = written.resolved()
+    for stage in ("sensitivity", "surrogate", "swarm", "verification"):
+        del content["study"][stage]
+    study = load_scene(content).study
+    assert study is not None
+    assert written.study is not None
+    assert (study.groups, study.models) == (written.study.groups, written.study.models)
+    assert (study.swarm, study.verification) == (written.study.swarm, written.study.verification)
+
+
+def test_seed_zero_is_a_seed() -> None:
+    zero, one = (load_scene(ROBUST, [f"study.seed={seed}"]) for seed in (0, 1))
+    assert zero.study is not None
+    assert zero.study.seed == 0
+    assert zero.hash != one.hash
+
+
+def test_effects_are_listed(scene: Scene) -> None:
+    assert len(scene.effects_on()) == 4
+    loud = scene.with_(
+        {
+            "effects.gravity": 9.81,
+            "effects.slider_load": 10,
+            "effects.guide_friction": {"coefficient": 0.1},
+            "numerics.formulation": "baumgarte",
+            "numerics.energy": True,
+            "numerics.uncertainty": True,
+            "drive": {"kind": "torque", "torque": 5, "initial_speed": 500},
+        }
+    )
+    assert len(loud.effects_on()) == 11
+    quiet = {"joints.crank_rod": {"kind": "ideal"}, "joints.rod_slider": {"kind": "ideal"}}
+    assert scene.with_({**quiet, "effects.friction": None}).effects_on() == ()
+
+
+def test_a_coefficient_of_zero_is_on(scene: Scene) -> None:
+    assert any(
+        "friction" in text for text in scene.with_({"effects.friction.coefficient": 0}).effects_on()
+    )
+    assert scene.with_({"effects.slider_load": 0}).effects.slider_load == 0.0
+    assert scene.with_({"effects.slider_load": "none"}).effects.slider_load is None
+
+
+def test_curves_come_in_radians_and_si(scene: Scene) -> None:
+    table = [[0, "1 kN"], ["180 deg", -500], ["360 deg", "1 kN"]]
+    loaded = scene.with_({"effects.slider_load": table})
+    assert loaded.effects.slider_load == ((0.0, 1000.0), (math.pi, -500.0), (2 * math.pi, 1000.0))
+    assert "effects.slider_load" not in loaded.numeric_paths()
+    assert "effects.slider_load" in scene.with_({"effects.slider_load": 5}).numeric_paths()
+
+
+def test_mass_centre_beyond_the_pin_is_only_a_warning(scene: Scene) -> None:
+    odd = scene.with_({"mechanism.rod.mass_center": -0.02})
+    assert any("mass_center" in text for text in odd.warnings)
+
+
+def test_start_outside_the_clearance_is_only_a_warning(scene: Scene) -> None:
+    on_circle = scene.with_({"joints.crank_rod.start_eccentricity": ["0.3 mm", 0]})
+    assert on_circle.joints.crank_rod.start_eccentricity == (3e-4, 0.0)
+    assert on_circle.warnings == scene.warnings
+    beyond = scene.with_({"joints.crank_rod.start_eccentricity": ["0.4 mm", 0]})
+    assert len(beyond.warnings) == len(scene.warnings) + 1
+
+
+def test_widened_box_holds_every_random_inertia() -> None:
+    scene = load_scene(ROBUST)
+    study = scene.study
+    assert study is not None
+    plain = box(scene, study.optimisation)
+    wide = box(scene, study.optimisation, study.case("robust").random)
+    assert dict(zip(plain.names, plain.lower, strict=True))["I2"] == 1
+    # Worst cases by hand, with k = 0.12^2/12: the lightest rod, its mass and inertia pulled apart.
+    k = 0.12**2 / 12
+    lower, upper = (dict(zip(wide.names, side, strict=True)) for side in (wide.lower, wide.upper))
+    assert lower["I2"] == pytest.approx((0.105 * k - 0.5e-4) / (0.110 * k), rel=1e-12)
+    assert upper["I2"] == pytest.approx((4 * 0.105 * k + 0.5e-4) / (0.100 * k), rel=1e-12)
+    assert (lower["u2"], upper["u2"]) == pytest.approx((-0.02, 0.14))
+    assert (lower["C"], upper["C"]) == (3e-4, 1e-3)
+
+
+# --- units -------------------------------------------------------------------------------------
+
+
+def test_common_units_agree_with_pint() -> None:
+    registry = pint.UnitRegistry()
+    for (unit, target), factor in scene_units._COMMON.items():
+        expected = registry.Quantity(1.0, unit).to(target).magnitude
+        assert float(factor) == pytest.approx(expected, rel=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("text", "target", "value"),
+    [
+        ("0.3 mm", "m", 3e-4),
+        ("0.3mm", "m", 3e-4),
+        ("300 µm", "m", 3e-4),
+        ("-2 cm", "m", -0.02),
+        ("1 in", "m", 0.0254),
+        ("0.25 kg*m^2", "kg*m**2", 0.25),
+        ("2500 g*cm**2", "kg*m**2", 2.5e-4),
+        ("2.5e-4 kg m²", "kg*m**2", 2.5e-4),
+        ("206.8 GPa", "Pa", 206.8e9),
+        ("10 turn/s", "rad/s", 20 * math.pi),
+        ("3000 deg/s", "rad/s", 3000 * math.pi / 180),
+        ("9.81 m/s^2", "m/s**2", 9.81),
+        ("1 kgf", "N", 9.80665),
+        ("0.5 s/m", "s/m", 0.5),
+        ("90 %", "", 0.9),
+        ("5 N·m", "N*m", 5.0),
+    ],
+)
+def test_units(text: str, target: str, value: float) -> None:
+    assert scene_units.to_si(text, target) == pytest.approx(value, rel=2e-16)
+
+
+@given(value=st.floats(1e-9, 1e9), unit=st.sampled_from(["um", "mm", "cm", "m"]))
+def test_lengths_are_rounded_once(value: float, unit: str) -> None:
+    digits = {"um": 6, "mm": 3, "cm": 2, "m": 0}[unit]
+    mantissa, _, exponent = f"{value:.16e}".partition("e")
+    assert scene_units.to_si(f"{value:.16e} {unit}", "m") == float(
+        f"{mantissa}e{int(exponent) - digits}"
+    )
+
+
+def test_plain_numbers_need_no_unit_registry() -> None:
+    code = (
+        "import sys; from hpcclear.scene import load_scene; "
+        f"load_scene({str(ROBUST)!r}); "
+        "print([m for m in ('pint', 'numba', 'mpi4py', 'sklearn', 'matplotlib', 'scipy') if m in sys.modules])"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == "[]"
+
+
+# --- files -------------------------------------------------------------------------------------
+
+
+def test_unreadable_files_are_refused(tmp_path: Path) -> None:
+    latin = tmp_path / "latin.toml"
+    latin.write_bytes("# Reibungszahl für\n[mechanism]\n".encode("latin-1"))
+    big = tmp_path / "big.toml"
+    big.write_bytes(b"#" * 1_000_001)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(bytes(range(256)))
+    loop = tmp_path / "loop.toml"
+    loop.symlink_to(loop)
+    sources = [
+        tmp_path,
+        tmp_path / "missing.toml",
+        latin,
+        big,
+        binary,
+        loop,
+        Path("/dev/zero"),
+        "a\0b",
+    ]
+    for source in sources:
+        with pytest.raises(InputError) as caught:
+            load_scene(source)
+        assert caught.value.key == "scene file"
+
+
+def test_symbolic_link_and_byte_order_mark_are_fine(tmp_path: Path, scene: Scene) -> None:
+    marked = tmp_path / "marked.toml"
+    marked.write_bytes(b"\xef\xbb\xbf" + SLIDER_CRANK.read_bytes().replace(b"\n", b"\r\n"))
+    link = tmp_path / "link.toml"
+    link.symlink_to(marked)
+    assert load_scene(link) == scene
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a." * 400_000 + "a=1",
+        "[" + "a." * 400_000 + "a]",
+        '"a".' * 200_000 + "a=1",
+        "a . " * 200_000 + "a=1",
+        "a=" + "[" * 900_000,
+        "a=" + "{a=" * 200_000,
+        "x" * 999_000,
+        "a = " + "9" * 900_000,
+        "a = 1e" + "9" * 900_000,
+        "".join(f"k{i}=1\n" for i in range(90_000)),
+        "a = '" + "." * 900_000,
+        '"' * 900_000,
+    ],
+    ids=lambda text: text[:12],
+)
+def test_hostile_files_end_quickly(tmp_path: Path, text: str) -> None:
+    source = tmp_path / "hostile.toml"
+    source.write_text(text)
+    code = (
+        "import sys\nfrom hpcclear.errors import InputError\nfrom hpcclear.scene import load_scene\n"
+        f"try:\n    load_scene({str(source)!r})\nexcept InputError as error:\n    sys.exit(2)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=20, check=False).returncode == 2
+
+
+# --- fuzzing -----------------------------------------------------------------------------------
+
+SHIPPED = [load_scene(path).resolved() for path in JOBS]
+PATHS = [[key for key, _ in flatten(content)] for content in SHIPPED]
+NUMBERS = st.one_of(
+    st.floats(),
+    st.integers(),
+    st.integers(min_value=10**300, max_value=10**320),
+    st.sampled_from([0, -1, 1, 1e300, -0.0, 5e-324]),
+)
+STRINGS = st.one_of(
+    st.text(max_size=12),
+    st.sampled_from(
+        ["0.3 mm", "3 kg", "1e9 m", "nan", "auto", "none", "ideal", "torque", "1 m**9"]
+    ),
+)
+SCALARS = st.one_of(NUMBERS, STRINGS, st.booleans(), st.none(), st.dates())
+KEYS = st.one_of(
+    st.text(max_size=8),
+    st.sampled_from(
+        sorted({part for paths in PATHS for path in paths for part in path.split(".")})
+    ),
+)
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(KEYS, inner, max_size=4)),
+    max_leaves=12,
+)
+QUICK = settings(
+    max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
+LONG = settings(QUICK, max_examples=10_000)
+
+
+def _loads_or_refuses(content: dict[str, object]) -> None:
+    try:
+        scene = load_scene(content)
+    except InputError as error:
+        assert str(error)
+        assert error.remedy
+    else:
+        assert load_scene(scene.resolved()).hash == scene.hash
+        assert load_scene(tomllib.loads(scene.to_toml())) == scene
+
+
+@st.composite
+def _mutants(draw: st.DrawFn) -> dict[str, object]:
+    index = draw(st.integers(0, len(SHIPPED) - 1))
+    content = copy.deepcopy(SHIPPED[index])
+    for _ in range(draw(st.integers(1, 3))):
+        path = draw(st.sampled_from(PATHS[index]))
+        path = ".".join(path.split(".")[: draw(st.integers(1, 4))])
+        content = replace(content, path, draw(VALUES))
+    return content
+
+
+@QUICK
+@given(content=st.dictionaries(KEYS, VALUES, max_size=6))
+def test_random_content_loads_or_is_refused(content: dict[str, object]) -> None:
+    _loads_or_refuses(content)
+
+
+@QUICK
+@given(content=_mutants())
+def test_mutated_scene_loads_or_is_refused(content: dict[str, object]) -> None:
+    _loads_or_refuses(content)
+
+
+@pytest.mark.full
+@LONG
+@given(content=_mutants())
+def test_many_mutated_scenes_load_or_are_refused(content: dict[str, object]) -> None:
+    _loads_or_refuses(content)
+
+
+@QUICK
+@given(data=st.data())
+def test_damaged_text_loads_or_is_refused(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    text = bytearray(ROBUST.read_bytes())
+    for _ in range(data.draw(st.integers(1, 5))):
+        place = data.draw(st.integers(0, len(text) - 1))
+        text[place : place + data.draw(st.integers(0, 40))] = data.draw(st.binary(max_size=6))
+    source = tmp_path_factory.getbasetemp() / "damaged.toml"
+    source.write_bytes(text)
+    try:
+        load_scene(source)
+    except InputError as error:
+        assert error.remedy
+
+
+# --- schema ------------------------------------------------------------------------------------
+
+
+def test_schema_is_closed_and_names_the_units() -> None:
+    schema = scene_schema()
+    assert json.loads(json.dumps(schema)) == schema
+    assert schema["additionalProperties"] is False
+    link = schema["$defs"]["Link"]
+    assert link["additionalProperties"] is False
+    assert link["properties"]["mass"]["anyOf"][0] == {"type": "number", "exclusiveMinimum": 0}
+    assert "kg" in json.dumps(link["properties"]["mass"])
+    assert "name" not in schema["$defs"]["Variable"]["properties"]
+    variables = schema["$defs"]["Study"]["properties"]["variables"]
+    assert variables["type"] == "object"
