@@ -57,13 +57,21 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal with the given mean and standard deviation."""
+    """Normal with the given mean and standard deviation.
+
+    Draws, density and rules are cut off at `TAIL` deviations; `kernel_integral` is of all of it.
+    """
 
     mean: float
     deviation: float
 
     def __post_init__(self) -> None:
         _check_normal(self.mean, self.deviation)
+
+    @property
+    def cut(self) -> "TruncatedNormal":
+        """What is left inside the support."""
+        return TruncatedNormal(self.mean, self.deviation, *self.support)
 
     @property
     def support(self) -> tuple[float, float]:
@@ -75,13 +83,12 @@ class Normal:
         return np.clip(rng.normal(self.mean, self.deviation, size), *self.support)
 
     def density(self, x: np.ndarray) -> np.ndarray:
-        """Probability density at `x`."""
-        return _bell((x - self.mean) / self.deviation) / self.deviation
+        """Probability density at `x`, inside the support."""
+        return self.cut.density(x)
 
     def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
-        nodes, weights = _truncated_rule(-TAIL, TAIL, count)  # Hermite nodes would go beyond
-        return self.mean + self.deviation * nodes, weights
+        return self.cut.rule(count)  # Hermite nodes would go beyond the support
 
     def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
         """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``."""
@@ -204,7 +211,8 @@ def nodes_needed(
     narrow = length / sqrt(2)
     low, high = distribution.support
     centres = np.linspace(low - 3 * narrow, high + 3 * narrow, 201)
-    exact = distribution.kernel_integral(centres, narrow)
+    within = distribution.cut if isinstance(distribution, Normal) else distribution
+    exact = within.kernel_integral(centres, narrow)
     ends = np.array([low]), np.array([high])
     for count in range(1, most + 1):
         if pieces:

@@ -91,6 +91,8 @@ class Wiring:
         for name in [*self.column, *self.random, *self.derived]:
             if name not in used and name not in self.names:
                 raise InputError(name, None, "the surrogate does not depend on it", "leave it out")
+        for name in self.fixed.keys() & (self.column.keys() | self.random.keys()):
+            raise InputError(name, self.fixed[name], "fixed and variable at once", "choose one")
         for name, one in self.random.items():
             if one.about_design != (name in self.column):
                 reason = "not a design variable" if one.about_design else "also a design variable"
@@ -135,7 +137,7 @@ class Wiring:
     def places(
         self, dims: Sequence[int], designs: np.ndarray, draws: Mapping[str, np.ndarray]
     ) -> np.ndarray:
-        """Model inputs `dims` for designs ``(n, k)`` and draws ``(n or 1, s)``: ``(n, s, len(dims))``."""
+        """Model inputs `dims`, ``(n, s, len(dims))``, of n designs and draws ``(n or 1, s)``."""
 
         def value(name: str) -> np.ndarray:
             if name in self.random and not self.random[name].about_design:
@@ -156,7 +158,7 @@ class Wiring:
 
 
 def tensor(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Node arrays ``(n or 1, N_k)`` of several axes as arrays over their tensor, last axis fastest."""
+    """Node arrays ``(n or 1, N_k)`` of several axes over their tensor, last axis fastest."""
     out = []
     for k, axis in enumerate(axes):
         after = int(np.prod([other.shape[1] for other in axes[k + 1 :]], dtype=int))

@@ -8,8 +8,8 @@ Three ways, each a check on the others:
 - the closed form in error functions, for independent inputs of one model.
 
 Random inputs are independent. They may stand for the model's inputs themselves or act through
-`Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2 and
-I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel is
+`Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
+and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel is
 still a product over the groups.
 """
 
@@ -74,7 +74,7 @@ class RobustObjective:
     Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
-    On a `PiecewiseKriging` the rules are split at the borders of the boxes, so each piece is smooth;
+    On a `PiecewiseKriging` the rules are split at the borders of the boxes, as each piece is smooth;
     this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
     ``method="monte-carlo"``.
 
@@ -162,7 +162,7 @@ class RobustObjective:
         return sample_moments(self._sampled(designs, self._wiring.draw(samples, rng)))
 
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
-        """The same in error functions, ``(n, 2)``; for one `Kriging` model without derived inputs."""
+        """The same in error functions, ``(n, 2)``: one `Kriging` model, no derived inputs."""
         designs = self._checked(designs)
         if len(self.model.leaves) > 1 or self._wiring.derived:
             raise InputError(
@@ -186,7 +186,7 @@ class RobustObjective:
         return designs
 
     def _sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The surrogate at all draws of each design, ``(n, s)``, one design at a time for memory."""
+        """The surrogate at all draws of each design, ``(n, s)``, design by design for memory."""
         dims = range(len(self.model.names))
         size = max((array.shape[1] for array in draws.values()), default=1)
         values = np.empty((len(designs), size))

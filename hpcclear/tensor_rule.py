@@ -58,7 +58,7 @@ class TensorRule:
             shares.append(weights / np.where(part > 0, part, 1.0)[:, None])
             span = leaf.upper[list(group.dims)] - leaf.lower[list(group.dims)]
             unit = (at - leaf.lower[list(group.dims)]) / span
-            places.append(unit.reshape(count, -1))
+            places.append(unit.reshape(count, unit.shape[1] * unit.shape[2]))
         mean, variance = np.zeros(count), np.zeros(count)
         here = share > 0
         if here.any():

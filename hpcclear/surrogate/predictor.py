@@ -66,12 +66,13 @@ def gaussian(square: float) -> float:
     p = p * r + 0.5
     p = p * r + 1.0
     p = p * r + 1.0
-    return p * _bits_as_float((_float_as_bits(shifted) + 1023) << 52)
+    bits: int = _float_as_bits(shifted)  # type: ignore[call-arg]
+    return p * _bits_as_float((bits + 1023) << 52)  # type: ignore[call-arg]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
-    """Fill `row` with the kernel, over the inputs `dims`, between a place and all training points."""
+    """Fill `row` with the kernel over the inputs `dims`, a place against all training points."""
     count = row.size
     row[:] = 0.0
     for k in range(dims.size):
@@ -123,7 +124,7 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
 
 
 def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Training points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)``, p whole `LANES`."""
+    """Points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)``, p a multiple of `LANES`."""
     count, dims = points.shape
     padded = -(-count // LANES) * LANES
     transposed, filled = np.zeros((dims, padded)), np.zeros(padded)
@@ -131,9 +132,15 @@ def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return transposed, filled
 
 
+@njit(cache=True, error_model="numpy")
+def _multiply(a, b, out):  # type: ignore[no-untyped-def]
+    for i in range(out.size):  # written out: an array expression would allocate
+        out[i] = a[i] * b[i]
+
+
 @njit(cache=True, error_model="numpy", fastmath=REORDER)
-def _four_dots(table, first, row, out):  # type: ignore[no-untyped-def]
-    """``out[k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
+def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
+    """``out[at + k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     t0, t1, t2, t3 = table[first], table[first + 1], table[first + 2], table[first + 3]
     for i in range(row.size):
@@ -141,10 +148,10 @@ def _four_dots(table, first, row, out):  # type: ignore[no-untyped-def]
         b += t1[i] * row[i]
         c += t2[i] * row[i]
         d += t3[i] * row[i]
-    out[0], out[1], out[2], out[3] = a, b, c, d
+    out[at], out[at + 1], out[at + 2], out[at + 3] = a, b, c, d
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=REORDER)
 def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
     """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
     mean, variance = 0.0, 0.0
@@ -202,8 +209,8 @@ def tensor_moments(  # type: ignore[no-untyped-def]
         at = 0
         for k in range(groups):
             width = starts[k + 1] - starts[k]
+            inputs = dims[starts[k] : starts[k + 1]]
             for node in range(first[k], first[k + 1]):
-                inputs = dims[starts[k] : starts[k + 1]]
                 _kernel_row(scaled, lengths, inputs, places[j, at : at + width], table[node])
                 at += width
         digits[:] = 0
@@ -215,10 +222,11 @@ def tensor_moments(  # type: ignore[no-untyped-def]
                     stack[0] = table[line]
                     chance[0] = shares[j, line]
                 else:
-                    stack[k] = stack[k - 1] * table[line]
+                    _multiply(stack[k - 1], table[line], stack[k])
                     chance[k] = chance[k - 1] * shares[j, line]
+            product = stack[groups - 1]
             for q in range(0, still, 4):
-                _four_dots(steady, q, stack[groups - 1], values[node * still + q :])
+                _four_dots(steady, q, product, values, node * still + q)
             for q in range(still):
                 weights[node * still + q] = chance[groups - 1] * steady_shares[q]
             changed = groups - 1

@@ -1,9 +1,9 @@
 """Kriging over a wide domain as a product of models, each on its own subinterval of the inputs.
 
 The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's interval, L'_i that of
-its subintervals). A box is accepted by R2 and RMAE on test points of its own; a refused one gets more
-training points, then is cut in half across the input that varies fastest, down to a stated depth.
-A query uses the model of the box it is in. A single model is the case of one box.
+its subintervals). A box is accepted by R2 and RMAE on test points of its own; a refused one gets
+more training points, then is cut in half across the input that varies fastest, down to a stated
+depth. A query uses the model of the box it is in. A single model is the case of one box.
 """
 
 from collections.abc import Mapping, Sequence

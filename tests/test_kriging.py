@@ -1,0 +1,330 @@
+"""Kriging against scikit-learn, known functions and itself after a round trip."""
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+from hpcclear.errors import InputError
+from hpcclear.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.surrogate.metrics import accuracy
+from hpcclear.surrogate.predictor import gaussian
+from hpcclear.surrogate.subintervals import PIECEWISE_FIELDS, PiecewiseKriging, fit_subintervals
+
+BOUNDS = np.array([[1.0, 3.0], [-2e-4, 5e-4], [10.0, 11.0]])
+
+
+def smooth(points):
+    """A function of 3 inputs without kinks, of order 1."""
+    x, y, z = ((points - BOUNDS[:, 0]) / np.ptp(BOUNDS, axis=1)).T
+    return np.sin(3 * x) + y**2 * z + 5.0
+
+
+def draw(count, seed, bounds=BOUNDS):
+    unit = qmc.LatinHypercube(len(bounds), rng=np.random.default_rng(seed)).random(count)
+    return bounds[:, 0] + np.ptp(bounds, axis=1) * unit
+
+
+@pytest.fixture(scope="module")
+def model():
+    points = draw(60, 0)
+    values = smooth(points) + 0.01 * np.random.default_rng(1).normal(size=60)
+    return fit_kriging(points, values, BOUNDS, rng=np.random.default_rng(2), names=("a", "b", "c"))
+
+
+def refit(model, **changes):
+    arguments = {"points": model.inputs, "values": model.values, "bounds": BOUNDS}
+    arguments |= {"rng": np.random.default_rng(2)} | changes
+    return fit_kriging(**arguments)
+
+
+def test_prediction_is_that_of_scikit_learn(model):
+    kernel = ConstantKernel(model.signal_variance) * RBF(model.length_scales) + WhiteKernel(
+        model.noise_variance
+    )
+    oracle = GaussianProcessRegressor(kernel, alpha=0.0, optimizer=None, normalize_y=True)
+    oracle.fit(model.to_unit(model.inputs), model.values)
+    places = draw(500, 3)
+    mean, deviation = oracle.predict(model.to_unit(places), return_std=True)
+    np.testing.assert_allclose(model.predict(places), mean, rtol=1e-10)
+    np.testing.assert_allclose(model.variance(places, noise=True), deviation**2, rtol=1e-7)
+    latent = model.variance(places) + model.noise_variance * model.scale**2
+    np.testing.assert_allclose(latent, deviation**2, rtol=1e-7)
+
+
+def test_likelihood_is_at_its_maximum(model):
+    """scikit-learn, started afresh in wider bounds, finds nothing better."""
+    kernel = ConstantKernel(1.0, (1e-4, 1e6)) * RBF(np.ones(3), (1e-3, 1e3)) + WhiteKernel(0.1)
+    oracle = GaussianProcessRegressor(
+        kernel, alpha=0.0, normalize_y=True, n_restarts_optimizer=5, random_state=0
+    )
+    oracle.fit(model.to_unit(model.inputs), model.values)
+    theta = np.log([model.signal_variance, *model.length_scales, model.noise_variance])
+    assert oracle.log_marginal_likelihood(theta) > oracle.log_marginal_likelihood_value_ - 0.1
+
+
+def test_exponential_is_accurate_to_the_last_digits():
+    squares = np.concatenate([np.linspace(0, 599, 5001), np.logspace(-16, 2, 500)])
+    ours = np.array([gaussian(square) for square in squares])
+    np.testing.assert_allclose(ours, np.exp(-0.5 * squares), rtol=1e-13)
+    assert gaussian(0.0) == 1.0
+    assert 0 <= gaussian(1e9) < 1e-100
+
+
+def test_prediction_does_not_depend_on_the_batch(model):
+    places = draw(37, 4)
+    alone = np.concatenate([model.predict(place[None]) for place in places])
+    assert (alone == model.predict(places)).all()
+
+
+def test_round_trip_is_bitwise(model):
+    arrays = {name: np.copy(array) for name, array in model.to_arrays().items()}
+    assert all(array.dtype.kind in "fiU" for array in arrays.values())
+    again = Kriging.from_arrays(arrays)
+    places = draw(100, 5)
+    assert again.names == ("a", "b", "c")
+    assert (again.predict(places) == model.predict(places)).all()
+    assert (again.variance(places) == model.variance(places)).all()
+
+
+def test_fit_is_deterministic(model):
+    again = refit(model, names=model.names)
+    for name, array in model.to_arrays().items():
+        assert (array == again.to_arrays()[name]).all(), name
+
+
+def test_stored_arrays_cannot_be_changed(model):
+    with pytest.raises(ValueError, match="read-only"):
+        model.alpha[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("alpha", lambda a: a[:-1]),
+        ("alpha", lambda a: a * np.nan),
+        ("inputs", lambda a: a[:, :2]),
+        ("length_scales", lambda a: -a),
+        ("lower", lambda a: a + 1e9),
+        ("scale", lambda a: np.zeros(())),
+        ("names", lambda a: np.arange(3.0)),
+        ("values", lambda a: None),
+    ],
+)
+def test_damaged_arrays_are_refused(model, name, damage):
+    arrays = model.to_arrays()
+    arrays[name] = damage(arrays[name])
+    if arrays[name] is None:
+        del arrays[name]
+    with pytest.raises(InputError) as caught:
+        Kriging.from_arrays(arrays)
+    assert caught.value.key in (name, "values", "alpha")
+
+
+def test_does_not_extrapolate(model):
+    inside = BOUNDS.mean(axis=1)
+    for column, value in [(0, 3.0001), (1, -2.1e-4), (2, np.nan), (2, np.inf)]:
+        place = inside.copy()
+        place[column] = value
+        with pytest.raises(InputError, match="does not extrapolate") as caught:
+            model.predict(np.array([inside, place]))
+        assert caught.value.key == model.names[column]
+        assert caught.value.value == value or np.isnan(value)
+    corners = np.array([BOUNDS[:, 0], np.nextafter(BOUNDS[:, 1], np.inf)])  # round-off is forgiven
+    assert np.isfinite(model.predict(corners)).all()
+    with pytest.raises(InputError, match="shape"):
+        model.predict(inside)
+
+
+def test_constant_function():
+    points = draw(20, 6)
+    model = fit_kriging(points, np.full(20, 0.1), BOUNDS, rng=np.random.default_rng(0))
+    assert (model.predict(draw(50, 7)) == model.mean).all()
+    assert model.mean == pytest.approx(0.1, rel=1e-15)
+    assert model.variance(draw(5, 8)).max() < 1e-3
+
+
+def test_noise_is_recovered():
+    """Deviation 0.1 on 300 points: the estimate scatters by 0.1 / sqrt(600); 4 of that."""
+    points = draw(300, 9)
+    values = smooth(points) + 0.1 * np.random.default_rng(10).normal(size=300)
+    model = fit_kriging(points, values, BOUNDS, rng=np.random.default_rng(0), restarts=1)
+    assert model.scale * np.sqrt(model.noise_variance) == pytest.approx(0.1, abs=0.017)
+
+
+def test_smooth_function_of_five_inputs():
+    """The Friedman function: sin(pi x1 x2), a parabola and two lines; known to be fitted well."""
+    bounds = np.tile([0.0, 1.0], (5, 1))
+    train, test = draw(200, 11, bounds), draw(500, 12, bounds)
+
+    def friedman(x):
+        wave = 10 * np.sin(np.pi * x[:, 0] * x[:, 1])
+        return wave + 20 * (x[:, 2] - 0.5) ** 2 + 10 * x[:, 3] + 5 * x[:, 4]
+
+    model = fit_kriging(train, friedman(train), bounds, rng=np.random.default_rng(0), restarts=1)
+    reached = accuracy(friedman(test), model.predict(test))
+    assert reached.r2 > 0.9999
+    assert reached.rmae < 0.05
+
+
+def test_failed_samples_are_dropped_and_counted(model):
+    values = np.array(model.values)
+    values[[3, 40]] = np.nan
+    with_failures = refit(model, values=values)
+    valid = np.isfinite(values)
+    without = refit(model, points=model.inputs[valid], values=values[valid])
+    assert with_failures.dropped == 2
+    assert without.dropped == 0
+    assert (with_failures.alpha == without.alpha).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda p, v, b: (p, np.where(np.arange(60) < 55, np.nan, v), b), "too few valid samples"),
+        (lambda p, v, b: (p, np.full(60, np.nan), b), "too few valid samples"),
+        (lambda p, v, b: (p[:0], v[:0], b), "too few valid samples"),
+        (lambda p, v, b: (np.where(p > 2.99, np.nan, p), v, b), "outside"),
+        (lambda p, v, b: (p * 1.1, v, b), "outside"),
+        (lambda p, v, b: (p, np.where(np.arange(60) == 5, np.inf, v), b), "infinite"),
+        (lambda p, v, b: (p, v[:-1], b), "one per point"),
+        (lambda p, v, b: (p, v, b[:, ::-1]), "crossed"),
+        (lambda p, v, b: (p, v, b[:2]), "wrong shape"),
+        (lambda p, v, b: (p[:, 0], v, b), "not a table"),
+        (lambda p, v, b: (p[:, :0], v, b[:0]), "not a table"),
+    ],
+)
+def test_bad_training_data_are_refused(model, change, reason):
+    points, values, bounds = change(np.array(model.inputs), np.array(model.values), BOUNDS)
+    with pytest.raises(InputError, match=reason):
+        fit_kriging(points, values, bounds, rng=np.random.default_rng(0))
+
+
+def test_names_must_fit(model):
+    for names in (("a", "b"), ("a", "a", "b")):
+        with pytest.raises(InputError, match="distinct name"):
+            refit(model, names=names)
+
+
+# Subintervals
+
+
+SQUARE = np.array([[0.0, 1.0], [0.0, 2.0]])
+
+
+def kinked(points):
+    return np.abs(points[:, 0] - 0.3) + 0.5 * points[:, 1] ** 2
+
+
+class Counted:
+    """A function that keeps count of its calls."""
+
+    def __init__(self, function):
+        self.function, self.calls = function, []
+
+    def __call__(self, points):
+        self.calls.append(len(points))
+        return self.function(points)
+
+
+def fit_kinked(evaluate, **changes):
+    arguments = {"samples": 30, "test_samples": 40, "max_resamples": 0, "max_depth": 5}
+    arguments |= {"r2_min": 0.999, "rmae_max": 0.05, "restarts": 0} | changes
+    return fit_subintervals(evaluate, SQUARE, rng=np.random.default_rng(0), **arguments)
+
+
+def test_recursion_cuts_where_the_kink_is():
+    evaluate = Counted(kinked)
+    pieces = fit_kinked(evaluate)
+    assert pieces.accepted.all()
+    assert len(pieces.leaves) > 1
+    assert all((leaf.lower[1], leaf.upper[1]) == (0.0, 2.0) for leaf in pieces.leaves)
+    assert (pieces.r2 >= 0.999).all()
+    assert len(evaluate.calls) < 6  # one call a generation
+    places = draw(500, 13, SQUARE)
+    assert accuracy(kinked(places), pieces.predict(places)).r2 > 0.999
+    single = fit_kinked(kinked, max_depth=0)
+    assert not single.accepted.any()
+    assert single.leaves[0].names == ("x1", "x2")
+    worse = accuracy(kinked(places), single.predict(places)).rmse
+    assert accuracy(kinked(places), pieces.predict(places)).rmse < 0.5 * worse
+
+
+def test_a_smooth_function_stays_in_one_piece():
+    evaluate = Counted(lambda p: p[:, 0] * p[:, 1])
+    pieces = fit_kinked(evaluate)
+    assert len(pieces.leaves) == 1
+    assert evaluate.calls == [70]
+
+
+def test_depth_and_resampling_are_limited():
+    evaluate = Counted(lambda p: np.sin(1e4 * p[:, 0]))  # noise, in effect
+    pieces = fit_kinked(evaluate, max_depth=1, max_resamples=2)
+    assert not pieces.accepted.any()
+    assert len(pieces.leaves) == 2
+    assert evaluate.calls == [70, 30, 30, 140, 60, 60]
+
+
+def test_grid_of_subintervals_and_borders():
+    pieces = fit_kinked(lambda p: p[:, 0] + p[:, 1], cuts=(2, 3))
+    assert len(pieces.leaves) == 6
+    places = np.array([[0.5, 2 / 3], [0.0, 0.0], [1.0, 2.0], [0.49, 2.0]])
+    corners = np.array([pieces.leaves[k].lower for k in pieces.locate(places)])
+    np.testing.assert_allclose(corners, [[0.5, 2 / 3], [0, 0], [0.5, 4 / 3], [0, 4 / 3]])
+    np.testing.assert_allclose(pieces.predict(places), places.sum(axis=1), atol=1e-3)
+    one = pieces.leaves[pieces.locate(places[3:])[0]]
+    assert pieces.predict(places[3:]) == one.predict(places[3:])
+    assert pieces.variance(places[3:]) == one.variance(places[3:])
+
+
+def test_pieces_refuse_what_lies_outside():
+    pieces = fit_kinked(lambda p: p[:, 0], cuts=(2, 1))
+    with pytest.raises(InputError, match=r"x2 = 2\.1: outside"):
+        pieces.predict(np.array([[0.2, 2.1]]))
+
+
+def test_pieces_round_trip_is_bitwise():
+    pieces = fit_kinked(kinked)
+    arrays = {name: np.copy(array) for name, array in pieces.to_arrays().items()}
+    assert arrays.keys() == PIECEWISE_FIELDS.keys()
+    for name, dims in PIECEWISE_FIELDS.items():
+        assert arrays[name].ndim == len(dims), name
+    again = PiecewiseKriging.from_arrays(arrays)
+    places = draw(200, 14, SQUARE)
+    assert (again.predict(places) == pieces.predict(places)).all()
+    assert (again.accepted == pieces.accepted).all()
+    for name, damaged in [
+        ("training_points", arrays["training_points"] + 1),
+        ("training_points", arrays["training_points"] * 0.5),
+        ("upper", arrays["upper"] + 0.1),
+        ("lower", arrays["lower"][:-1]),
+        ("r2", arrays["r2"][:-1]),
+        ("names", arrays["names"][:1]),
+    ]:
+        with pytest.raises(InputError):
+            PiecewiseKriging.from_arrays(arrays | {name: damaged})
+
+
+def test_pieces_are_deterministic_and_survive_failures():
+    def sometimes(points):
+        return np.where(points[:, 1] < 0.1, np.nan, kinked(points))
+
+    first, second = fit_kinked(sometimes), fit_kinked(sometimes)
+    for name, array in first.to_arrays().items():
+        assert np.array_equal(array, second.to_arrays()[name]), name
+    assert sum(leaf.dropped for leaf in first.leaves) > 0
+    with pytest.raises(InputError, match="too few valid samples"):
+        fit_kinked(lambda p: np.full(len(p), np.nan))
+
+
+@pytest.mark.parametrize(("changes", "key"), [({"cuts": (0, 1)}, "cuts"), ({"cuts": (2,)}, "cuts")])
+def test_bad_cuts_are_refused(changes, key):
+    with pytest.raises(InputError) as caught:
+        fit_kinked(kinked, **changes)
+    assert caught.value.key == key
+
+
+def test_evaluate_must_answer_every_point():
+    with pytest.raises(InputError, match="one value per point"):
+        fit_kinked(lambda p: p)

@@ -1,0 +1,416 @@
+"""Moments under random inputs: three routes against each other and against known answers."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.integrate import quad
+
+from hpcclear.distributions import Normal, TruncatedNormal, Uniform, nodes_needed, piece_rule
+from hpcclear.errors import InputError
+from hpcclear.random_inputs import Derived, RandomInput
+from hpcclear.robust import RobustObjective, sample_moments
+from hpcclear.surrogate.kriging import Kriging
+from hpcclear.surrogate.subintervals import PiecewiseKriging
+
+LOWER, UPPER = np.array([1.0, -0.2, 5e-5, 3e-4]), np.array([2.0, 0.3, 8e-4, 1e-3])
+NAMES = ("m", "u", "I", "C")
+DESIGN = ("m", "u", "I")
+SCIPY = {
+    Uniform(-1.0, 3.0): stats.uniform(-1.0, 4.0),
+    Normal(2.0, 0.5): stats.norm(2.0, 0.5),
+    TruncatedNormal(2.0, 0.5, 1.5, 4.0): stats.truncnorm(-1.0, 4.0, 2.0, 0.5),
+    TruncatedNormal(0.0, 1.0, 4.0, 5.0): stats.truncnorm(4.0, 5.0),
+    TruncatedNormal(0.0, 1.0, -9.0, -3.0): stats.truncnorm(-9.0, -3.0),
+}
+
+
+def surrogate(lengths=(1.5, 0.6, 3.0, 0.9), names=NAMES, lower=LOWER, upper=UPPER, seed=0):
+    """A Kriging model with alpha out of a hat: the moments must hold for any."""
+    rng = np.random.default_rng(seed)
+    points = lower + (upper - lower) * rng.random((61, len(names)))
+    return Kriging(
+        names=names,
+        lower=lower,
+        upper=upper,
+        length_scales=np.array(lengths),
+        signal_variance=2.0,
+        noise_variance=1e-3,
+        mean=7.0,
+        scale=0.5,
+        inputs=points,
+        values=np.zeros(61),
+        alpha=rng.normal(size=61),
+    )
+
+
+def designs(count, seed=1):
+    """Designs whose random inputs stay inside the domain."""
+    return np.array([1.1, -0.1, 2e-4]) + np.random.default_rng(seed).random((count, 3)) * np.array(
+        [0.8, 0.3, 4e-4]
+    )
+
+
+UNIFORM = (
+    RandomInput("C", Uniform(3e-4, 1e-3)),
+    RandomInput("m", Uniform(-0.05, 0.05), about_design=True),
+    RandomInput("u", Uniform(-0.1, 0.1), about_design=True),
+    RandomInput("I", Uniform(-1e-4, 1e-4), about_design=True),
+)
+NORMAL = (
+    RandomInput("C", Normal(6.5e-4, 5e-5)),
+    RandomInput("m", Normal(0.0, 0.015), about_design=True),
+    RandomInput("u", Normal(0.005, 0.015), about_design=True),
+)
+TRUNCATED = (
+    RandomInput("C", TruncatedNormal(6e-4, 2e-4, 3e-4, 1e-3)),
+    RandomInput("u", TruncatedNormal(0.02, 0.05, -0.1, 0.06), about_design=True),
+)
+CASES = pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1]])
+
+
+# Distributions
+
+
+@pytest.mark.parametrize("distribution", SCIPY, ids=str)
+def test_draws_follow_the_distribution(distribution):
+    draws = distribution.draw(20_000, np.random.default_rng(0))
+    assert stats.kstest(draws, SCIPY[distribution].cdf).pvalue > 0.01
+    low, high = distribution.support
+    assert low <= draws.min() <= draws.max() <= high
+
+
+@pytest.mark.parametrize("distribution", SCIPY, ids=str)
+def test_rule_integrates_polynomials(distribution):
+    """N nodes are exact to degree 2 N - 1 (a normal's support is cut at 6 deviations)."""
+    oracle = SCIPY[distribution]
+    nodes, weights = distribution.rule(6)
+    low, high = distribution.support
+    assert low < nodes.min() < nodes.max() < high
+    assert (weights > 0).all()
+    places = (nodes - oracle.mean()) / oracle.std()
+    for power in range(12):
+        exact = oracle.expect(lambda x, k=power: ((x - oracle.mean()) / oracle.std()) ** k)
+        if isinstance(distribution, Normal):
+            exact = stats.truncnorm(-6, 6).moment(power) if power > 0 else 1.0
+        assert weights @ places**power == pytest.approx(exact, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("distribution", SCIPY, ids=str)
+def test_kernel_integral(distribution):
+    centres = np.array([-3.0, 0.0, 1.7, 4.4, 6.0])
+    for length in (0.2, 1.0, 30.0):
+        ours = distribution.kernel_integral(centres, length)
+        low, high = distribution.support
+        for value, centre in zip(ours, centres, strict=True):
+            exact = quad(
+                lambda x, c=centre, length=length: (
+                    SCIPY[distribution].pdf(x) * np.exp(-0.5 * ((x - c) / length) ** 2)
+                ),
+                low,
+                high,
+                points=[min(max(centre, low), high)],
+                epsabs=1e-13,
+                epsrel=1e-11,
+                limit=200,
+            )[0]
+            assert value == pytest.approx(exact, rel=1e-8, abs=3e-9)
+
+
+@pytest.mark.parametrize("distribution", SCIPY, ids=str)
+def test_pieces_add_up(distribution):
+    edges = np.array([-np.inf, -3.5, 0.0, 1.6, 2.2, 4.3, np.inf])
+    nodes, weights = piece_rule(distribution, 40, edges[:-1], edges[1:])
+    assert weights.sum() == pytest.approx(1.0, abs=1e-8)
+    cdf = SCIPY[distribution].cdf(edges)
+    np.testing.assert_allclose(weights.sum(axis=1), np.diff(cdf), atol=1e-8)
+    assert (weights * nodes).sum() == pytest.approx(SCIPY[distribution].mean(), abs=1e-7)
+
+
+def test_nodes_are_as_few_as_the_tolerance_allows():
+    even = Uniform(-0.5, 0.5)
+    counts = [nodes_needed(even, length, 1e-8, 48) for length in (0.1, 0.3, 1.0, 10.0, 100.0)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] == 2
+    assert nodes_needed(even, 1.0, 1e-4, 48) < nodes_needed(even, 1.0, 1e-12, 48)
+    assert nodes_needed(even, 1e-3, 1e-8, 48) == 0
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Uniform(1.0, 1.0),
+        lambda: Uniform(0.0, np.inf),
+        lambda: Uniform(np.nan, 1.0),
+        lambda: Normal(0.0, 0.0),
+        lambda: Normal(np.nan, 1.0),
+        lambda: TruncatedNormal(0.0, 1.0, 2.0, 1.0),
+        lambda: TruncatedNormal(0.0, -1.0, 0.0, 1.0),
+        lambda: TruncatedNormal(0.0, 1.0, 50.0, 51.0),
+    ],
+)
+def test_bad_distributions_are_refused(make):
+    with pytest.raises(InputError):
+        make()
+
+
+# Standard errors
+
+
+def test_standard_errors_are_honest():
+    """Over 2000 repetitions the estimates scatter as much as their standard errors say."""
+    rng = np.random.default_rng(0)
+    for draw, deviation in [
+        (rng.normal(3.0, 2.0, (2000, 400)), 2.0),
+        (rng.uniform(0.0, 1.0, (2000, 400)), 12**-0.5),
+        (rng.exponential(1.0, (2000, 400)), 1.0),
+    ]:
+        found = sample_moments(draw)
+        assert found.mean.std() == pytest.approx(found.mean_error.mean(), rel=0.08)
+        assert found.deviation.std() == pytest.approx(found.deviation_error.mean(), rel=0.08)
+        covered = abs(found.deviation - deviation) < 2 * found.deviation_error
+        assert 0.9 < covered.mean() < 0.98
+
+
+def test_few_or_equal_samples():
+    with pytest.raises(InputError, match="too few"):
+        sample_moments(np.zeros((1, 3)))
+    found = sample_moments(np.full((2, 9), 4.0))
+    assert (found.deviation == 0).all()
+    assert (found.deviation_error == 0).all()
+
+
+# The three routes
+
+
+@CASES
+def test_quadrature_is_the_closed_form(inputs):
+    objective = RobustObjective(surrogate(), DESIGN, inputs)
+    places = designs(20)
+    found, exact = objective(places), objective.closed_form(places)
+    assert abs((found - exact)[:, 0] / exact[:, 1]).max() < 1e-6
+    assert abs(found[:, 1] / exact[:, 1] - 1).max() < 1e-5
+    finer = RobustObjective(surrogate(), DESIGN, inputs, tolerance=1e-12)(places)
+    assert abs(finer / exact - 1).max() < 2e-7
+
+
+@CASES
+def test_quadrature_agrees_with_a_million_samples(inputs):
+    objective = RobustObjective(surrogate(), DESIGN, inputs)
+    places = designs(2)
+    found = objective(places)
+    sampled = objective.monte_carlo(places, 1_000_000, np.random.default_rng(3))
+    assert (abs(found[:, 0] - sampled.mean) < 3 * sampled.mean_error).all()
+    assert (abs(found[:, 1] - sampled.deviation) < 3 * sampled.deviation_error).all()
+    assert (sampled.deviation_error < 2e-3 * sampled.deviation).all()
+
+
+def test_moments_of_the_predictor_by_brute_force():
+    """A dense grid through `predict`, which shares no code with the tensor rule."""
+    model = surrogate()
+    objective = RobustObjective(model, DESIGN, UNIFORM[:2])
+    nodes, weights = np.polynomial.legendre.leggauss(30)
+    (place,) = designs(1)
+    m, c = np.meshgrid(place[0] + 0.05 * nodes, 6.5e-4 + 3.5e-4 * nodes, indexing="ij")
+    grid = np.stack([m, np.full_like(m, place[1]), np.full_like(m, place[2]), c], axis=-1)
+    values = model.predict(grid.reshape(-1, 4))
+    weight = np.outer(weights, weights).ravel() / 4
+    mean = weight @ values
+    deviation = np.sqrt(weight @ (values - mean) ** 2)
+    np.testing.assert_allclose(objective(place[None]), [[mean, deviation]], rtol=1e-7)
+
+
+def test_nothing_random_about_the_design_or_at_all():
+    model, places = surrogate(), designs(5)
+    calm = RobustObjective(model, DESIGN, (), fixed={"C": 5e-4})
+    values = model.predict(np.column_stack([places, np.full(5, 5e-4)]))
+    np.testing.assert_allclose(calm(places)[:, 0], values, rtol=1e-13)
+    assert (calm(places)[:, 1] < 1e-13).all()
+    assert calm(places[:0]).shape == (0, 2)
+
+
+def test_a_design_does_not_depend_on_its_batch():
+    for inputs in (UNIFORM, NORMAL[:1]):
+        objective = RobustObjective(surrogate(), DESIGN, inputs)
+        places = designs(13)
+        alone = np.concatenate([objective(place[None]) for place in places])
+        assert (alone == objective(places)).all()
+
+
+def test_monte_carlo_objective():
+    arguments = (surrogate(), DESIGN, UNIFORM)
+    by_chance = [
+        RobustObjective(
+            *arguments, method="monte-carlo", samples=4000, rng=np.random.default_rng(0)
+        )
+        for _ in range(2)
+    ]
+    places = designs(4)
+    assert (by_chance[0](places) == by_chance[1](places)).all()
+    np.testing.assert_allclose(by_chance[0](places), RobustObjective(*arguments)(places), rtol=0.1)
+    with pytest.raises(InputError, match="Monte Carlo"):
+        RobustObjective(*arguments, method="monte-carlo")
+    with pytest.raises(InputError, match="unknown"):
+        RobustObjective(*arguments, method="sobol")
+
+
+# Inputs that are derived: trained in r = I / m, tolerances in I and m
+
+RATIO = (Derived("r", ("I", "m"), lambda inertia, mass: inertia / mass),)
+RATIO_NAMES = ("m", "u", "r", "C")
+RATIO_UPPER = np.array([2.0, 0.3, 1e-3, 1e-3])
+
+
+def in_ratio(**changes):
+    arguments = {"derived": RATIO, "probes": designs(50)} | changes
+    model = surrogate(names=RATIO_NAMES, upper=RATIO_UPPER)
+    return RobustObjective(model, DESIGN, UNIFORM, **arguments)
+
+
+def test_derived_inputs_agree_with_a_fine_rule_and_with_samples():
+    objective, places = in_ratio(), designs(20)
+    found, fine = objective(places), in_ratio(tolerance=1e-12)(places)
+    assert abs((found - fine)[:, 0] / fine[:, 1]).max() < 1e-6
+    assert abs(found[:, 1] / fine[:, 1] - 1).max() < 1e-6
+    sampled = objective.monte_carlo(places[:2], 1_000_000, np.random.default_rng(4))
+    assert (abs(found[:2, 0] - sampled.mean) < 3 * sampled.mean_error).all()
+    assert (abs(found[:2, 1] - sampled.deviation) < 3 * sampled.deviation_error).all()
+
+
+def test_a_map_over_all_inputs_is_the_product_rule():
+    """One group of everything, that is, no use made of the product, gives the same."""
+    everything = tuple(
+        Derived(f"all_{name}", NAMES, lambda *v, k=k: v[k] + 0 * sum(v))
+        for k, name in enumerate(NAMES)
+    )
+    mapped = RobustObjective(
+        surrogate(names=tuple(one.name for one in everything)),
+        DESIGN,
+        UNIFORM,
+        derived=everything,
+        probes=designs(5),
+    )
+    direct = RobustObjective(surrogate(), DESIGN, UNIFORM)
+    places = designs(3)
+    assert abs(mapped(places) / direct(places) - 1).max() < 1e-6
+
+
+def test_derived_inputs_that_do_not_scatter():
+    model = surrogate(names=RATIO_NAMES, upper=RATIO_UPPER)
+    objective = RobustObjective(model, DESIGN, UNIFORM[:1], derived=RATIO)
+    places = designs(3)
+    ratio = np.column_stack([places[:, 0], places[:, 1], places[:, 2] / places[:, 0]])
+    plain = RobustObjective(model, ("m", "u", "r"), UNIFORM[:1])(ratio)
+    np.testing.assert_allclose(objective(places), plain, rtol=1e-12)
+
+
+def test_derived_inputs_need_probes_and_have_no_closed_form():
+    with pytest.raises(InputError, match="give designs"):
+        in_ratio(probes=None)
+    with pytest.raises(InputError, match="no closed form"):
+        in_ratio().closed_form(designs(1))
+
+
+def test_derived_support_must_stay_inside():
+    place = np.array([[1.1, 0.0, 1.5e-4]])  # I down to 0.5e-4, m up to 1.15: r = 4.3e-5 < 5e-5
+    with pytest.raises(InputError, match="does not extrapolate") as caught:
+        in_ratio()(place)
+    assert caught.value.key == "r"
+    assert caught.value.value == pytest.approx(0.5e-4 / 1.15)
+
+
+# Piecewise models
+
+
+def pieces():
+    """Four unrelated models on boxes cut across u and C, so that the prediction jumps."""
+    leaves = []
+    for k, (u, c) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
+        lower, upper = LOWER.copy(), UPPER.copy()
+        (upper if u == 0 else lower)[1] = 0.03
+        (upper if c == 0 else lower)[3] = 5e-4
+        leaves.append(surrogate(lower=lower, upper=upper, seed=k))
+    return PiecewiseKriging(tuple(leaves), np.ones(4), np.zeros(4), np.ones(4, bool))
+
+
+@pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1], UNIFORM[1:2]])
+def test_piecewise_model_is_integrated_piece_by_piece(inputs):
+    fixed = {} if inputs[0].name == "C" else {"C": 6e-4}
+    objective = RobustObjective(pieces(), DESIGN, inputs, fixed=fixed)
+    places = designs(3)
+    found = objective(places)
+    sampled = objective.monte_carlo(places, 300_000, np.random.default_rng(5))
+    assert (abs(found[:, 0] - sampled.mean) < 3.5 * sampled.mean_error).all()
+    assert (abs(found[:, 1] - sampled.deviation) < 3.5 * sampled.deviation_error).all()
+    finer = RobustObjective(pieces(), DESIGN, inputs, fixed=fixed, tolerance=1e-11)
+    assert abs(finer(places) / found - 1).max() < 1e-6
+
+
+def test_piecewise_with_derived_inputs_takes_monte_carlo():
+    leaves = tuple(
+        surrogate(names=RATIO_NAMES, lower=lower, upper=upper)
+        for lower, upper in [
+            (LOWER, np.array([1.5, *RATIO_UPPER[1:]])),
+            (np.array([1.5, *LOWER[1:]]), RATIO_UPPER),
+        ]
+    )
+    model = PiecewiseKriging(leaves, np.ones(2), np.zeros(2), np.ones(2, bool))
+    with pytest.raises(InputError, match="derived on a piecewise model"):
+        RobustObjective(model, DESIGN, UNIFORM, derived=RATIO, probes=designs(3))
+    objective = RobustObjective(
+        model,
+        DESIGN,
+        UNIFORM,
+        derived=RATIO,
+        method="monte-carlo",
+        rng=np.random.default_rng(0),
+    )
+    assert np.isfinite(objective(designs(3))).all()
+
+
+# Refusals
+
+
+def test_support_must_stay_inside_the_domain():
+    objective = RobustObjective(surrogate(), DESIGN, UNIFORM)
+    place = designs(1)
+    assert np.isfinite(objective(np.array([[1.05, 0.0, 2e-4]]))).all()  # just touches the border
+    for column, value in [(0, 1.04), (1, 0.21), (2, 1.4e-4), (0, np.nan)]:
+        outside = place.copy()
+        outside[0, column] = value
+        with pytest.raises(InputError, match="does not extrapolate") as caught:
+            objective(outside)
+        assert caught.value.key == DESIGN[column]
+    wide = RobustObjective(surrogate(), DESIGN, (RandomInput("C", Uniform(2.9e-4, 1e-3)),))
+    with pytest.raises(InputError, match="does not extrapolate") as caught:
+        wide(place)
+    assert caught.value.key == "C"
+    with pytest.raises(InputError, match="shape"):
+        objective(place[0])
+
+
+@pytest.mark.parametrize(
+    ("names", "inputs", "options", "key"),
+    [
+        ((), UNIFORM[:1], {"fixed": {"m": 1.5, "u": 0.0, "I": 3e-4}}, "design_names"),
+        (("m", "m", "u", "I"), UNIFORM, {}, "design_names, random_inputs"),
+        (DESIGN, UNIFORM + UNIFORM[:1], {}, "design_names, random_inputs"),
+        (DESIGN, UNIFORM[1:], {}, "C"),
+        ((*DESIGN, "q"), UNIFORM, {}, "q"),
+        (DESIGN, (*UNIFORM, RandomInput("q", Uniform(0, 1))), {}, "q"),
+        (("m", "u"), UNIFORM, {"fixed": {"I": 3e-4}}, "I"),
+        ((*DESIGN, "C"), UNIFORM, {}, "C"),
+        (DESIGN, UNIFORM, {"fixed": {"m": 1.5}}, "m"),
+        (DESIGN, UNIFORM, {"derived": RATIO}, "r"),
+    ],
+)
+def test_names_that_do_not_fit_are_refused(names, inputs, options, key):
+    with pytest.raises(InputError) as caught:
+        RobustObjective(surrogate(), names, inputs, **options)
+    assert caught.value.key == key
+
+
+def test_an_input_over_many_length_scales_is_refused():
+    rough = surrogate(lengths=(1.0, 1.0, 1.0, 0.01))
+    with pytest.raises(InputError, match="length scales") as caught:
+        RobustObjective(rough, DESIGN, UNIFORM[:1])
+    assert caught.value.key == "C"
