@@ -25,6 +25,7 @@ import matplotlib.pyplot as plt
 import moocore
 import numpy as np
 import xarray as xr
+from matplotlib.ticker import NullFormatter
 
 from hpcclear.mopso import minimise
 from hpcclear.pareto import cut
@@ -238,11 +239,12 @@ def figure(result: xr.Dataset, path: Path) -> None:
     for axis, problem in zip(axes, PROBLEMS, strict=True):
         lack = result.limit.sel(problem=problem) - result.hypervolume.sel(problem=problem)
         for row in rows:
-            colour = "tab:red" if row == 0 else "tab:blue"
+            colour = "tab:red" if result.algorithm.values[row] == "hpcclear" else "tab:blue"
             run = lack.isel(algorithm=row).values
             axis.plot(run, np.full(run.shape, row), "o", color=colour, alpha=0.5, ms=5)
             axis.plot(np.median(run), row, "|", color=colour, ms=22, mew=2)
         axis.set_xscale("log")
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_title(problem)
         axis.grid(axis="x", which="both", alpha=0.25)
     axes[0].set_yticks(rows, list(result.algorithm.values))
