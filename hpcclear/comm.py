@@ -9,6 +9,7 @@ import contextlib
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -98,7 +99,9 @@ def _open_mail() -> Mail:
     mpi = _load_mpi()
     begins = not mpi.Is_initialized()
     if begins:
-        mpi.Init_thread()
+        with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
+            warnings.filterwarnings("ignore", "suspicious MPI execution environment")
+            mpi.Init_thread()
     variable, copies = launcher.launched_size()
     if copies > 1 and mpi.COMM_WORLD.size == 1:
         raise InputError(

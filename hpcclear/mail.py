@@ -129,5 +129,6 @@ class Mail:
         """End all ranks now; does not return."""
         sys.stderr.flush()
         if self._mpi is not None:
-            self._comm.Abort(code)
+            # from a duplicate, or a plain exit, mpiexec at times returns 9, the code of the killed
+            self._mpi.COMM_WORLD.Abort(code)
         os._exit(code)

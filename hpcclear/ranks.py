@@ -48,6 +48,8 @@ class Ranks:
     ----------
     rank, size : int
         This process, and how many there are.
+    is_root : bool
+        Whether this process runs the program.
     oversubscribed : bool
         Whether this node has more ranks than cores for them.
     stage_seconds : dict of str to ndarray
@@ -67,6 +69,7 @@ class Ranks:
         self._passed_on = False
         self.rank = mail.rank
         self.size = mail.size
+        self.is_root = mail.rank == 0
         self.oversubscribed = mail.node_size > mail.node_cores
         self.stage_seconds: dict[str, np.ndarray] = {}
 

@@ -1,0 +1,313 @@
+"""Ranks under mpiexec: equal results, errors that end the job, stops that can be resumed.
+
+Every mpiexec has a time-out of its own; a job that hangs is killed and fails its test.
+"""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from hpcclear import comm, launcher
+from hpcclear.ranks import COLUMNS
+from hpcclear.status import OUTCOME
+
+PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
+MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
+sys.path.insert(0, str(PROGRAMS))
+
+from synthetic import design, make_sleeping, records_of  # noqa: E402
+
+pytestmark = pytest.mark.mpi
+
+
+def start(ranks: int, program: str, *arguments: object, **settings: str) -> subprocess.Popen:
+    """Start a program on so many ranks; 0 is without mpiexec."""
+    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    environment = os.environ | settings
+    environment["PYTHONPATH"] = str(PROGRAMS.parent.parent)
+    return subprocess.Popen(
+        [*launch, sys.executable, str(PROGRAMS / program), *map(str, arguments)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    )
+
+
+def finish(job: subprocess.Popen, seconds: float = 30.0) -> tuple[int, str]:
+    """Exit code and output; kills a job that does not end (its ranks die with mpiexec)."""
+    try:
+        output, _ = job.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        os.killpg(job.pid, signal.SIGKILL)
+        output, _ = job.communicate()
+        pytest.fail(f"the job did not end within {seconds} s:\n{output}")
+    return job.returncode, output
+
+
+def wait_for(path: pathlib.Path, job: subprocess.Popen) -> None:
+    """Wait until a job has made a file."""
+    deadline = time.monotonic() + 20.0
+    while not path.exists():
+        if time.monotonic() > deadline or job.poll() is not None:
+            os.killpg(job.pid, signal.SIGKILL)
+            pytest.fail(f"{path.name} was not reached:\n{job.communicate()[0]}")
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory) -> dict[int, dict[str, np.ndarray]]:
+    """What equal.py wrote on 0 (no mpiexec), 1, 2 and 3 ranks."""
+    folder = tmp_path_factory.mktemp("equal")
+    results = {}
+    for ranks in (0, 1, 2, 3):
+        code, output = finish(start(ranks, "equal.py", folder / f"{ranks}.npz"))
+        assert code == 0, output
+        with np.load(folder / f"{ranks}.npz") as archive:
+            results[ranks] = dict(archive)
+    return results
+
+
+@pytest.mark.parametrize("ranks", [0, 1, 2, 3])
+def test_any_number_of_ranks_gives_the_same_records(runs, ranks):
+    run, expected = runs[ranks], records_of(np.arange(200), design(200))
+    assert run["size"] == max(ranks, 1)
+    assert run["full"].tobytes() == expected.tobytes()
+    assert run["half"].tobytes() == expected.tobytes()
+    assert run["few"].tobytes() == records_of(np.arange(1), design(200)[:1]).tobytes()
+    assert run["none"].size == run["streamed"].size == 0
+    assert run["none"].dtype == OUTCOME
+
+
+def test_every_finished_record_is_delivered_once(runs):
+    for run in runs.values():
+        assert np.sort(run["seen"]["sample"]).tolist() == sorted([*range(200), *range(9)])
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_seconds_of_all_ranks_add_up_to_the_wall_time_of_a_stage(runs, ranks):
+    table = runs[ranks]["seconds_full"]
+    assert table.shape == (ranks, len(COLUMNS))
+    assert (table >= 0.0).all()
+    walls = table.sum(axis=1)
+    np.testing.assert_allclose(walls, walls[0], rtol=1e-9)
+    assert (table[:, COLUMNS.index("busy")] > 0.0).all()
+    # 200 samples of 2 ms in 4 lanes are 0.1 s of work, whoever does it; sleeps only get longer
+    assert table[:, COLUMNS.index("busy")].sum() > 0.09
+    assert runs[ranks]["seconds_serial"][0, COLUMNS.index("write")] > 0.0
+
+
+ERRORS = [
+    "worker on root",
+    "worker on a rank",
+    "workers everywhere",
+    "maker on root",
+    "import on a rank",
+    "first on node",
+    "payload",
+    "callback",
+    "serial",
+    "stray record",
+    "deaf root",
+]
+
+
+@pytest.mark.parametrize("how", ERRORS)
+def test_a_program_error_is_reported_once_and_ends_every_rank(how, tmp_path):
+    code, output = finish(start(3, "failing.py", how, tmp_path / "mark"))
+    elapsed = time.time() - (tmp_path / "mark").stat().st_mtime
+    assert code == 1, output
+    assert output.count("Traceback") == 1, output
+    assert output.count("hpcclear failed on rank") == 1, output
+    assert elapsed < 5.0
+
+
+def test_a_report_names_rank_stage_and_sample(tmp_path):
+    _, output = finish(start(2, "failing.py", "worker on a rank", tmp_path / "mark"))
+    assert "on rank 1 of 2 in stage 'sampling'" in output
+    assert "sample" in output.partition("in stage")[2].splitlines()[0]
+    assert "raised on purpose" in output
+
+
+def test_work_finished_before_an_error_reaches_root(tmp_path):
+    finish(start(2, "failing.py", "worker on a rank", tmp_path / "mark"))
+    samples = [int(line) for line in (tmp_path / "mark.records").read_text().split()]
+    assert len(set(samples)) == len(samples) > 5
+
+
+@pytest.mark.parametrize(
+    "how", ["bad input", "bad input on a rank", "bad input on every rank", "deaf root, bad input"]
+)
+def test_bad_input_on_any_rank_is_a_message_and_exit_code_2(how, tmp_path):
+    code, output = finish(start(3, "failing.py", how, tmp_path / "mark"))
+    assert code == 2, output
+    assert "Traceback" not in output
+    assert output.count("crank.length = -1.0: must be positive. Give a length in metres.") == 1
+    assert time.time() - (tmp_path / "mark").stat().st_mtime < 5.0
+
+
+@pytest.mark.parametrize("how", ["exit code", "system exit"])
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_the_program_may_choose_the_exit_code(ranks, how, tmp_path):
+    assert finish(start(ranks, "failing.py", how, tmp_path / "mark")) == (1, "")
+
+
+def test_an_error_in_one_process_is_reported_once(tmp_path):
+    code, output = finish(start(0, "failing.py", "worker on root", tmp_path / "mark"))
+    assert (code, output.count("Traceback")) == (1, 1)
+    assert "sample" in output
+
+
+def stop_and_resume(folder: pathlib.Path, where: str, number: int, ranks: int) -> str:
+    job = start(ranks, "stopping.py", where, folder)
+    wait_for(folder / "ready", job)
+    time.sleep(0.05)
+    told = time.time()
+    os.kill(job.pid, number)
+    code, output = finish(job)
+    assert code == 3, output
+    assert time.time() - told < 5.0
+    assert "Traceback" not in output
+    return output
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_signal_stops_a_run_that_then_resumes_to_the_same_result(ranks, number, tmp_path):
+    output = stop_and_resume(tmp_path, "sampling", number, ranks)
+    assert f"{number.name} was received" in output
+    before = np.frombuffer((tmp_path / "records").read_bytes(), OUTCOME)
+    assert 0 < before.size < 800
+    code, output = finish(start(3, "stopping.py", "resumed", tmp_path))
+    assert code == 0, output
+    after = np.frombuffer((tmp_path / "records").read_bytes(), OUTCOME)
+    assert np.sort(after["sample"]).tolist() == list(range(800))  # nothing was done twice
+    expected = records_of(np.arange(800), design(800))
+    assert np.load(tmp_path / "result.npy").tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("where", ["begin", "polling", "deaf", "set-up of a rank"])
+def test_a_signal_is_obeyed_in_every_state(where, tmp_path):
+    stop_and_resume(tmp_path, where, signal.SIGTERM, 2)
+
+
+def test_a_signal_to_one_rank_only_stops_the_job(tmp_path):
+    job = start(2, "stopping.py", "sampling", tmp_path)
+    wait_for(tmp_path / "ready", job)
+    marks = [f"PMI_RANK={rank}".encode() for rank in (0, 1)]
+    ranks = {}
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if str(tmp_path).encode() in (process / "cmdline").read_bytes():
+                environment = (process / "environ").read_bytes().split(b"\0")
+                ranks |= {i: int(process.name) for i in (0, 1) if marks[i] in environment}
+        except OSError:
+            continue
+    os.kill(ranks[1], signal.SIGTERM)
+    code, output = finish(job)
+    assert code == 3, output
+    assert output.count("SIGTERM was received on rank 1") == 1
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_a_time_limit_stops_the_run(ranks, tmp_path):
+    began = time.time()
+    code, output = finish(start(ranks, "stopping.py", "limited", tmp_path, 0.5))
+    assert code == 3, output
+    assert time.time() - began < 6.5
+    assert "the time limit was reached" in output
+    assert (tmp_path / "records").stat().st_size > 0
+
+
+def test_a_second_interrupt_ends_a_deaf_process_at_once(tmp_path):
+    job = start(0, "stopping.py", "deaf", tmp_path)
+    wait_for(tmp_path / "ready", job)
+    os.kill(job.pid, signal.SIGINT)
+    time.sleep(1.0)
+    assert job.poll() is None
+    told = time.monotonic()
+    os.kill(job.pid, signal.SIGINT)
+    assert finish(job)[0] == 3
+    assert time.monotonic() - told < 1.5
+
+
+def test_copies_that_do_not_see_each_other_are_refused(tmp_path):
+    settings = {"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_RANK": "0"}
+    code, output = finish(start(0, "equal.py", tmp_path / "out.npz", **settings))
+    assert code == 2
+    assert "OMPI_COMM_WORLD_SIZE = 4: the launcher started 4 processes" in output
+    settings["OMPI_COMM_WORLD_RANK"] = "1"
+    assert finish(start(0, "equal.py", tmp_path / "out.npz", **settings)) == (2, "")
+
+
+def test_no_mpi_library_is_needed_in_one_process_but_named_when_missing(tmp_path):
+    missing = {"MPI4PY_LIBMPI": str(tmp_path / "libmpi.so")}
+    assert finish(start(0, "equal.py", tmp_path / "out.npz", **missing))[0] == 0
+    code, output = finish(start(2, "equal.py", tmp_path / "out.npz", **missing))
+    assert code == 2
+    assert output.count("Error: MPI library") == 1
+    assert "MPI4PY_LIBMPI" in output
+    assert "Traceback" not in output
+
+
+def test_the_mpi_library_is_described_without_starting_it():
+    assert comm.describe_mpi()
+    from mpi4py import MPI
+
+    assert not MPI.Is_initialized()
+
+
+def test_one_process_in_a_notebook_gets_plain_exceptions():
+    ranks = comm.alone({"sleep": make_sleeping})
+    result = ranks.run_points("sleep", {"cost": 1e-4}, design(20))
+    assert result.tobytes() == records_of(np.arange(20), design(20)).tobytes()
+    with pytest.raises(ArithmeticError, match="on purpose"):
+        ranks.run_points("sleep", {"cost": 1e-4, "fails_at": 3}, design(20))
+
+
+@pytest.mark.parametrize(
+    ("environment", "size", "rank"),
+    [
+        ({}, ("", 1), None),
+        ({"SLURM_NTASKS": "8", "SLURM_PROCID": "0"}, ("", 1), None),
+        ({"SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "5"}, ("SLURM_STEP_NUM_TASKS", 8), 5),
+        ({"PMI_SIZE": "1", "PMI_RANK": "0"}, ("", 1), 0),
+        ({"PMI_SIZE": "3", "PMI_RANK": "2", "SLURM_PROCID": "0"}, ("PMI_SIZE", 3), 2),
+        (
+            {"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "1"},
+            ("OMPI_COMM_WORLD_SIZE", 2),
+            1,
+        ),
+    ],
+)
+def test_launchers_are_recognised(environment, size, rank):
+    assert launcher.launched_size(environment) == size
+    assert launcher.launched_rank(environment) == rank
+    assert launcher.is_launched(environment) == (rank is not None)
+
+
+def test_every_library_is_kept_to_one_thread():
+    script = (
+        "import numpy; from hpcclear.launcher import pin_threads; pin_threads()\n"
+        "import scipy.linalg, numba, threadpoolctl\n"
+        "print({i['num_threads'] for i in threadpoolctl.threadpool_info()},"
+        " numba.get_num_threads())"
+    )
+    root = PROGRAMS.parent.parent
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
+    assert run.stdout.split() == ["{1}", "1"], run.stderr
+
+
+def test_importing_the_boundary_loads_no_mpi():
+    script = "import sys, hpcclear.comm; print('mpi4py' in sys.modules, 'numba' in sys.modules)"
+    root = PROGRAMS.parent.parent
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
+    assert run.stdout.split() == ["False", "False"], run.stderr

@@ -1,0 +1,179 @@
+"""The block policy, on ranks whose time is simulated, and the books of hand-out."""
+
+import heapq
+from collections import deque
+
+import numpy as np
+import pytest
+
+from hpcclear.schedule import QUANTUM, Desk, HandOut, Need, allot
+
+
+class SimulatedWorker:
+    """Lanes in lockstep on a clock of its own; a sample takes its cost in seconds of one lane."""
+
+    def __init__(self, lanes: int) -> None:
+        self.lanes = lanes
+        self.now = 0.0
+        self._queue: deque[tuple[int, float]] = deque()
+        self._lanes: list[list[float]] = []
+
+    @property
+    def pending(self) -> int:
+        return len(self._queue) + len(self._lanes)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        self._queue += zip(index.tolist(), points.tolist(), strict=True)
+
+    def advance(self, seconds: float) -> np.ndarray:
+        finished = []
+        while seconds > 1e-12 and self.pending:
+            while self._queue and len(self._lanes) < self.lanes:
+                self._lanes.append(list(self._queue.popleft()))
+            step = min(seconds, min(left for _, left in self._lanes))
+            seconds -= step
+            self.now += step
+            for lane in self._lanes:
+                lane[1] -= step
+            finished += [int(sample) for sample, left in self._lanes if left <= 1e-12]
+            self._lanes = [lane for lane in self._lanes if lane[1] > 1e-12]
+        return np.array([(sample,) for sample in finished], [("sample", np.int64)])
+
+
+def simulate(costs: np.ndarray, ranks: int, lanes: int) -> float:
+    """Summed busy time over ranks x makespan; root answers between its quanta, as in a job."""
+    book = HandOut(costs.size, np.empty(0, np.int64), ranks)
+    workers = [SimulatedWorker(lanes) for _ in range(ranks)]
+    desks = [Desk(worker, lambda worker=worker: worker.now) for worker in workers]
+    requests: deque[tuple[float, int]] = deque()
+    replies: list[tuple[float, tuple] | None] = [None] * ranks
+    asked = [False] * ranks
+    turns = [(0.0, rank) for rank in range(ranks)]
+    finished = np.zeros(ranks)
+    while not book.done:
+        now, rank = heapq.heappop(turns)
+        desk, worker = desks[rank], workers[rank]
+        worker.now = now
+        if rank == 0:
+            while requests and requests[0][0] <= now:
+                other = requests.popleft()[1]
+                index, ask_below = book.grant(desks[other].need)
+                replies[other] = (now, (index, costs[index], ask_below))
+            if desk.hungry:
+                index, ask_below = book.grant(desk.need)
+                desk.take(index, costs[index], ask_below)
+        else:
+            reply = replies[rank]
+            if reply is not None and reply[0] <= now:
+                desk.take(*reply[1])
+                asked[rank], replies[rank] = False, None
+            if desk.hungry and not asked[rank]:
+                requests.append((now, rank))
+                asked[rank] = True
+        if desk.idle:
+            worker.now = now + 0.005
+        else:
+            book.accept(desk.work(QUANTUM))
+            finished[rank] = worker.now
+        heapq.heappush(turns, (worker.now, rank))
+    return sum(desk.busy for desk in desks) / (ranks * finished.max())
+
+
+def tenfold(total: int, mean: float) -> np.ndarray:
+    """Costs spread tenfold, in random order."""
+    costs = np.random.default_rng(3).permutation(np.geomspace(1.0, 10.0, total))
+    return costs * mean / costs.mean()
+
+
+@pytest.mark.parametrize(
+    ("lanes", "seconds"), [(1, 0.002), (1, 0.05), (1, 0.5), (16, 0.02), (16, 0.2), (32, 0.5)]
+)
+def test_two_ranks_are_busy_to_the_end_at_a_tenfold_spread(lanes, seconds):
+    samples = round(2 * 30.0 * lanes / seconds)  # a run of 30 s
+    assert simulate(tenfold(samples, seconds), 2, lanes) > 0.97
+
+
+def test_expensive_samples_at_the_end_of_a_table_are_shared():
+    assert simulate(np.sort(tenfold(12000, 0.005)), 2, 1) > 0.97
+
+
+def test_expensive_samples_at_the_start_of_a_table_are_shared():
+    assert simulate(np.sort(tenfold(12000, 0.005))[::-1].copy(), 2, 1) > 0.97
+
+
+def test_many_ranks_stay_busy():
+    assert simulate(tenfold(64 * 400, 0.05), 64, 1) > 0.95
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.5, 1e4])
+@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("ranks", [1, 2, 10_000])
+def test_a_block_is_never_empty_while_something_remains_and_never_more(ranks, lanes, rate):
+    for remaining in (1, 2, 17, 1000, 10**6):
+        for pending in (0, lanes, 3 * lanes):
+            size, ask_below = allot(remaining, ranks, Need(lanes, pending, rate))
+            assert 1 <= size <= remaining
+            assert ask_below >= lanes
+    assert allot(0, ranks, Need(lanes, 0, rate)).size == 0
+
+
+def test_blocks_shrink_towards_the_end():
+    sizes = []
+    remaining = 10_000
+    while remaining:
+        sizes.append(allot(remaining, 4, Need(1, 0, 1e4)).size)
+        remaining -= sizes[-1]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[-4:] == [1, 1, 1, 1]
+
+
+def test_a_rank_that_starts_gets_its_lanes_filled_and_few_samples_are_shared():
+    assert allot(10_000, 2, Need(16, 0, 0.0)).size == 32
+    assert allot(16, 2, Need(16, 0, 0.0)).size == 8
+
+
+def records(samples: list[int]) -> np.ndarray:
+    return np.array([(sample,) for sample in samples], [("sample", np.int64)])
+
+
+def test_hand_out_leaves_out_what_is_completed_and_ends_when_all_is_back():
+    book = HandOut(6, np.array([1, 4]), 1)
+    handed = []
+    while book.remaining:
+        handed += book.grant(Need(2, 0, 0.0))[0].tolist()
+    assert handed == [0, 2, 3, 5]
+    book.accept(records([5, 0, 3]))
+    assert (book.outstanding, book.done) == (1, False)
+    book.accept(records([2]))
+    assert book.done
+
+
+@pytest.mark.parametrize("completed", [[3], [-1], [1, 1]])
+def test_completed_samples_that_do_not_fit_the_design_are_refused(completed):
+    with pytest.raises(ValueError, match="complet"):
+        HandOut(3, np.array(completed), 1)
+
+
+def test_a_desk_knows_its_samples_when_the_worker_raises():
+    class Failing(SimulatedWorker):
+        def advance(self, seconds: float) -> np.ndarray:
+            raise ArithmeticError
+
+    desk = Desk(Failing(1))
+    desk.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
+    assert desk.suspects == []
+    with pytest.raises(ArithmeticError):
+        desk.work()
+    assert desk.suspects == [3, 7]
+
+
+@pytest.mark.parametrize("strange", [[5], [7, 7], [-1]])
+def test_a_worker_may_only_return_what_it_was_given_and_once(strange):
+    class Confused(SimulatedWorker):
+        def advance(self, seconds: float) -> np.ndarray:
+            return records(strange)
+
+    desk = Desk(Confused(1))
+    desk.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
+    with pytest.raises(RuntimeError, match=f"sample {strange[-1]}, which it does not have"):
+        desk.work()
