@@ -9,8 +9,8 @@ Three ways, each a check on the others:
 
 Random inputs are independent. They may stand for the model's inputs themselves or act through
 `Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
-and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel is
-still a product over the groups.
+and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel
+is still a product over the groups.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,7 +74,7 @@ class RobustObjective:
     Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
-    On a `PiecewiseKriging` the rules are split at the borders of the boxes, as each piece is smooth;
+    On a `PiecewiseKriging` the rules are split at the borders of the boxes (each piece is smooth);
     this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
     ``method="monte-carlo"``.
 

@@ -263,7 +263,7 @@ def _maximise_likelihood(
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-    from threadpoolctl import threadpool_limits  # scikit-learn's own dependency
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     dims = unit.shape[1]
     signal = ConstantKernel(1.0, SIGNAL_BOUNDS)

@@ -124,7 +124,7 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
 
 
 def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points ``(n, d)`` and weights ``(n,)`` as ``(d, p)`` and ``(p,)``, p a multiple of `LANES`."""
+    """Points ``(n, d)``, weights ``(n,)`` as ``(d, p)`` and ``(p,)``, p a multiple of `LANES`."""
     count, dims = points.shape
     padded = -(-count // LANES) * LANES
     transposed, filled = np.zeros((dims, padded)), np.zeros(padded)
