@@ -219,7 +219,7 @@ class Checkpoint:
         self._written = self._clock()
 
     def completed(self) -> np.ndarray:
-        """All samples on disk and in memory, by growing number, each once; `OUTCOME`, shape (n,)."""
+        """All samples on disk and in memory, by growing number, each once; shape (n,)."""
         pieces = [part.records for part in self._parts] + [records for records, _ in self._buffer]
         return _join(pieces, [np.empty((len(piece), 0)) for piece in pieces])[0]
 

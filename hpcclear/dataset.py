@@ -171,9 +171,9 @@ def samples_dataset(
     ValueError
         Shapes that do not match, a sample twice, a design that is not finite.
     """
-    values = np.asarray(values, dtype=float).reshape(len(records), -1)
-    if values.shape[1] != len(names):
-        raise ValueError(f"{len(names)} names for {values.shape[1]} columns of designs")
+    values = np.asarray(values, dtype=float)
+    if values.shape != (len(records), len(names)):
+        raise ValueError(f"designs have shape {values.shape}, not {(len(records), len(names))}")
     if not np.isfinite(values).all():
         raise ValueError("a design is not finite")
     order = np.argsort(records["sample"], kind="stable")

@@ -321,8 +321,8 @@ def decode(content: bytes) -> xr.Dataset:
             if source.is_scale:
                 coordinates[name] = ((name,), _decode_values(source), _decode_attributes(source))
             else:
-                dims = tuple(scale[0].name.lstrip("/") for scale in source.dims)
-                data[name] = (dims, _decode_values(source), _decode_attributes(source))
+                values = _decode_values(source)
+                data[name] = (_decode_dims(source), values, _decode_attributes(source))
         attributes = _decode_attributes(file)
     return xr.Dataset(data, coordinates, attributes)
 
@@ -332,6 +332,13 @@ def _bare_dimension(source: h5py.Dataset) -> bool:
     return bool(
         source.is_scale and isinstance(label, bytes) and label.startswith(b"This is a netCDF")
     )
+
+
+def _decode_dims(source: h5py.Dataset) -> tuple[str, ...]:
+    names = [scale[0].name for scale in source.dims]
+    if None in names:
+        raise ValueError(f"{source.name!r} has a dimension without a name")
+    return tuple(name.lstrip("/") for name in names)
 
 
 def _decode_values(source: h5py.Dataset) -> np.ndarray:

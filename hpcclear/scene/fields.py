@@ -4,7 +4,6 @@ counts, curves."""
 import difflib
 import itertools
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
@@ -21,6 +20,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from hpcclear.scene.units import UnitError, to_si
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
+LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
 LONGEST_CURVE = 10_000
 MOST_LISTED = 20
 
@@ -109,14 +109,16 @@ class Quantity:
             number = math.inf
         if not math.isfinite(number):
             raise problem("the number must be finite", self._remedy())
+        if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
+            raise problem("the number is of no physical size", self._remedy())
         return number
 
     def holds(self, value: Any) -> Any:
         """Whether a float is finite and within the bounds; elementwise for an array."""
         lower = -math.inf if self.above is None else self.above
         upper = math.inf if self.below is None else self.below
-        least = -sys.float_info.max if self.least is None else self.least
-        most = sys.float_info.max if self.most is None else self.most
+        least = -LARGEST if self.least is None else self.least
+        most = LARGEST if self.most is None else self.most
         return (value > lower) & (value < upper) & (value >= least) & (value <= most)
 
     def bounds(self) -> str:

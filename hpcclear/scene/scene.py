@@ -170,7 +170,16 @@ class Scene(Table):
     def resolved(self) -> dict[str, Any]:
         """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
         in."""
-        return _plain(self)
+        content: dict[str, Any] = _plain(self)
+        # A name's own paths are left out, so that C follows when a joint is made ideal.
+        open_paths = [f"joints.{name}.clearance" for name in self.clearance_joints()]
+        for table in ("variables", "random"):
+            for name, row in content.get("study", {}).get(table, {}).items():
+                paths = PAPER_PATHS.get(name, ())
+                own = [p for p in paths if p in open_paths or not p.startswith("joints.")]
+                if row["paths"] == own:
+                    del row["paths"]
+        return content
 
     def to_toml(self) -> str:
         """TOML text of the resolved content; loading it gives an equal scene."""

@@ -1,0 +1,1 @@
+"""How time advances: tableaus, step control, impact instants and the block stepper."""

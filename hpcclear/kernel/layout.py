@@ -1,0 +1,173 @@
+"""Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
+
+Rows are module constants, so the compiler sees every distance between two rows and can vectorise over
+the lanes without run-time checks. Rows of effects that are off are never touched.
+"""
+
+from typing import Any, NamedTuple
+
+TURN = 6.283185307179586  # rad
+
+MAX_COORDINATES = 9  # Baumgarte: three bodies in the plane
+
+
+class Effects(NamedTuple):
+    """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
+
+    crank_rod: Any = None  # clearance at O12
+    rod_slider: Any = None  # clearance at O23
+    fixed: Any = None  # fixed damping factor (Hunt-Crossley)
+    latched: Any = None  # damping by restitution, impact speed latched
+    coulomb: Any = None
+    ambrosio: Any = None
+    torque: Any = None  # the crank is free, driven by a torque
+    torque_table: Any = None
+    gravity: Any = None
+    load: Any = None  # constant slider load
+    load_table: Any = None
+    guide: Any = None  # guide friction on the slider
+    baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
+    ledger: Any = None  # energies
+    record: Any = None  # every accepted step is kept
+
+
+# ---- parameters of one sample -------------------------------------------------------------------
+(
+    SPEED,  # rad/s, prescribed crank speed
+    CRANK_LENGTH,
+    ROD_LENGTH,
+    ROD_NEAR,  # u2: from the first pin to the mass centre
+    ROD_FAR,  # L2 - u2
+    ROD_MASS,
+    INV_ROD_MASS,
+    ROD_INERTIA,
+    INV_ROD_INERTIA,
+    SLIDER_MASS,
+    INV_SLIDER_MASS,
+    CRANK_MOMENT,  # m1 u1
+    CRANK_INERTIA,  # about the crank's bearing, flywheel included
+    GRAVITY,
+    LOAD,
+    TORQUE,
+    GUIDE_COEFFICIENT,
+    GUIDE_INVERSE_RAMP,
+    BAUMGARTE_ALPHA2,  # 2 alpha
+    BAUMGARTE_BETA2,  # beta^2
+    PERIOD,  # s, one revolution at the prescribed speed
+    FIRST_STEP,  # s
+    CRANK_MASS,
+    CRANK_NEAR,  # u1
+    CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
+    SLIDER_INERTIA,
+) = range(26)
+JOINT_12 = 26
+JOINT_23 = 36
+# within a joint's block
+(
+    CLEARANCE,
+    STIFFNESS,
+    DAMPING,
+    BEARING_RADIUS,
+    JOURNAL_RADIUS,
+    FRICTION,
+    INVERSE_RAMP,
+    DEAD_SPEED,
+) = range(8)
+PARAMETERS = 46
+
+# ---- what the motion writes besides accelerations ---------------------------------------------
+(GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
+(DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(6, 10)
+RATES = 10
+
+# ---- lane state and scratch ---------------------------------------------------------------------
+Q = 0  # coordinates at the start of the step
+V = Q + MAX_COORDINATES
+QS = V + MAX_COORDINATES  # coordinates of the stage
+VS = QS + MAX_COORDINATES
+ACC = VS + MAX_COORDINATES  # accelerations of the stage
+RATE_NOW = ACC + MAX_COORDINATES  # rates of the stage
+RATE_OLD = RATE_NOW + RATES  # rates at the start of the step
+RATE_SUM = RATE_OLD + RATES  # weighted by the method: h * sum is the integral over the step
+RATE_ERROR = RATE_SUM + RATES  # weighted by the difference of the pair
+INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of their absolute values)
+(
+    TIME,  # s, since the start of this revolution
+    STEP,  # s, the step being tried
+    NEXT_STEP,  # s, what the controller asks for
+    STAGE_TIME,
+    ERROR,  # mean square of the scaled error
+    LOG_ERROR,  # log2 of the last accepted one
+    ACCEPT,  # 1 or 0
+    ACTIVE_12,  # contact latched (1) or flight (0)
+    ACTIVE_23,
+    INVERSE_IMPACT_12,  # 1 / d'_0
+    INVERSE_IMPACT_23,
+    PEAK_12,
+    PEAK_23,
+    DEEPEST_12,  # largest penetration over clearance
+    DEEPEST_23,
+    ENDED_12,  # contacts ended in this revolution
+    ENDED_23,
+    AVERAGING,  # 1 once the transient is over
+    ATTEMPTS,  # steps tried, accepted or not
+    EVALUATIONS,
+    RUNNING,  # 1 while the lane holds a sample
+    FRESH,  # 1 while the accelerations at the start of the step are not known
+    REJECTED,  # 1 after a rejection: the next step must not grow
+    SPECIAL,  # 1 when this step needs a look by the scalar code
+    KINETIC_PEAK,
+    ENDING,  # 1 when this step ends the revolution
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 26)
+WORK = INTEGRAL + RATES + 26
+
+# ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
+(
+    SAMPLE,  # slot of the sample in the queue
+    REVOLUTION,  # revolutions finished
+    GAP_SUM_12,  # m s, over the averaged revolutions
+    GAP_SUM_23,
+    TIME_SUM,  # s
+    MEAN_F,  # Welford mean of the revolution's objective
+    M2_F,
+    COUNT_F,
+    LATCHED_12,
+    LATCHED_23,
+    DRIVE_WORK,
+    ABS_DRIVE_WORK,
+    DISSIPATED,
+    LOAD_WORK,
+    ELAPSED,  # s, whole revolutions so far
+) = range(15)
+BOOK = 15
+
+# ---- one finished sample --------------------------------------------------------------------------
+(
+    OUT_STATUS,
+    OUT_OBJECTIVE,
+    OUT_SPREAD,
+    OUT_GAP_12,
+    OUT_GAP_23,
+    OUT_PEAK_12,
+    OUT_PEAK_23,
+    OUT_LATCHED_12,
+    OUT_LATCHED_23,
+    OUT_DEEPEST_12,
+    OUT_DEEPEST_23,
+    OUT_EVALUATIONS,
+    OUT_REVOLUTIONS,
+    OUT_DRIVE_WORK,
+    OUT_ABS_DRIVE_WORK,
+    OUT_DISSIPATED,
+    OUT_LOAD_WORK,
+    OUT_KINETIC_PEAK,
+    OUT_TIME,
+    OUT_ACTIVE_12,
+    OUT_ACTIVE_23,
+    OUT_INVERSE_IMPACT_12,
+    OUT_INVERSE_IMPACT_23,
+    OUT_ATTEMPTS,
+    OUT_STIFF_STEPS,
+) = range(25)
+OUT_STATE = 25
+OUT = OUT_STATE + 2 * MAX_COORDINATES

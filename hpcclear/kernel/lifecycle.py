@@ -1,0 +1,245 @@
+"""A lane's life, in scalar code run for few lanes at a time: take a sample, stop at impacts, end revolutions, finish."""
+
+import math
+
+from ..jit import scalar_function as lane_event
+from ..status import Status
+from . import layout as at
+from .events import absolute_integral, impact_fraction
+
+OK = int(Status.OK)
+STEP_CAP = int(Status.STEP_CAP)
+STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
+NOT_FINITE = int(Status.NOT_FINITE)
+STALLED = int(Status.STALLED)
+
+# ---- settings shared by all lanes
+(
+    RTOL,
+    GAP_TOLERANCE,  # m: an impact is located this well
+    ANGLE_TOLERANCE,  # rad, likewise for the end of a revolution of a free crank
+    IMPACT_FLOOR,  # m/s, least latched impact speed
+    TRANSIENT,  # revolutions
+    AVERAGED,
+    MAX_STEPS,
+    SMALLEST_STEP,  # relative to the time
+    EXPONENT,
+    BETA,
+    ATOL,  # first of 2 * MAX_COORDINATES
+) = range(11)
+SETTINGS = ATOL + 2 * at.MAX_COORDINATES
+
+# ---- counters shared by all lanes
+(NEXT_SLOT, SLOTS, FINISHED, RECORDED) = range(4)
+COUNTERS = 4
+
+STATE = 2 * at.MAX_COORDINATES + 4  # of a queued sample: coordinates, velocities, active flags, 1/d'_0
+
+
+@lane_event
+def load(lane, W, n, work, par, book, queue_par, queue_state, counters, settings):
+    """Give a lane the next sample of the queue, or let it rest."""
+    slot = counters[NEXT_SLOT]
+    for k in range(at.TIME, at.WORK):
+        work[k * W + lane] = 0.0
+    for k in range(at.RATE_OLD, at.TIME):
+        work[k * W + lane] = 0.0
+    for k in range(at.BOOK):
+        book[k * W + lane] = 0.0
+    if slot >= counters[SLOTS]:
+        return  # the step stays 0: a resting lane repeats its last state
+    counters[NEXT_SLOT] = slot + 1
+    for k in range(at.PARAMETERS):
+        par[k * W + lane] = queue_par[slot, k]
+    for k in range(n):
+        work[(at.Q + k) * W + lane] = queue_state[slot, k]
+        work[(at.V + k) * W + lane] = queue_state[slot, at.MAX_COORDINATES + k]
+    last = 2 * at.MAX_COORDINATES
+    work[at.ACTIVE_12 * W + lane] = queue_state[slot, last]
+    work[at.ACTIVE_23 * W + lane] = queue_state[slot, last + 1]
+    work[at.INVERSE_IMPACT_12 * W + lane] = queue_state[slot, last + 2]
+    work[at.INVERSE_IMPACT_23 * W + lane] = queue_state[slot, last + 3]
+    work[at.NEXT_STEP * W + lane] = par[at.FIRST_STEP * W + lane]
+    work[at.FRESH * W + lane] = 1.0
+    work[at.RUNNING * W + lane] = 1.0
+    work[at.AVERAGING * W + lane] = 1.0 if settings[TRANSIENT] == 0.0 else 0.0
+    book[at.SAMPLE * W + lane] = slot
+
+
+@lane_event
+def finish(lane, W, n, status, work, book, out, finished, counters):
+    """Write down a sample that ended, whatever its status, and free the lane."""
+    slot = int(book[at.SAMPLE * W + lane])
+    time = book[at.TIME_SUM * W + lane]
+    gap_12 = book[at.GAP_SUM_12 * W + lane] / time if time > 0.0 else math.nan
+    gap_23 = book[at.GAP_SUM_23 * W + lane] / time if time > 0.0 else math.nan
+    count = book[at.COUNT_F * W + lane]
+    out[slot, at.OUT_STATUS] = status
+    out[slot, at.OUT_OBJECTIVE] = math.sqrt(gap_12 * gap_12 + gap_23 * gap_23)
+    spread = math.sqrt(book[at.M2_F * W + lane] / (count - 1.0)) if count > 1.0 else math.nan
+    out[slot, at.OUT_SPREAD] = spread
+    out[slot, at.OUT_GAP_12] = gap_12
+    out[slot, at.OUT_GAP_23] = gap_23
+    out[slot, at.OUT_PEAK_12] = work[at.PEAK_12 * W + lane]
+    out[slot, at.OUT_PEAK_23] = work[at.PEAK_23 * W + lane]
+    out[slot, at.OUT_LATCHED_12] = book[at.LATCHED_12 * W + lane]
+    out[slot, at.OUT_LATCHED_23] = book[at.LATCHED_23 * W + lane]
+    out[slot, at.OUT_DEEPEST_12] = work[at.DEEPEST_12 * W + lane]
+    out[slot, at.OUT_DEEPEST_23] = work[at.DEEPEST_23 * W + lane]
+    out[slot, at.OUT_EVALUATIONS] = work[at.EVALUATIONS * W + lane]
+    out[slot, at.OUT_REVOLUTIONS] = book[at.REVOLUTION * W + lane]
+    out[slot, at.OUT_DRIVE_WORK] = book[at.DRIVE_WORK * W + lane]
+    out[slot, at.OUT_ABS_DRIVE_WORK] = book[at.ABS_DRIVE_WORK * W + lane]
+    out[slot, at.OUT_DISSIPATED] = book[at.DISSIPATED * W + lane]
+    out[slot, at.OUT_LOAD_WORK] = book[at.LOAD_WORK * W + lane]
+    out[slot, at.OUT_KINETIC_PEAK] = work[at.KINETIC_PEAK * W + lane]
+    out[slot, at.OUT_TIME] = book[at.ELAPSED * W + lane]
+    out[slot, at.OUT_ACTIVE_12] = work[at.ACTIVE_12 * W + lane]
+    out[slot, at.OUT_ACTIVE_23] = work[at.ACTIVE_23 * W + lane]
+    out[slot, at.OUT_INVERSE_IMPACT_12] = work[at.INVERSE_IMPACT_12 * W + lane]
+    out[slot, at.OUT_INVERSE_IMPACT_23] = work[at.INVERSE_IMPACT_23 * W + lane]
+    out[slot, at.OUT_ATTEMPTS] = work[at.ATTEMPTS * W + lane]
+    for k in range(n):
+        out[slot, at.OUT_STATE + k] = work[(at.Q + k) * W + lane]
+        out[slot, at.OUT_STATE + at.MAX_COORDINATES + k] = work[(at.V + k) * W + lane]
+    finished[counters[FINISHED]] = slot
+    counters[FINISHED] += 1
+    work[at.RUNNING * W + lane] = 0.0
+
+
+@lane_event
+def failure(lane, W, n, work, stages, settings):
+    """Why a lane cannot go on: a status, or OK if it can."""
+    if work[at.ATTEMPTS * W + lane] >= settings[MAX_STEPS]:
+        return STEP_CAP
+    h = work[at.STEP * W + lane]
+    shortest = settings[SMALLEST_STEP] * (h + work[at.TIME * W + lane])
+    if work[at.ACCEPT * W + lane] == 0.0 and h <= shortest:
+        for k in range(n):
+            state = work[(at.Q + k) * W + lane] + work[(at.V + k) * W + lane]
+            if not math.isfinite(state + stages[k * W + lane]):
+                return NOT_FINITE
+        return STEP_TOO_SMALL
+    return OK
+
+
+@lane_event
+def meet_impact(lane, W, work, settings, gap, active, inverse):
+    """Where in this step a joint in flight strikes, as a fraction; 2 if it does not or if it strikes at the end.
+
+    At the end of the step, or at its start, the contact is latched here.
+    """
+    h = work[at.STEP * W + lane]
+    if work[active * W + lane] == 1.0:
+        return 2.0
+    tolerance = settings[GAP_TOLERANCE]
+    d0 = work[(at.RATE_OLD + gap) * W + lane]
+    d1 = work[(at.RATE_NOW + gap) * W + lane]
+    m0 = h * work[(at.RATE_OLD + gap + 2) * W + lane]
+    m1 = h * work[(at.RATE_NOW + gap + 2) * W + lane]
+    if abs(d1) <= tolerance and m1 > 0.0:
+        return 1.0
+    fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
+    if fraction == 0.0:
+        speed = max(work[(at.RATE_OLD + gap + 2) * W + lane], settings[IMPACT_FLOOR])
+        work[active * W + lane] = 1.0
+        work[inverse * W + lane] = 1.0 / speed
+        work[at.FRESH * W + lane] = 1.0
+    return fraction
+
+
+@lane_event
+def latch(lane, W, work, settings, gap, active, inverse):
+    """Start a contact at the end of this step: its approach speed is kept until the contact ends."""
+    speed = max(work[(at.RATE_NOW + gap + 2) * W + lane], settings[IMPACT_FLOOR])
+    work[active * W + lane] = 1.0
+    work[inverse * W + lane] = 1.0 / speed
+    # within the tolerance of zero: a hair below it would end the contact at once
+    work[(at.RATE_NOW + gap) * W + lane] = max(work[(at.RATE_NOW + gap) * W + lane], 0.0)
+
+
+@lane_event
+def stop_at_impacts(lane, W, work, settings):
+    """Shorten the step to the first impact inside it, or latch the contacts that begin at its end."""
+    first = meet_impact(lane, W, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
+    second = meet_impact(lane, W, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+    fraction = min(first, second)
+    if fraction < 1.0:
+        h = work[at.STEP * W + lane]
+        work[at.ACCEPT * W + lane] = 0.0
+        work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h
+        return
+    if first == 1.0:
+        latch(lane, W, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
+    if second == 1.0:
+        latch(lane, W, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+
+
+@lane_event
+def integrate_gap(lane, W, work, gap):
+    """Integral of |gap| over a step in which the gap changes sign."""
+    h = work[at.STEP * W + lane]
+    d0 = work[(at.RATE_OLD + gap) * W + lane]
+    d1 = work[(at.RATE_NOW + gap) * W + lane]
+    if d0 * d1 < 0.0:
+        m0 = h * work[(at.RATE_OLD + gap + 2) * W + lane]
+        m1 = h * work[(at.RATE_NOW + gap + 2) * W + lane]
+        mean = work[(at.RATE_SUM + gap) * W + lane]
+        work[(at.RATE_SUM + gap) * W + lane] = absolute_integral(mean, d0, m0, d1, m1)
+
+
+@lane_event
+def end_turn_of_free_crank(lane, W, work, settings, last):
+    """Stop a free crank at a full turn. Returns OK or STALLED."""
+    if work[(at.VS + last) * W + lane] <= 0.0:
+        return STALLED
+    beyond = work[(at.QS + last) * W + lane] - at.TURN
+    tolerance = settings[ANGLE_TOLERANCE]
+    work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0
+    if beyond > tolerance:
+        h = work[at.STEP * W + lane]
+        before = work[(at.Q + last) * W + lane] - at.TURN
+        fraction = impact_fraction(
+            before, h * work[(at.V + last) * W + lane], beyond, h * work[(at.VS + last) * W + lane], 0.0
+        )
+        work[at.ACCEPT * W + lane] = 0.0
+        work[at.NEXT_STEP * W + lane] = fraction * h
+    return OK
+
+
+@lane_event
+def end_revolution(lane, W, work, book, settings):
+    """Close the books of a revolution; True when it was the last one."""
+    time = work[at.TIME * W + lane]
+    book[at.ELAPSED * W + lane] += time
+    revolution = book[at.REVOLUTION * W + lane] + 1.0
+    book[at.REVOLUTION * W + lane] = revolution
+    if work[at.AVERAGING * W + lane] == 1.0:
+        gap_12 = work[(at.INTEGRAL + at.GAP_12) * W + lane]
+        gap_23 = work[(at.INTEGRAL + at.GAP_23) * W + lane]
+        book[at.GAP_SUM_12 * W + lane] += gap_12
+        book[at.GAP_SUM_23 * W + lane] += gap_23
+        book[at.TIME_SUM * W + lane] += time
+        f = math.sqrt(gap_12 * gap_12 + gap_23 * gap_23) / time
+        count = book[at.COUNT_F * W + lane] + 1.0
+        step = f - book[at.MEAN_F * W + lane]
+        mean = book[at.MEAN_F * W + lane] + step / count
+        book[at.M2_F * W + lane] += step * (f - mean)
+        book[at.MEAN_F * W + lane] = mean
+        book[at.COUNT_F * W + lane] = count
+        if work[at.ACTIVE_12 * W + lane] == 1.0 and work[at.ENDED_12 * W + lane] == 0.0:
+            book[at.LATCHED_12 * W + lane] = 1.0
+        if work[at.ACTIVE_23 * W + lane] == 1.0 and work[at.ENDED_23 * W + lane] == 0.0:
+            book[at.LATCHED_23 * W + lane] = 1.0
+    book[at.DRIVE_WORK * W + lane] += work[(at.INTEGRAL + at.DRIVE_POWER) * W + lane]
+    book[at.ABS_DRIVE_WORK * W + lane] += work[(at.INTEGRAL + at.ABS_DRIVE_POWER) * W + lane]
+    book[at.DISSIPATED * W + lane] += work[(at.INTEGRAL + at.DISSIPATION) * W + lane]
+    book[at.LOAD_WORK * W + lane] += work[(at.INTEGRAL + at.LOAD_POWER) * W + lane]
+    for r in range(at.RATES):
+        work[(at.INTEGRAL + r) * W + lane] = 0.0
+    work[at.TIME * W + lane] = 0.0
+    work[at.ENDED_12 * W + lane] = 0.0
+    work[at.ENDED_23 * W + lane] = 0.0
+    work[at.ENDING * W + lane] = 0.0
+    work[at.AVERAGING * W + lane] = 1.0 if revolution >= settings[TRANSIENT] else 0.0
+    return revolution >= settings[TRANSIENT] + settings[AVERAGED]

@@ -1,0 +1,39 @@
+"""Keeping every accepted step of a single response: the raw material of time series. Off in ensembles."""
+
+from ..jit import lane_function
+from . import layout as at
+
+# one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
+(TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
+(DRIVE_WORK, ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, STATE) = range(7, 12)
+
+
+def columns(n: int) -> int:
+    """Length of a row for n coordinates."""
+    return STATE + 3 * n
+
+
+@lane_function
+def record_step(record, counters, work, stages, book, n, W):
+    """Append the new state of lane 0 to `record`; True when it is full and the stepper must return."""
+    if record is not None:
+        if work[at.ACCEPT * W] * work[at.RUNNING * W] == 1.0:
+            row = counters[3]
+            record[row, TIME] = book[at.ELAPSED * W] + work[at.TIME * W]
+            record[row, TURN_TIME] = work[at.TIME * W]
+            record[row, REVOLUTION] = book[at.REVOLUTION * W]
+            record[row, ACTIVE_12] = work[at.ACTIVE_12 * W]
+            record[row, ACTIVE_23] = work[at.ACTIVE_23 * W]
+            record[row, INVERSE_12] = work[at.INVERSE_IMPACT_12 * W]
+            record[row, INVERSE_23] = work[at.INVERSE_IMPACT_23 * W]
+            for r in range(4):
+                done = book[(at.DRIVE_WORK + r) * W]
+                record[row, DRIVE_WORK + r] = done + work[(at.INTEGRAL + at.DRIVE_POWER + r) * W]
+            for k in range(n):
+                record[row, STATE + k] = work[(at.Q + k) * W]
+                record[row, STATE + n + k] = work[(at.V + k) * W]
+                record[row, STATE + 2 * n + k] = stages[k * W]
+            counters[3] = row + 1
+        return counters[3] >= record.shape[0]
+    else:
+        return False

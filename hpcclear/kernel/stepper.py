@@ -1,0 +1,225 @@
+"""The block stepper: W samples in lockstep, each with its own time, step, contact state and outcome.
+
+A lane whose sample ends takes the next one from the queue. The stepper returns after a budget of steps with
+its whole state in the arrays it was given, and goes on from there bit for bit.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba import njit
+
+from ..jit import FASTMATH, lane_function
+from . import layout as at
+from .combine import any_stage_state, step_error
+from .control import choose_step, commit, flag_gaps, judge_step
+from .lifecycle import (
+    ATOL,
+    BETA,
+    EXPONENT,
+    FINISHED,
+    GAP_TOLERANCE,
+    MAX_STEPS,
+    NEXT_SLOT,
+    OK,
+    RTOL,
+    SLOTS,
+    SMALLEST_STEP,
+    end_revolution,
+    end_turn_of_free_crank,
+    failure,
+    finish,
+    integrate_gap,
+    load,
+    stop_at_impacts,
+)
+from .record import record_step
+from .rhs import accelerations
+
+
+@lane_function
+def begin_stage(work, par, torque, c, W):
+    """Time of this stage within the revolution."""
+    if torque is None:
+        for i in range(W):
+            work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
+
+
+@lane_function
+def start_state(work, n, W):
+    """The start of the step as a stage, for lanes whose accelerations there are not known yet."""
+    for k in range(n):
+        for i in range(W):
+            work[(at.QS + k) * W + i] = work[(at.Q + k) * W + i]
+            work[(at.VS + k) * W + i] = work[(at.V + k) * W + i]
+
+
+@lane_function
+def adopt_fresh(work, stages, n, W):
+    """Take over accelerations and rates at the start of the step on fresh lanes only."""
+    for i in range(W):
+        if work[at.FRESH * W + i] == 1.0:
+            for k in range(n):
+                stages[k * W + i] = work[(at.ACC + k) * W + i]
+            for r in range(at.RATES):
+                work[(at.RATE_OLD + r) * W + i] = work[(at.RATE_NOW + r) * W + i]
+            work[at.FRESH * W + i] = 0.0
+            work[at.EVALUATIONS * W + i] += 1.0
+
+
+@lane_function
+def weigh_gap(work, b, e, row, gap, first, W):
+    """Add a stage's gap to the sums that become its integral over the step and the error of that."""
+    for i in range(W):
+        old = 0.0 if first else work[(at.RATE_SUM + gap) * W + i]
+        work[(at.RATE_SUM + gap) * W + i] = old + b * work[(row + gap) * W + i]
+        old = 0.0 if first else work[(at.RATE_ERROR + gap) * W + i]
+        work[(at.RATE_ERROR + gap) * W + i] = old + e * work[(row + gap) * W + i]
+
+
+@lane_function
+def weigh_rates(crank_rod, rod_slider, ledger, work, b, e, row, first, W):
+    """Add a stage's rates, times the weights b and e of its method, to the sums over the step."""
+    if crank_rod is not None:
+        weigh_gap(work, b, e, row, at.GAP_12, first, W)
+    if rod_slider is not None:
+        weigh_gap(work, b, e, row, at.GAP_23, first, W)
+    if ledger is not None:
+        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
+            for i in range(W):
+                old = 0.0 if first else work[(at.RATE_SUM + r) * W + i]
+                work[(at.RATE_SUM + r) * W + i] = old + b * work[(row + r) * W + i]
+
+
+@lane_function
+def weigh_stage(effects, work, weights, s, count, W):
+    """Weigh the rates of stage s; those of the first stage are known from the step before."""
+    B = count + 2 * count * count
+    E = B + count
+    if s == 1:
+        weigh_rates(
+            effects.crank_rod, effects.rod_slider, effects.ledger, work,
+            weights[B], weights[E], at.RATE_OLD, True, W,
+        )  # fmt: skip
+    weigh_rates(
+        effects.crank_rod, effects.rod_slider, effects.ledger, work,
+        weights[B + s], weights[E + s], at.RATE_NOW, False, W,
+    )  # fmt: skip
+
+
+@lane_function
+def free_crank_turn(torque, lane, W, work, settings, last):
+    if torque is not None:
+        return end_turn_of_free_crank(lane, W, work, settings, last)
+    else:
+        return OK
+
+
+@lane_function
+def impacts(latched, lane, W, work, settings):
+    if latched is not None:
+        stop_at_impacts(lane, W, work, settings)
+
+
+@lane_function
+def wrap_free_crank(torque, lane, W, work, last):
+    """Count a free crank's angle anew each turn, so that it keeps its precision."""
+    if torque is not None:
+        work[(at.Q + last) * W + lane] -= at.TURN
+
+
+@cache
+def make_stepper(W: int, n: int) -> Callable[..., Any]:
+    """Return the compiled stepper for W lanes of n coordinates.
+
+    Its arguments: effects (`layout.Effects`), number of stages, packed tableau, settings,
+    work, stages (stages n W), par, book, drive and load tables, the queue (parameters, states), out,
+    finished, counters, record (array or None) and budget: how many block steps to take at most.
+    It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
+    vector length.
+    """
+
+    @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
+    def stepper(
+        effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
+        queue_par, queue_state, out, finished, counters, record, budget,
+    ):  # fmt: skip
+        # offsets in the packed tableau: c, A, A A, b, e, e A
+        A = count
+        AA = A + count * count
+        E = AA + count * count + count
+        EA = E + count
+        atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
+        running = 0.0
+        for i in range(W):
+            if work[at.RUNNING * W + i] == 0.0:
+                load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
+            running += work[at.RUNNING * W + i]
+        while budget > 0 and running > 0.0:
+            budget -= 1
+            choose_step(work, par, effects.torque, W)
+            fresh = 0.0
+            for i in range(W):
+                fresh += work[at.FRESH * W + i]
+            for s in range(0 if fresh > 0.0 else 1, count):
+                if s == 0:
+                    start_state(work, n, W)
+                else:
+                    any_stage_state(
+                        work, stages, weights, weights[s], A + s * count, AA + s * count, n, s, W
+                    )
+                begin_stage(work, par, effects.torque, weights[s], W)
+                accelerations(effects, work, par, torque_table, load_table, W)
+                if s == 0:
+                    adopt_fresh(work, stages, n, W)
+                else:
+                    weigh_stage(effects, work, weights, s, count, W)
+            step_error(
+                effects.crank_rod, effects.rod_slider, work, stages, par, weights, E, EA, n,
+                settings[RTOL], atol, 6, W,
+            )  # fmt: skip
+            for i in range(W):
+                work[at.EVALUATIONS * W + i] += count - 1.0
+            special = judge_step(
+                work, settings[EXPONENT], settings[BETA], settings[MAX_STEPS], settings[SMALLEST_STEP], W
+            )
+            special += flag_gaps(
+                effects.crank_rod, effects.rod_slider, effects.torque, effects.latched,
+                work, n - 1, settings[GAP_TOLERANCE], W,
+            )  # fmt: skip
+            if special > 0.0:
+                for i in range(W):
+                    if work[at.SPECIAL * W + i] == 1.0:
+                        status = failure(i, W, n, work, stages, settings)
+                        if status == OK and work[at.ACCEPT * W + i] == 1.0:
+                            impacts(effects.latched, i, W, work, settings)
+                            if work[at.ACCEPT * W + i] == 1.0:
+                                status = free_crank_turn(effects.torque, i, W, work, settings, n - 1)
+                            integrate_gap(i, W, work, at.GAP_12)
+                            integrate_gap(i, W, work, at.GAP_23)
+                        if status != OK:
+                            finish(i, W, n, status, work, book, out, finished, counters)
+                            load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
+                            running += work[at.RUNNING * W + i] - 1.0
+            ended = commit(
+                effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
+                work, stages, n, W,
+            )  # fmt: skip
+            full = record_step(record, counters, work, stages, book, n, W)
+            if ended > 0.0:
+                for i in range(W):
+                    if work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i] == 1.0:
+                        wrap_free_crank(effects.torque, i, W, work, n - 1)
+                        if end_revolution(i, W, work, book, settings):
+                            finish(i, W, n, OK, work, book, out, finished, counters)
+                            load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
+                            running += work[at.RUNNING * W + i] - 1.0
+            if full:
+                break
+        return running > 0.0
+
+    return stepper
+
+
+__all__ = ["FINISHED", "NEXT_SLOT", "SLOTS", "make_stepper"]

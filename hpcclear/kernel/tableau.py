@@ -1,0 +1,100 @@
+"""Embedded Runge-Kutta pairs as data; the stepper reads the coefficients and is compiled once for all.
+
+The equations of motion are of second order with q' = v, so the stages of q follow from those of v:
+``q_s = q + h c_s v + h^2 sum_j (A A)_sj a_j``. This is the same method, in exact arithmetic, as applying A to the
+first-order system, with half the storage. Every pair is brought to first-same-as-last form: its last stage
+is the new point, whose accelerations start the next step.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction as F
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """An embedded pair.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        Order of the solution that is carried on.
+    error_order : int
+        Order of the other one; the error estimate scales like h**(error_order + 1).
+    a, b, e : numpy.ndarray
+        Stage matrix (stages, stages), weights and error weights (stages,), first-same-as-last.
+    source : str
+    """
+
+    name: str
+    order: int
+    error_order: int
+    a: np.ndarray
+    b: np.ndarray
+    e: np.ndarray
+    source: str
+
+    @property
+    def stages(self) -> int:
+        """Number of stages, the new point included; a step costs one evaluation less."""
+        return len(self.b)
+
+    def packed(self) -> np.ndarray:
+        """Coefficients for the stepper: c, A, A A, b, e, e A in one flat array."""
+        rows = (self.a.sum(axis=1), self.a, self.a @ self.a, self.b, self.e, self.e @ self.a)
+        return np.concatenate([np.ravel(x) for x in rows])
+
+
+def _pair(
+    name: str, order: int, error_order: int, rows: list[list[F]], b: list[F], other: list[F], source: str
+) -> Tableau:
+    """Assemble a tableau from exact fractions, adding the new point as last stage where it is missing."""
+    n = len(b)
+    matrix = [row + [F(0)] * (n - len(row)) for row in rows]
+    if matrix[-1] != b:
+        matrix = [[*row, F(0)] for row in matrix] + [[*b, F(0)]]
+        b, other = [*b, F(0)], [*other, F(0)]
+    as_float = lambda row: [float(x) for x in row]  # noqa: E731
+    a = np.array([as_float(row) for row in matrix])
+    error = [x - y for x, y in zip(b, other, strict=True)]
+    return Tableau(name, order, error_order, a, np.array(as_float(b)), np.array(as_float(error)), source)
+
+
+DORMAND_PRINCE = _pair(
+    "dormand-prince",
+    5,
+    4,
+    [
+        [],
+        [F(1, 5)],
+        [F(3, 40), F(9, 40)],
+        [F(44, 45), F(-56, 15), F(32, 9)],
+        [F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)],
+        [F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)],
+        [F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)],
+    ],
+    [F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84), F(0)],
+    [F(5179, 57600), F(0), F(7571, 16695), F(393, 640), F(-92097, 339200), F(187, 2100), F(1, 40)],
+    "Dormand and Prince 1980, doi:10.1016/0771-050X(80)90013-3",
+)
+
+FEHLBERG = _pair(
+    "fehlberg",
+    4,
+    5,
+    [
+        [],
+        [F(1, 4)],
+        [F(3, 32), F(9, 32)],
+        [F(1932, 2197), F(-7200, 2197), F(7296, 2197)],
+        [F(439, 216), F(-8), F(3680, 513), F(-845, 4104)],
+        [F(-8, 27), F(2), F(-3544, 2565), F(1859, 4104), F(-11, 40)],
+    ],
+    [F(25, 216), F(0), F(1408, 2565), F(2197, 4104), F(-1, 5), F(0)],
+    [F(16, 135), F(0), F(6656, 12825), F(28561, 56430), F(-9, 50), F(2, 55)],
+    "Fehlberg 1969, NASA TR R-315: an adaptive fourth-order pair, as in the paper",
+)
+
+TABLEAUS = {t.name: t for t in (DORMAND_PRINCE, FEHLBERG)}
