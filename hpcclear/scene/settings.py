@@ -47,7 +47,7 @@ class Sensitivity(Table):
     """Base samples of the global indices, a power of two; 0 leaves them out."""
 
     def check(self) -> None:
-        """Contradictions between the entries; raises PydanticCustomError, its key below the study."""
+        """Contradictions between the entries; PydanticCustomError with a key below the study."""
         if self.sobol_samples & (self.sobol_samples - 1):
             raise problem(
                 "must be a power of two, or the sequence is not balanced",

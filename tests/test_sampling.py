@@ -1,0 +1,285 @@
+"""Points: strata, bounds, independence of the number drawn, moments, tables of designs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from hpcclear.errors import InputError
+from hpcclear.sampling import (
+    Points,
+    check_points,
+    latin_hypercube,
+    monte_carlo,
+    read_points,
+    unit_lhs,
+)
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.domain import box, to_coordinates, to_physical
+
+JOBS = Path(__file__).parent.parent / "jobs"
+ROBUST = load_scene(JOBS / "robust_slider_crank.toml")
+DESIGN = {"m2": 0.2, "m3": 0.1, "u2": 0.05, "I2": 3e-4}
+ROBUST_CASE = ("C", "m2", "m3", "u2", "I2")
+OPTIMISATION = ("m2", "m3", "u2", "I2", "C")
+
+
+@settings(deadline=None, max_examples=30, derandomize=True)
+@given(n=st.integers(1, 200), d=st.integers(1, 8), seed=st.integers(0, 2**32))
+def test_each_stratum_holds_one_point(n: int, d: int, seed: int) -> None:
+    unit = unit_lhs(n, d, np.random.default_rng(seed))
+    strata = np.sort(np.floor(unit * n).astype(int), axis=0)
+    assert (strata == np.arange(n)[:, None]).all()
+
+
+def test_scene_design_is_stratified_in_its_coordinates() -> None:
+    points = latin_hypercube(ROBUST, 128)
+    region = box(ROBUST)
+    coordinates = to_coordinates(ROBUST, points.names, points.values)
+    unit = (coordinates - region.lower) / (region.upper - region.lower)
+    strata = np.sort(np.floor(unit * 128).astype(int), axis=0)
+    assert (strata == np.arange(128)[:, None]).all()
+
+
+def test_ratios_become_inertias_of_the_same_row() -> None:
+    points = latin_hypercube(ROBUST, 300)
+    for mass, inertia, length in (("m1", "I1", 0.05), ("m2", "I2", 0.12)):
+        ratio = points.column(inertia) / (points.column(mass) * length**2 / 12)
+        assert 1 <= ratio.min() < 1.02
+        assert 3.98 < ratio.max() <= 4
+
+
+def test_ratio_uses_the_scene_where_mass_is_no_variable() -> None:
+    points = latin_hypercube(ROBUST, 100, names=("I2",))
+    ratio = points.column("I2") / (0.21 * 0.12**2 / 12)
+    assert 1 <= ratio.min() < 1.05
+    assert 3.95 < ratio.max() <= 4
+
+
+def test_ratio_follows_a_varying_length() -> None:
+    scene = ROBUST.with_(
+        {
+            "study.variables.L2": {"path": "mechanism.rod.length", "range": [0.1, 0.2]},
+            "study.surrogate.optimisation": ["I2", "L2", "m2", "m3", "u2", "C"],
+        }
+    )
+    points = latin_hypercube(scene, 100)
+    ratio = points.column("I2") * 12 / (points.column("m2") * points.column("L2") ** 2)
+    assert ratio.min() >= 1
+    assert ratio.max() <= 4
+
+
+def test_coordinates_are_the_inverse_of_physical_values() -> None:
+    region = box(ROBUST)
+    unit = unit_lhs(50, 8, np.random.default_rng(3))
+    coordinates = region.lower + unit * (region.upper - region.lower)
+    values = to_physical(ROBUST, region.names, coordinates)
+    np.testing.assert_allclose(
+        to_coordinates(ROBUST, region.names, values), coordinates, rtol=1e-14
+    )
+
+
+def test_widened_design_reaches_beyond_the_box_and_holds_every_random_point() -> None:
+    wide = latin_hypercube(ROBUST, 400, names=OPTIMISATION, widen=ROBUST_CASE)
+    assert wide.column("u2").min() < -0.019
+    assert wide.column("u2").max() > 0.139
+    assert wide.column("C").min() >= 3e-4
+    region = box(ROBUST, OPTIMISATION, ROBUST_CASE)
+    corners = [(0.105, 1.0), (0.105, 4.0), (0.42, 1.0), (0.42, 4.0)]
+    for mass, ratio in corners:
+        design = {"m2": mass, "m3": 0.07, "u2": 0.0, "I2": ratio * mass * 0.12**2 / 12}
+        points = monte_carlo(ROBUST, 4000, random=ROBUST_CASE, design=design)
+        coordinates = to_coordinates(ROBUST, points.names, points.values)
+        for name, column in zip(points.names, coordinates.T, strict=True):
+            at = region.names.index(name)
+            assert region.lower[at] - 1e-12 <= column.min()
+            assert column.max() <= region.upper[at] + 1e-12
+
+
+def test_design_follows_from_seed_and_purpose() -> None:
+    first = latin_hypercube(ROBUST)
+    assert len(first) == 200
+    assert (first.values == latin_hypercube(ROBUST).values).all()
+    others = [
+        latin_hypercube(ROBUST, purpose="test"),
+        latin_hypercube(ROBUST.with_({"study.seed": 0})),
+        latin_hypercube(ROBUST.with_({"study.seed": 2**40})),
+    ]
+    for other in others:
+        assert np.intersect1d(first.values[:, 0], other.values[:, 0]).size == 0
+
+
+@pytest.mark.parametrize("design", [None, DESIGN])
+def test_sample_does_not_depend_on_how_many_are_drawn(design: dict[str, float] | None) -> None:
+    whole = monte_carlo(ROBUST, 1000, design=design).values
+    for first, count in ((0, 1), (1, 1), (2, 7), (3, 250), (997, 3), (500, 500)):
+        part = monte_carlo(ROBUST, count, design=design, first=first).values
+        assert (part == whole[first : first + count]).all()
+
+
+def test_further_random_input_leaves_the_others() -> None:
+    some = monte_carlo(ROBUST, 50, random=("C",), design=DESIGN)
+    more = monte_carlo(ROBUST, 50, random=("m2", "C"), design=DESIGN)
+    assert (some.column("C") == more.column("C")).all()
+    assert (some.column("m2") == 0.2).all()
+
+
+def test_streams_are_independent() -> None:
+    values = monte_carlo(ROBUST, 100_000, random=ROBUST_CASE, design=DESIGN).values
+    correlation = np.corrcoef(values.T) - np.eye(values.shape[1])
+    assert np.abs(correlation).max() < 5 / np.sqrt(100_000)
+    other = monte_carlo(ROBUST, 100_000, random=ROBUST_CASE, design=DESIGN, purpose="verify").values
+    assert abs(np.corrcoef(values[:, 0], other[:, 0])[0, 1]) < 5 / np.sqrt(100_000)
+
+
+def _with_distribution(**entries: object) -> Scene:
+    return ROBUST.with_({"study.random.m2": entries, "study.cases.robust": ["C", "m2"]})
+
+
+@pytest.mark.parametrize(
+    ("entries", "law"),
+    [
+        ({"distribution": "uniform", "half_width": 0.005}, stats.uniform(0.195, 0.01)),
+        ({"distribution": "uniform", "range": [0.2, 0.3]}, stats.uniform(0.2, 0.1)),
+        ({"distribution": "normal", "deviation": 0.004}, stats.norm(0.2, 0.004)),
+        ({"distribution": "normal", "mean": 0.25, "deviation": 0.004}, stats.norm(0.25, 0.004)),
+        (
+            {"distribution": "truncated-normal", "deviation": 0.004, "half_width": 0.005},
+            stats.truncnorm(-1.25, 1.25, 0.2, 0.004),
+        ),
+    ],
+)
+def test_random_inputs_have_their_distribution(
+    entries: dict[str, object], law: stats.rv_continuous
+) -> None:
+    points = monte_carlo(_with_distribution(**entries), 50_000, random=("m2",), design=DESIGN)
+    assert points.names == ("m2", "u2", "I2", "m3")
+    column = points.column("m2")
+    error = law.std() / np.sqrt(len(points))
+    assert abs(column.mean() - law.mean()) < 4 * error
+    assert column.std() == pytest.approx(law.std(), rel=0.02)
+    assert stats.kstest(column, law.cdf).pvalue > 1e-3
+    assert law.cdf(column.min()) >= 0
+    lower, upper = law.support()
+    assert lower <= column.min()
+    assert column.max() <= upper
+
+
+def test_without_a_design_variables_fill_their_range_and_inputs_scatter_about_the_scene() -> None:
+    points = monte_carlo(ROBUST, 20_000)
+    assert points.names == ROBUST.study.names  # type: ignore[union-attr]
+    assert stats.kstest(points.column("m1"), stats.uniform(0.15, 0.45).cdf).pvalue > 1e-3
+    assert stats.kstest(points.column("m2"), stats.uniform(0.205, 0.01).cdf).pvalue > 1e-3
+    ratio = points.column("I1") / (points.column("m1") * 0.05**2 / 12)
+    assert stats.kstest(ratio, stats.uniform(1, 3).cdf).pvalue > 1e-3
+
+
+def test_points_cannot_be_changed() -> None:
+    source = np.ones((2, 1))
+    points = Points(("m2",), source, (("mechanism.rod.mass",),))
+    source[0, 0] = 5
+    assert points.values[0, 0] == 1
+    with pytest.raises(ValueError, match="read-only"):
+        points.values[0, 0] = 2
+    assert points.units == ("kg",)
+    assert len(points.take([1])) == 1
+    assert len(points.take(slice(0, 2))) == 2
+
+
+def test_wrong_requests_are_refused() -> None:
+    bare = load_scene(JOBS / "slider_crank.toml")
+    cases = [
+        lambda: latin_hypercube(bare),
+        lambda: latin_hypercube(ROBUST, 0),
+        lambda: latin_hypercube(ROBUST, names=("m9",)),
+        lambda: monte_carlo(ROBUST, 0),
+        lambda: monte_carlo(ROBUST, 1, first=-1),
+        lambda: monte_carlo(ROBUST, 1, random=("m1",)),
+        lambda: monte_carlo(ROBUST, 1, design={"m9": 1.0}),
+        lambda: monte_carlo(ROBUST, 1, design={"m2": float("nan")}),
+        lambda: monte_carlo(ROBUST, 1, random=(), design={"m2": -1.0}),
+        lambda: Points(("m2",), np.ones(3), (("mechanism.rod.mass",),)),
+    ]
+    for case in cases:
+        with pytest.raises(InputError) as caught:
+            case()
+        assert caught.value.remedy
+
+
+def test_points_that_make_no_mechanism_are_refused_by_row() -> None:
+    paths = (("joints.crank_rod.clearance",), ("joints.crank_rod.bearing_radius",))
+    points = Points(("C12", "R"), np.array([[1e-3, 0.02], [0.01, 0.01]]), paths)
+    with pytest.raises(InputError) as caught:
+        check_points(ROBUST, points)
+    assert caught.value.key.startswith("sample 1, ")
+    check_points(ROBUST, points.take([0]))
+
+
+# --- tables of designs -------------------------------------------------------------------------
+
+
+def _table(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "designs.csv"
+    path.write_bytes(text.encode("utf-8-sig"))
+    return path
+
+
+def test_table_of_designs(tmp_path: Path) -> None:
+    text = (
+        "# my designs\nm2, C [mm], mechanism.slider.mass [g], drive.speed [rpm]\r\n"
+        "0.2,0.3,140,5000\n\n 0.3 , 0.6, 150, 3000\n"
+    )
+    points = read_points(_table(tmp_path, text), ROBUST)
+    assert points.names == ("m2", "C", "mechanism.slider.mass", "drive.speed")
+    expected = [[0.2, 3e-4, 0.14, ROBUST.number("drive.speed")], [0.3, 6e-4, 0.15, 100 * np.pi]]
+    np.testing.assert_allclose(points.values, expected, rtol=2e-16)
+    assert points.paths[1] == ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
+
+
+def test_table_needs_no_study_and_drives_the_clearances_there_are(tmp_path: Path) -> None:
+    scene = load_scene(JOBS / "slider_crank.toml", ["joints.crank_rod.kind=ideal"])
+    points = read_points(_table(tmp_path, "C [mm]\n0.5"), scene)
+    assert points.paths == (("joints.rod_slider.clearance",),)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "fragment"),
+    [
+        ("", "table of points", "holds no points"),
+        ("m2\n", "table of points", "holds no points"),
+        ("m2,C [kg]\n1,2", "{}", "quantity in m"),
+        ("m2 [furlongz]\n1", "{}", "not a known unit"),
+        ("m2,masss\n1,2", "{}", "neither a variable nor a number"),
+        ("m2,m 3\n1,2", "{}", "not a column name"),
+        ("m2,m2\n1,2", "{}", "two columns drive"),
+        ("m2,mechanism.rod.mass\n1,2", "{}", "two columns drive"),
+        ("C,C12\n1e-3,1e-3", "{}", "two columns drive"),
+        ("m2,C [mm]\n1,0.5\n1,nan", "{}, line 3, column C", "finite decimal"),
+        ("m2,C [mm]\n1,", "{}, line 2, column C", "finite decimal"),
+        ("m2\n1/3", "{}, line 2, column m2", "finite decimal"),
+        ("m2\n1e999", "{}, line 2, column m2", "finite decimal"),
+        ("m2\n-1", "{}, line 2, column m2", "above 0 kg"),
+        ("m2,m3\n1", "{}, line 2", "1 cells instead of 2"),
+        ("m2,C [mm]\n\n1,21", "{}, line 3, joints.crank_rod.bearing_radius", "as large as"),
+        ('"m2\n1', "table of points", "cannot be read"),
+    ],
+)
+def test_broken_table_is_refused(tmp_path: Path, text: str, key: str, fragment: str) -> None:
+    path = _table(tmp_path, text)
+    with pytest.raises(InputError) as caught:
+        read_points(path, ROBUST)
+    assert caught.value.key.startswith(key.format(path))
+    assert fragment in caught.value.reason
+    assert caught.value.remedy
+
+
+def test_unreadable_tables_are_refused(tmp_path: Path) -> None:
+    latin = tmp_path / "latin.csv"
+    latin.write_bytes("m2\n1\n# für".encode("latin-1"))
+    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero"), latin):
+        with pytest.raises(InputError) as caught:
+            read_points(path, ROBUST)
+        assert caught.value.key == "table of points"
