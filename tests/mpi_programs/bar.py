@@ -1,0 +1,18 @@
+"""Shows progress for half a second on root: bar.py."""
+
+import sys
+
+from synthetic import design, make_sleeping
+
+from hpcclear.comm import run_on_ranks
+from hpcclear.progress import Progress
+from hpcclear.ranks import Ranks
+
+
+def program(ranks: Ranks) -> None:
+    progress = Progress("sampling", interval=0.1)
+    ranks.run_points("sleep", {"cost": 5e-3}, design(150), progress=progress)
+
+
+if __name__ == "__main__":
+    sys.exit(run_on_ranks(program, {"sleep": make_sleeping}))

@@ -1,0 +1,164 @@
+"""Progress on a terminal, in a log, and in silence."""
+
+import io
+import os
+import pathlib
+import pty
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hpcclear.progress import Progress, duration, launching_terminal, log_interval
+from hpcclear.status import OUTCOME
+
+PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
+MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
+
+
+class Clock:
+    """Seconds that pass when told to."""
+
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def records(count: int, failed: int = 0) -> np.ndarray:
+    made = np.zeros(count, OUTCOME)
+    made["status"][:failed] = 1
+    return made
+
+
+def test_a_log_gets_a_line_every_interval_with_percentage_failures_and_eta():
+    clock, log = Clock(), io.StringIO()
+    progress = Progress("sampling", "log", 5.0, log, clock)
+    progress.start(200, records(0))
+    for _ in range(10):  # ten samples a second, one in ten fails
+        clock.now += 1.0
+        progress.add(records(10, failed=1))
+        progress.refresh()
+    progress.close()
+    assert log.getvalue().splitlines() == [
+        "sampling: 50/200 (25 %), 5 failed, 10 samples/s, 15 s left",
+        "sampling: 100/200 (50 %), 10 failed, 10 samples/s, 10 s left",
+        "sampling: 100/200 (50 %), 10 failed, 10 samples/s in 10 s",
+    ]
+
+
+def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
+    clock, log = Clock(), io.StringIO()
+    progress = Progress("", "log", 5.0, log, clock)
+    progress.start(100, records(80, failed=2))
+    clock.now += 5.0
+    progress.refresh()
+    progress.add(records(5))
+    clock.now += 5.0
+    progress.refresh()
+    assert log.getvalue().splitlines() == [
+        "80/100 (80 %), 2 failed, 0 samples/s, ? left",
+        "85/100 (85 %), 2 failed, 0.5 samples/s, 30 s left",
+    ]
+
+
+def test_the_rate_forgets_after_half_a_minute():
+    clock, log = Clock(), io.StringIO()
+    progress = Progress("", "log", 5.0, log, clock)
+    progress.start(10_000, records(0))
+    for rate in [100] * 60 + [1] * 60:
+        clock.now += 1.0
+        progress.add(records(rate))
+        progress.refresh()
+    assert log.getvalue().splitlines()[-1].split(", ")[1] == "1 samples/s"
+
+
+def test_quiet_writes_nothing_and_an_empty_design_is_complete():
+    log = io.StringIO()
+    for style in ("quiet", "log"):
+        progress = Progress("none", style, 0.0, log, Clock())
+        progress.start(0, records(0))
+        progress.close()
+    assert log.getvalue() == "none: 0/0 (100 %), 0 samples/s in 0 s\n"
+
+
+def test_a_stream_that_is_no_terminal_gets_a_log():
+    log = io.StringIO()
+    progress = Progress("sampling", "auto", 0.0, log, Clock())
+    progress.start(2, records(1))
+    progress.refresh()
+    progress.close()
+    assert "\x1b" not in log.getvalue()
+    assert log.getvalue().count("sampling: 1/2 (50 %)") == 2
+
+
+def test_a_bar_shows_the_numbers():
+    clock, screen = Clock(), io.StringIO()
+    progress = Progress("sampling", "bar", None, screen, clock)
+    progress.start(10, records(0))
+    progress.add(records(10, failed=3))
+    clock.now += 2.0
+    progress.close()
+    assert "10/10 (100 %), 3 failed, 5 samples/s" in screen.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.4, "0 s"), (59.7, "1:00 min"), (185.0, "3:05 min"), (3723.0, "1:02:03 h")],
+)
+def test_durations_read_naturally(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_batch_logs_stay_short():
+    assert log_interval({"SLURM_JOB_ID": "12"}) == 30.0
+    assert log_interval({}) == 5.0
+
+
+def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
+    """What a program writes on a terminal; its standard error may go elsewhere."""
+    screen, line = pty.openpty()
+    root = str(PROGRAM.parent.parent.parent)
+    environment = os.environ | {"PYTHONPATH": root, "TERM": "xterm", "COLUMNS": "120"}
+    environment.pop("SLURM_JOB_ID", None)
+    job = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=line,
+        stderr=line if errors is None else errors,
+        env=environment,
+    )
+    os.close(line)
+    seen = b""
+    try:
+        while piece := os.read(screen, 4096):
+            seen += piece
+    except OSError:  # how Linux says that the other side was closed
+        pass
+    finally:
+        os.close(screen)
+    assert job.wait(timeout=30) == 0
+    return seen.decode()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("launch", [[], [str(MPIEXEC), "-n", "2"]])
+def test_a_person_at_a_terminal_sees_a_bar_also_through_mpiexec(launch):
+    seen = run_on_a_terminal([*launch, sys.executable, str(PROGRAM)])
+    assert "━" in seen
+    assert "sampling: 150/150 (100 %), 21 failed" in seen
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("launch", [[], [str(MPIEXEC), "-n", "2"]])
+def test_errors_sent_to_a_file_get_a_log_even_at_a_terminal(launch, tmp_path):
+    with open(tmp_path / "log", "w", encoding="utf-8") as log:
+        seen = run_on_a_terminal([*launch, sys.executable, str(PROGRAM)], log.fileno())
+    assert seen == ""
+    assert "\x1b" not in (tmp_path / "log").read_text()
+    assert (tmp_path / "log").read_text().count("sampling: ") >= 3
+
+
+def test_no_terminal_is_looked_for_without_a_launcher():
+    assert launching_terminal() is None
