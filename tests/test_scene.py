@@ -14,6 +14,7 @@ import pint
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
 from hpcclear.errors import InputError
@@ -577,3 +578,20 @@ def test_schema_is_closed_and_names_the_units() -> None:
     assert "name" not in schema["$defs"]["Variable"]["properties"]
     variables = schema["$defs"]["Study"]["properties"]["variables"]
     assert variables["type"] == "object"
+
+
+@pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
+def test_schema_accepts_what_is_shipped(path: Path) -> None:
+    validator = Draft202012Validator(scene_schema())
+    validator.check_schema(scene_schema())
+    assert list(validator.iter_errors(tomllib.loads(path.read_text()))) == []
+    assert list(validator.iter_errors(load_scene(path).resolved())) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["unknown_key", "boolean_mass", "negative_mass", "missing_mass", "unknown_law"]
+)
+def test_schema_refuses_wrong_keys_and_values(name: str) -> None:
+    path = next(path for path in BROKEN if path.stem == name)
+    content = tomllib.loads(path.read_text())
+    assert list(Draft202012Validator(scene_schema()).iter_errors(content))
