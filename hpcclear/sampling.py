@@ -124,15 +124,7 @@ def monte_carlo(
     purpose, first
         Which stream, and where in it to begin.
 
-    Returns
-    -------
-    Points
-        In SI.
-
-    Raises
-    ------
-    InputError
-        If the scene has no study, a name is unknown, or a point makes no mechanism.
+    Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
     """
     study = study_of(scene)
     count = study.samples if samples is None else samples
@@ -149,19 +141,19 @@ def monte_carlo(
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
     for column, name in enumerate(names):
+        uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
         if name in chosen:
             centre = (fixed or {}).get(name, scene.number(paths[column][0]))
-            uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
             values[:, column] = _quantile(inputs[name], centre, uniform)
         elif fixed is not None:
             values[:, column] = fixed[name]
         else:
             lower, upper = study.variable(name).bounds
-            uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
             values[:, column] = lower + uniform * (upper - lower)
-    for column, name in enumerate(names):
-        if fixed is None and name not in chosen and study.variable(name).ratio is not None:
-            values[:, column] *= slender_inertias(scene, paths, values, paths[column][0])
+    if fixed is None:
+        for column, name in enumerate(names):
+            if name not in chosen and study.variable(name).ratio is not None:
+                values[:, column] *= slender_inertias(scene, paths, values, paths[column][0])
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row}")
     return points
