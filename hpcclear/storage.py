@@ -212,7 +212,8 @@ def load(path: Path) -> xr.Dataset:
     try:
         return decode(content)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, OverflowError) as error:
-        # only a file sealed by somebody else gets here
+        # Only a file sealed by somebody else gets here. Damage cannot; malice can, and HDF5 itself
+        # may then loop: the seal keeps out accidents and idle hands, not an attacker who forges it.
         reason = (
             f"its structure is not that of an hpcclear file ({str(error).splitlines()[0][:120]})"
         )

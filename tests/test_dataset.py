@@ -1,0 +1,633 @@
+"""Result files: names, units, bytes, and what reading refuses."""
+
+import errno
+import functools
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pint
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hpcclear import dataset, storage
+from hpcclear.errors import InputError, StorageError
+from hpcclear.names import KINDS
+from hpcclear.status import JOINTS, OUTCOME, Flag, Status, failed
+
+SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
+HASH = "c0ffee" * 10 + "beef"
+
+
+def outcomes(n: int) -> np.ndarray:
+    rng = np.random.default_rng(n)
+    found = np.zeros(n, OUTCOME)
+    for name in OUTCOME.names:
+        if OUTCOME[name].base.kind == "f":
+            found[name] = rng.random(found[name].shape)
+    found["sample"] = np.arange(n)
+    found["rhs_evaluations"] = rng.integers(1, 2**40, n)
+    found["objective_uncertainty"] = np.nan
+    if n > 3:
+        found[3] = failed(3, Status.STEP_CAP, 17)[0]
+    return found
+
+
+def samples(n: int = 9) -> xr.Dataset:
+    values = np.random.default_rng(1).random((n, 3))
+    names, units = ["m2", "C", "mechanism.rod.length"], {"mechanism.rod.length": "m"}
+    provenance = dataset.provenance(SCENE, HASH)
+    return dataset.samples_dataset(names, values, units, outcomes(n), provenance)
+
+
+def example(kind: str) -> xr.Dataset:
+    """A dataset with every variable of its kind."""
+    table = KINDS[kind]
+    if kind == "samples":
+        return samples()
+    sizes = {name: 2 if name == "joint" else 3 + i for i, name in enumerate(table.coords)}
+    counter = iter(range(1000))
+
+    def fill(row) -> np.ndarray:
+        shape = tuple(sizes[dim] for dim in row.dims)
+        size = int(np.prod(shape, dtype=int))
+        if row.dtype == "text":
+            return np.array([f"tëxt {next(counter)}" for _ in range(size)]).reshape(shape)
+        if row.dtype == "i1":
+            return np.zeros(shape, np.int8)
+        return np.arange(size).reshape(shape).astype(row.dtype)
+
+    coords = {name: fill(row) for name, row in table.coords.items()}
+    if "joint" in coords:
+        coords["joint"] = np.array(JOINTS)
+    data = {name: fill(row) for name, row in table.data.items()}
+    if table.design_dims is not None:
+        data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
+    return dataset.dataset(kind, coords, data, dataset.provenance(SCENE, HASH))
+
+
+# -- table and builders -------------------------------------------------------------------------
+
+
+def test_the_table_holds_the_names_of_the_contract():
+    contract = {
+        "response": "crank_angle slider_position slider_velocity slider_acceleration rod_x rod_y "
+        "rod_angle eccentricity_x eccentricity_y penetration contact_force friction_force "
+        "crank_moment kinetic_energy elastic_energy driving_work dissipated_energy "
+        "energy_residual objective objective_spread rhs_evaluations status",
+        "samples": "objective objective_spread objective_uncertainty mean_gap peak_contact_force "
+        "latched rhs_evaluations status",
+        "sensitivity": "sensitivity standard_error r2 rmae converged",
+        "kriging": "r2 rmae",
+        "front": "mean deviation",
+        "verification": "mean_true deviation_true",
+        "claims": "text verdict figure",
+        "timing": "busy idle compile write command",
+    }
+    dims = {
+        "response": "time joint",
+        "samples": "sample joint",
+        "sensitivity": "surface interval clearance parameter",
+        "kriging": "model",
+        "front": "case run solution",
+        "verification": "design",
+        "claims": "claim",
+        "timing": "rank stage",
+    }
+    assert set(KINDS) == set(contract)
+    for kind, names in contract.items():
+        assert set(names.split()) <= set(KINDS[kind].data)
+        assert set(dims[kind].split()) <= set(KINDS[kind].coords)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_units_are_read_by_pint_and_every_variable_is_described(kind):
+    registry = pint.UnitRegistry()
+    for name, variable in example(kind).variables.items():
+        assert len(variable.attrs["long_name"]) > 3, name
+        if variable.dtype in (np.float64, np.int64):
+            registry.parse_units(variable.attrs["units"])
+        else:
+            assert "units" not in variable.attrs
+
+
+def test_units_have_the_right_dimension():
+    registry = pint.UnitRegistry()
+    found = {name: row for kind in KINDS.values() for name, row in kind.data.items()}
+    expected = {
+        "slider_velocity": "[length]/[time]",
+        "slider_acceleration": "[length]/[time]**2",
+        "crank_moment": "[mass]*[length]**2/[time]**2",
+        "kinetic_energy": "[mass]*[length]**2/[time]**2",
+        "contact_force": "[mass]*[length]/[time]**2",
+        "objective": "[length]",
+    }
+    for name, dimension in expected.items():
+        assert registry.parse_units(found[name].units).dimensionality == (
+            registry.get_dimensionality(dimension)
+        )
+    inertia = dataset.DESIGN_VARIABLES["I2"][0]
+    assert registry.parse_units(inertia).dimensionality == registry.get_dimensionality(
+        "[mass]*[length]**2"
+    )
+
+
+def test_status_and_flags_follow_cf():
+    found = samples()
+    status, flags = found["status"], found["flags"]
+    assert status.attrs["flag_values"].dtype == status.dtype == np.int8
+    meanings = dict(
+        zip(status.attrs["flag_meanings"].split(), status.attrs["flag_values"], strict=True)
+    )
+    assert meanings == {code.name.lower(): code for code in Status}
+    masks = dict(zip(flags.attrs["flag_meanings"].split(), flags.attrs["flag_masks"], strict=True))
+    assert masks == {flag.name.lower(): flag for flag in Flag}
+    assert "units" not in status.attrs
+
+
+def test_samples_are_sorted_and_come_back_as_the_same_records():
+    n = 12
+    shuffled = np.random.default_rng(0).permutation(n)
+    records, values = outcomes(n), np.arange(2.0 * n).reshape(n, 2)
+    found = dataset.samples_dataset(["m2", "C"], values[shuffled], {}, records[shuffled])
+    assert dataset.records(found).tobytes() == records.tobytes()
+    designs = dataset.designs(found)
+    assert list(designs) == ["m2", "C"]
+    np.testing.assert_array_equal(designs["C"], values[:, 1])
+    assert np.isnan(found["objective"][3])
+    assert found["rhs_evaluations"][3] == 17
+
+
+def test_design_variables_by_path_keep_their_path():
+    found = samples()
+    assert found["mechanism_rod_length"].attrs["units"] == "m"
+    assert list(dataset.designs(found)) == ["m2", "C", "mechanism.rod.length"]
+
+
+@pytest.mark.parametrize("name", ["objective", "sample", "status", "2m", "a b", "", "m.ö"])
+def test_names_that_cannot_be_design_variables_are_refused(name):
+    with pytest.raises(InputError, match=r"study\.variables"):
+        dataset.samples_dataset([name], np.ones((2, 1)), {name: "m"}, outcomes(2))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"objektive": np.zeros(9)}, "not in the table"),
+        ({"objective": np.zeros(8)}, "shape"),
+        ({"objective": np.array(["a"] * 9)}, "type"),
+        ({"status": np.full(9, 300)}, "does not fit"),
+        ({"rhs_evaluations": np.zeros(9)}, "type"),
+    ],
+)
+def test_what_is_not_in_the_table_is_refused(change, words):
+    data = {name: outcomes(9)[name] for name in OUTCOME.names if name != "sample"}
+    coords = {"sample": np.arange(9), "joint": np.array(JOINTS)}
+    with pytest.raises(ValueError, match=words):
+        dataset.dataset("samples", coords, {**data, **change})
+
+
+def test_samples_that_occur_twice_or_are_not_finite_are_refused():
+    twice = outcomes(4)
+    twice["sample"] = [0, 1, 1, 2]
+    with pytest.raises(ValueError, match="twice"):
+        dataset.samples_dataset(["m2"], np.ones((4, 1)), {}, twice)
+    with pytest.raises(ValueError, match="finite"):
+        dataset.samples_dataset(["m2"], np.full((4, 1), np.nan), {}, outcomes(4))
+    with pytest.raises(ValueError, match="same"):
+        dataset.samples_dataset(
+            ["a.b", "a_b"], np.ones((4, 2)), {"a.b": "m", "a_b": "m"}, outcomes(4)
+        )
+
+
+def test_timing_and_response_builders():
+    seconds = {name: np.ones((2, 3)) for name in ("busy", "idle", "compile", "write")}
+    timing = dataset.timing_dataset(["sample", "fit", "swarm"], seconds, "hpcclear run x.toml")
+    assert timing["busy"].sel(stage="fit").sizes == {"rank": 2}
+    assert str(timing["command"].values) == "hpcclear run x.toml"
+    series = {"crank_angle": np.zeros(5), "contact_force": np.zeros((5, 2))}
+    scalars = {"objective": 1e-4, "objective_spread": np.nan, "rhs_evaluations": 7, "status": 0}
+    response = dataset.response_dataset(np.linspace(0, 1, 5), {**series, **scalars})
+    assert response["contact_force"].sel(joint="rod_slider").sizes == {"time": 5}
+    with pytest.raises(ValueError, match="lacks"):
+        dataset.response_dataset(np.linspace(0, 1, 5), series)
+
+
+# -- files --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
+    original, path = example(kind), tmp_path / "file.nc"
+    dataset.write(original, path)
+    assert dataset.read(path, kind, HASH).identical(original)
+    with xr.open_dataset(path, engine=engine) as found:
+        xr.testing.assert_equal(found.load(), original)
+        assert found.attrs["scene"] == SCENE
+        for name, variable in found.data_vars.items():
+            if variable.dtype.kind == "f":
+                assert np.isnan(variable.encoding["_FillValue"]), name
+            else:
+                assert "_FillValue" not in variable.encoding, name
+    with h5py.File(path) as file:
+        assert set(original.variables) <= set(file)
+
+
+def test_numbers_survive_to_the_last_bit(tmp_path):
+    values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
+    original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
+    storage.save(original, tmp_path / "x.nc")
+    found = storage.load(tmp_path / "x.nc")
+    assert found["x"].values.tobytes() == values.tobytes()
+    assert found["n"].values.tobytes() == original["n"].values.tobytes()
+
+
+def test_long_attributes_and_empty_dimensions(tmp_path):
+    attributes = {"scene": "ä" * 200_000, "nothing": "", "number": 3.5}
+    original = dataset.samples_dataset([], np.empty((0, 0)), {}, outcomes(0), attributes)
+    dataset.write(original, tmp_path / "x.nc")
+    assert dataset.read(tmp_path / "x.nc").identical(original)
+    with xr.open_dataset(tmp_path / "x.nc", engine="h5netcdf") as found:
+        assert found.attrs["scene"] == attributes["scene"]
+
+
+WRITE_IN_ANOTHER_PROCESS = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_dataset import example
+from hpcclear import dataset
+for kind in dataset.KINDS:
+    dataset.write(example(kind), f"{folder}/{{kind}}.nc")
+"""
+
+
+def test_equal_content_gives_equal_bytes_in_another_process_at_another_time(tmp_path):
+    code = WRITE_IN_ANOTHER_PROCESS.format(tests=str(Path(__file__).parent), folder=tmp_path)
+    subprocess.run(
+        [sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"}
+    )
+    for kind in KINDS:
+        here = tmp_path / "here.nc"
+        dataset.write(example(kind), here)
+        assert here.read_bytes() == (tmp_path / f"{kind}.nc").read_bytes(), kind
+
+
+def test_a_design_that_differs_by_one_bit_gives_other_bytes(tmp_path):
+    original, other = samples(), samples()
+    other["C"].values[0] = np.nextafter(other["C"].values[0], 1)
+    assert storage.encode(original) != storage.encode(other)
+
+
+def test_a_written_file_has_the_permissions_of_an_ordinary_one(tmp_path):
+    (tmp_path / "ordinary").write_bytes(b"")
+    dataset.write(samples(), tmp_path / "x.nc")
+    assert (tmp_path / "x.nc").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["ordinary", "x.nc"]
+
+
+# -- writing that fails -------------------------------------------------------------------------
+
+
+def test_a_symbolic_link_is_replaced_and_what_it_points_to_is_left_alone(tmp_path):
+    outside = tmp_path / "outside.nc"
+    outside.write_text("precious")
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "x.nc").symlink_to(outside)
+    dataset.write(samples(), inside / "x.nc")
+    assert outside.read_text() == "precious"
+    assert not (inside / "x.nc").is_symlink()
+    dataset.read(inside / "x.nc", "samples")
+    (tmp_path / "link").symlink_to(inside)  # a linked directory is what the user asked for
+    dataset.write(samples(), tmp_path / "link" / "y.nc")
+    dataset.read(inside / "y.nc", "samples")
+
+
+def places(folder: Path) -> dict[str, Path]:
+    (folder / "file").write_text("")
+    (folder / "directory").mkdir()
+    (folder / "loop").symlink_to(folder / "loop")
+    return {
+        "missing directory": folder / "no" / "x.nc",
+        "file as directory": folder / "file" / "x.nc",
+        "directory in the way": folder / "directory",
+        "loop": folder / "loop" / "x.nc",
+        "long name": folder / ("x" * 300),
+        "proc": Path("/proc/x.nc"),
+    }
+
+
+PLACES = ["missing directory", "file as directory", "directory in the way", "loop", "proc"]
+
+
+@pytest.mark.parametrize("case", [*PLACES, "long name"])
+def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
+    place = places(tmp_path)[case]
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(InputError, match="output"):
+        dataset.write(samples(), place)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("case", PLACES)
+def test_a_probe_refuses_them_beforehand(tmp_path, case):
+    with pytest.raises(InputError, match="output"):
+        storage.probe(places(tmp_path)[case])
+
+
+def test_a_probe_leaves_nothing_behind(tmp_path):
+    storage.probe(tmp_path / "x.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_nul_in_a_path_is_bad_input(tmp_path):
+    with pytest.raises(InputError):
+        dataset.write(samples(), f"{tmp_path}/a\0b")
+
+
+@pytest.mark.parametrize("call", ["write", "fsync", "rename"])
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
+def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, code):
+    path = tmp_path / "x.nc"
+    dataset.write(samples(5), path)
+    good = path.read_bytes()
+
+    def fail(*args: object, **kwargs: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, call, fail)
+        with pytest.raises(StorageError, match=os.strerror(code)):
+            dataset.write(samples(6), path)
+    assert path.read_bytes() == good
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x.nc"]
+
+
+def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monkeypatch):
+    real = os.write
+    calls = []
+
+    def interrupted(descriptor: int, data: memoryview) -> int:
+        calls.append(1)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        return real(descriptor, data[:100])  # short writes are allowed
+
+    monkeypatch.setattr(os, "write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        dataset.write(samples(), tmp_path / "x.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+LIMITED = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_dataset import samples
+from hpcclear import dataset
+from hpcclear.errors import StorageError
+import resource
+dataset.write(samples(5), {path!r})
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+try:
+    dataset.write(samples(5000), {path!r})
+except StorageError as error:
+    print(error)
+    sys.exit(1)
+"""
+
+
+def test_a_file_size_limit_ends_in_a_message_and_keeps_the_last_good_file(tmp_path):
+    path = tmp_path / "x.nc"
+    code = LIMITED.format(tests=str(Path(__file__).parent), path=str(path))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "ulimit" in done.stdout
+    assert done.stderr == ""
+    assert dataset.read(path, "samples").sizes["sample"] == 5
+    assert [entry.name for entry in tmp_path.iterdir()] == ["x.nc"]
+
+
+def test_no_permission_is_bad_input(tmp_path):
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o555)
+    code = "import os, sys\nfrom pathlib import Path\nfrom hpcclear import storage\n"
+    if os.geteuid() == 0:  # root may write everywhere, so become nobody once all is imported
+        code += "os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
+        tmp_path.chmod(0o755)
+        for parent in tmp_path.parents[:2]:
+            parent.chmod(0o755)
+    code += f"try:\n    storage.probe(Path({str(locked)!r}) / 'x.nc')\n"
+    code += "except Exception as error:\n    print(type(error).__name__, error)\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("InputError output"), done
+    assert "Permission denied" in done.stdout
+
+
+# -- reading what is not right ------------------------------------------------------------------
+
+
+@functools.cache
+def sealed() -> bytes:
+    image = storage.encode(samples())
+    return image + storage._seal(image)
+
+
+def refuses(folder: Path, content: bytes) -> str:
+    path = folder / "damaged.nc"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        dataset.read(path, "samples")
+    return caught.value.reason
+
+
+DAMAGE = settings(
+    max_examples=300,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+@DAMAGE
+@given(data=st.data())
+def test_truncated_files_are_refused(tmp_path, data):
+    refuses(tmp_path, sealed()[: data.draw(st.integers(0, len(sealed()) - 1))])
+
+
+@DAMAGE
+@given(data=st.data())
+def test_changed_bytes_are_refused(tmp_path, data):
+    position = data.draw(st.integers(0, len(sealed()) - 1))
+    patch = data.draw(st.binary(min_size=1, max_size=64))
+    content = sealed()[:position] + patch + sealed()[position + len(patch) :]
+    if content != sealed():
+        refuses(tmp_path, content)
+
+
+@DAMAGE
+@given(content=st.binary(max_size=2000))
+def test_foreign_bytes_are_refused(tmp_path, content):
+    refuses(tmp_path, content)
+    refuses(tmp_path, content + storage._seal(content))
+
+
+def test_files_that_are_not_there_or_no_files_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for place in (tmp_path / "none.nc", tmp_path, tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(InputError):
+            dataset.read(place)
+
+
+def test_a_value_changed_with_h5py_is_noticed(tmp_path):
+    path = tmp_path / "x.nc"
+    dataset.write(samples(), path)
+    with h5py.File(path, "r+") as file:
+        file["objective"][0] = 1.0
+    with pytest.raises(InputError, match="changed"):
+        dataset.read(path)
+
+
+def test_a_file_of_another_kind_or_scene_is_refused(tmp_path):
+    path = tmp_path / "x.nc"
+    dataset.write(samples(), path)
+    with pytest.raises(InputError, match="it holds samples, not front"):
+        dataset.read(path, "front")
+    with pytest.raises(InputError, match="another scene"):
+        dataset.read(path, "samples", "0" * 64)
+
+
+def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
+    if what == "missing":
+        return content.drop_vars("objective")
+    if what == "coordinate":
+        return content.drop_vars("joint")
+    if what == "unknown":
+        return content.assign(surprise=("sample", np.zeros(9)))
+    if what == "type":
+        return content.assign(rhs_evaluations=content["rhs_evaluations"].astype(float))
+    if what == "dimensions":
+        return content.assign(mean_gap=content["mean_gap"].T)
+    if what == "kind":
+        return content.assign_attrs(hpcclear_kind="potato")
+    if what == "design":
+        return content.assign(C=content["C"].where(content["sample"] > 2))
+    if what == "status":
+        return content.assign(status=content["status"] + np.int8(100))
+    if what == "finished without a number":
+        return content.assign(objective=content["objective"] * np.nan)
+    if what == "failed with a number":
+        return content.assign(objective=content["objective"].fillna(0.0))
+    assert what == "order"
+    return content.isel(sample=slice(None, None, -1))
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        "missing",
+        "coordinate",
+        "unknown",
+        "type",
+        "dimensions",
+        "kind",
+        "design",
+        "status",
+        "finished without a number",
+        "failed with a number",
+        "order",
+    ],
+)
+def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
+    with xr.set_options(keep_attrs=True):
+        spoilt = spoil(samples(), what)
+    storage.save(spoilt, tmp_path / "x.nc")
+    with pytest.raises(InputError):
+        dataset.read(tmp_path / "x.nc", "samples")
+
+
+def hostile(path: Path, what: str, secret: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        old = file["objective_uncertainty"]
+        shape = old.shape
+        if what == "chunked bomb":
+            file.create_dataset("bomb", (10**6, 10**6), "f8", chunks=(1000, 1000))
+        elif what == "unallocated":
+            file.create_dataset("bomb", (10**12,), "f8")
+        elif what == "external data":
+            file.create_dataset("spy", shape, "i1", external=[(str(secret), 0, 80)])
+        elif what == "external link":
+            file["spy"] = h5py.ExternalLink(str(secret), "/x")
+        elif what == "soft link":
+            file["spy"] = h5py.SoftLink("/objective")
+        elif what == "virtual":
+            layout = h5py.VirtualLayout(shape, "f8")
+            layout[:] = h5py.VirtualSource(str(secret), "x", shape)
+            file.create_virtual_dataset("spy", layout)
+        elif what == "group":
+            file.create_group("objects/deep")
+        elif what == "compound":
+            file.create_dataset("spy", data=np.zeros(3, "i4,f8"))
+        elif what == "reference":
+            file.attrs["spy"] = old.ref
+        elif what == "opaque":
+            file.create_dataset("spy", data=np.void(b"cos\nsystem\n"))
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        "chunked bomb",
+        "unallocated",
+        "external data",
+        "external link",
+        "soft link",
+        "virtual",
+        "group",
+        "compound",
+        "reference",
+        "opaque",
+    ],
+)
+def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
+    path, secret = tmp_path / "x.nc", tmp_path / "secret"
+    secret.write_bytes(b"password" * 10)
+    dataset.write(samples(), path)
+    hostile(path, what, secret)
+    image = path.read_bytes()
+    path.write_bytes(image + storage._seal(image))
+    with pytest.raises(InputError, match="structure"):
+        dataset.read(path, "samples")
+
+
+def test_what_a_file_cannot_hold_is_refused_when_writing():
+    with pytest.raises(ValueError, match="type"):
+        storage.encode(xr.Dataset({"x": ("k", np.array([object()]))}))
+    with pytest.raises(ValueError, match="type"):
+        storage.encode(xr.Dataset({"x": ("k", np.zeros(2, complex))}))
+
+
+# -- conventions --------------------------------------------------------------------------------
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("kind", KINDS)
+def test_cf_checker_finds_no_error(tmp_path, kind):
+    path, report = tmp_path / "x.nc", tmp_path / "report.json"
+    dataset.write(example(kind), path)
+    command = [str(Path(sys.executable).with_name("compliance-checker")), "--test", "cf:1.11"]
+    subprocess.run(
+        [*command, "--format", "json", "--output", report, path], capture_output=True, check=False
+    )
+    found = json.loads(report.read_text())["cf:1.11"]
+    messages = [text for entry in found["high_priorities"] for text in entry["msgs"]]
+    # The checker wants a calendar date of any dimension called time; ours is elapsed time.
+    unexpected = [text for text in messages if "should have standard_name='time'" not in text]
+    assert unexpected == []
+    assert kind == "response" or messages == []
