@@ -28,7 +28,7 @@ class Effects(NamedTuple):
     guide: Any = None  # guide friction on the slider
     baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
-    record: Any = None  # every accepted step is kept
+    series: Any = None  # friction forces and crank moment, for time series
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
@@ -78,7 +78,8 @@ PARAMETERS = 46
 # ---- what the motion writes besides accelerations ---------------------------------------------
 (GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(6, 10)
-RATES = 10
+(FRICTION_12, FRICTION_23, DRIVE_MOMENT) = range(10, 13)  # for time series only
+RATES = 13
 
 # ---- lane state and scratch ---------------------------------------------------------------------
 Q = 0  # coordinates at the start of the step
@@ -116,10 +117,9 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     FRESH,  # 1 while the accelerations at the start of the step are not known
     REJECTED,  # 1 after a rejection: the next step must not grow
     SPECIAL,  # 1 when this step needs a look by the scalar code
-    KINETIC_PEAK,
     ENDING,  # 1 when this step ends the revolution
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 26)
-WORK = INTEGRAL + RATES + 26
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 25)
+WORK = INTEGRAL + RATES + 25
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (
@@ -160,7 +160,6 @@ BOOK = 15
     OUT_ABS_DRIVE_WORK,
     OUT_DISSIPATED,
     OUT_LOAD_WORK,
-    OUT_KINETIC_PEAK,
     OUT_TIME,
     OUT_ACTIVE_12,
     OUT_ACTIVE_23,
@@ -168,6 +167,6 @@ BOOK = 15
     OUT_INVERSE_IMPACT_23,
     OUT_ATTEMPTS,
     OUT_STIFF_STEPS,
-) = range(25)
-OUT_STATE = 25
+) = range(24)
+OUT_STATE = 24
 OUT = OUT_STATE + 2 * MAX_COORDINATES

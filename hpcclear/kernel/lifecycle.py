@@ -92,7 +92,6 @@ def finish(lane, W, n, status, work, book, out, finished, counters):
     out[slot, at.OUT_ABS_DRIVE_WORK] = book[at.ABS_DRIVE_WORK * W + lane]
     out[slot, at.OUT_DISSIPATED] = book[at.DISSIPATED * W + lane]
     out[slot, at.OUT_LOAD_WORK] = book[at.LOAD_WORK * W + lane]
-    out[slot, at.OUT_KINETIC_PEAK] = work[at.KINETIC_PEAK * W + lane]
     out[slot, at.OUT_TIME] = book[at.ELAPSED * W + lane]
     out[slot, at.OUT_ACTIVE_12] = work[at.ACTIVE_12 * W + lane]
     out[slot, at.OUT_ACTIVE_23] = work[at.ACTIVE_23 * W + lane]

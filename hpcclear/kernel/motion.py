@@ -76,13 +76,13 @@ def guide_ratio(guide, par, speed, i, W):
 
 
 @lane_function
-def joint_force(effects, par, joint, active, inverse_impact, ex, ey, vx, vy, spin_journal, spin_bearing, i, W):
+def joint_force(effects, work, par, joint, row, active, inverse_impact, ex, ey, vx, vy, spin_journal, spin_bearing, i, W):
     """Contact and friction in one open joint.
 
     Parameters are the journal's position and velocity relative to the bearing's centre and both bodies'
-    angular velocities. Returns the force on the bearing (the journal gets the opposite), the moments of
-    the friction force on bearing and journal about their own centres, gap |e| - c, normal force,
-    gap rate, and dissipated power.
+    angular velocities. Gap |e| - c, normal force and gap rate go to three rate rows from `row` on.
+    Returns the force on the bearing (the journal gets the opposite), the moments of the friction force on
+    bearing and journal about their own centres, and the dissipated power.
     """
     square = ex * ex + ey * ey + _TINY
     inverse = 1.0 / math.sqrt(square)
@@ -117,7 +117,17 @@ def joint_force(effects, par, joint, active, inverse_impact, ex, ey, vx, vy, spi
     fy = normal * ny + tangential * nx
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + tangential * sliding
-    return fx, fy, arm_bearing * tangential, -arm_journal * tangential, gap, normal, rate, loss
+    work[(at.RATE_NOW + row) * W + i] = gap
+    work[(at.RATE_NOW + row + 1) * W + i] = normal
+    work[(at.RATE_NOW + row + 2) * W + i] = rate
+    store_friction(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
+    return fx, fy, arm_bearing * tangential, -arm_journal * tangential, loss
+
+
+@lane_function
+def store_friction(series, work, row, tangential, i, W):
+    if series is not None:
+        work[(at.RATE_NOW + row) * W + i] = tangential
 
 
 @lane_function
@@ -130,7 +140,9 @@ def switched(latched, force, active):
 
 
 @lane_function
-def store_power(ledger, torque, work, drive_moment, speed, loss, load_power, i, W):
+def store_power(ledger, series, work, drive_moment, speed, loss, load_power, i, W):
+    if series is not None:
+        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
     if ledger is not None:
         power = drive_moment * speed
         work[(at.RATE_NOW + at.DRIVE_POWER) * W + i] = power
@@ -171,10 +183,12 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
     crank = par[at.CRANK_LENGTH * W + i]
     x2 = work[(at.QS + 0) * W + i]
     y2 = work[(at.QS + 1) * W + i]
-    fx1, fy1, mb1, mj1, gap, normal, rate, loss1 = joint_force(
+    fx1, fy1, mb1, mj1, loss1 = joint_force(
         effects,
+        work,
         par,
         at.JOINT_12,
+        at.GAP_12,
         work[at.ACTIVE_12 * W + i],
         work[at.INVERSE_IMPACT_12 * W + i],
         crank * cphi - (x2 - near * ct),
@@ -186,13 +200,12 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
         i,
         W,
     )
-    work[(at.RATE_NOW + at.GAP_12) * W + i] = gap
-    work[(at.RATE_NOW + at.FORCE_12) * W + i] = normal
-    work[(at.RATE_NOW + at.RATE_12) * W + i] = rate
-    fx2, fy2, mb2, mj2, gap, normal, rate, loss2 = joint_force(
+    fx2, fy2, mb2, mj2, loss2 = joint_force(
         effects,
+        work,
         par,
         at.JOINT_23,
+        at.GAP_23,
         work[at.ACTIVE_23 * W + i],
         work[at.INVERSE_IMPACT_23 * W + i],
         work[(at.QS + 3) * W + i] - (x2 + far * ct),
@@ -204,9 +217,6 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
         i,
         W,
     )
-    work[(at.RATE_NOW + at.GAP_23) * W + i] = gap
-    work[(at.RATE_NOW + at.FORCE_23) * W + i] = normal
-    work[(at.RATE_NOW + at.RATE_23) * W + i] = rate
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
     ratio = guide_ratio(effects.guide, par, v3, i, W)
@@ -226,7 +236,7 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
     )
     store_power(
         effects.ledger,
-        effects.torque,
+        effects.series,
         work,
         drive_moment_of(effects.torque, torque, -crank_load),
         omega,
@@ -250,10 +260,12 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     length = par[at.ROD_LENGTH * W + i]
     far = par[at.ROD_FAR * W + i]
     crank = par[at.CRANK_LENGTH * W + i]
-    fx, fy, mb, mj, gap, normal, rate, loss = joint_force(
+    fx, fy, mb, mj, loss = joint_force(
         effects,
+        work,
         par,
         at.JOINT_12,
+        at.GAP_12,
         work[at.ACTIVE_12 * W + i],
         work[at.INVERSE_IMPACT_12 * W + i],
         crank * cphi - (x3 - length * ct),
@@ -265,9 +277,6 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
         i,
         W,
     )
-    work[(at.RATE_NOW + at.GAP_12) * W + i] = gap
-    work[(at.RATE_NOW + at.FORCE_12) * W + i] = normal
-    work[(at.RATE_NOW + at.RATE_12) * W + i] = rate
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
@@ -289,7 +298,7 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     )
     store_power(
         effects.ledger,
-        effects.torque,
+        effects.series,
         work,
         drive_moment_of(effects.torque, torque, -crank_load),
         omega,
@@ -341,10 +350,12 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
     length = par[at.ROD_LENGTH * W + i]
     near = par[at.ROD_NEAR * W + i]
     crank = par[at.CRANK_LENGTH * W + i]
-    fx, fy, mb, mj, gap, normal, rate, loss = joint_force(
+    fx, fy, mb, mj, loss = joint_force(
         effects,
+        work,
         par,
         at.JOINT_23,
+        at.GAP_23,
         work[at.ACTIVE_23 * W + i],
         work[at.INVERSE_IMPACT_23 * W + i],
         x3 - (crank * cphi + length * ct),
@@ -356,9 +367,6 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
         i,
         W,
     )
-    work[(at.RATE_NOW + at.GAP_23) * W + i] = gap
-    work[(at.RATE_NOW + at.FORCE_23) * W + i] = normal
-    work[(at.RATE_NOW + at.RATE_23) * W + i] = rate
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
@@ -389,7 +397,7 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
     store_crank(effects.torque, work, 2, crank_alpha, i, W)
     store_power(
         effects.ledger,
-        effects.torque,
+        effects.series,
         work,
         drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3),
         omega,
@@ -480,7 +488,7 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
     )
     work[at.ACC * W + i] = alpha
     store_power(
-        effects.ledger, effects.torque, work, torque, omega, friction * v3, load * v3, i, W
+        effects.ledger, effects.series, work, torque, omega, friction * v3, load * v3, i, W
     )
 
 

@@ -22,14 +22,15 @@ def reduced_compliance(youngs_modulus: float, poisson_ratio: float) -> float:
     return (1.0 - poisson_ratio**2) / youngs_modulus
 
 
-def contact_stiffness(h_bearing: float, h_journal: float, bearing_radius: float, clearance: float) -> float:
-    """Return Hertz's K in N/m^1.5 of a journal in a bearing (paper eq. 4).
+def contact_stiffness(h_bearing, h_journal, bearing_radius, clearance):
+    """Return Hertz's K in N/m^1.5 of a journal in a bearing (paper eq. 4); floats or arrays in SI.
 
     Eq. 4 as printed lacks R_J and is not dimensionally consistent; this is the form of the cited
     source, Lankarani and Nikravesh 1990 (doi:10.1115/1.2912617), for internal contact of spheres.
     """
     journal_radius = bearing_radius - clearance
-    return 4.0 / (3.0 * (h_bearing + h_journal)) * math.sqrt(bearing_radius * journal_radius / clearance)
+    shape = (bearing_radius * journal_radius / clearance) ** 0.5
+    return 4.0 / (3.0 * (h_bearing + h_journal)) * shape
 
 
 def lankarani_nikravesh(restitution: float) -> float:

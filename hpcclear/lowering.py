@@ -1,0 +1,280 @@
+"""From a scene and its points to the numbers the kernel reads: parameters, start states, effects, tolerances."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError
+from .kernel import layout as at
+from .kernel.lanes import Problem
+from .kernel.lifecycle import STATE
+from .kernel.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
+from .physics import contact
+from .scene import Scene
+from .scene.points import Points
+
+Array = NDArray[np.float64]
+
+CELLS = 2048
+"""Cells of a tabulated torque or load over one turn."""
+
+
+class Numbers:
+    """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
+
+    def __init__(self, scene: Scene, points: Points | None) -> None:
+        self.scene = scene
+        self.points = points
+        self.size = 1 if points is None else len(points)
+        self._columns = {}
+        if points is not None:
+            for k, paths in enumerate(points.paths):
+                self._columns.update(dict.fromkeys(paths, points.values[:, k]))
+
+    def __call__(self, path: str) -> Array:
+        """Values of an entry, shape (size,), SI."""
+        column = self._columns.get(path)
+        return np.full(self.size, self.scene.number(path)) if column is None else column
+
+
+def topology(scene: Scene) -> tuple[bool, bool, bool]:
+    """Whether O12 is open, O23 is open, and the crank is free."""
+    open_joints = scene.clearance_joints()
+    return "crank_rod" in open_joints, "rod_slider" in open_joints, scene.drive.kind == "torque"
+
+
+def coordinate_count(scene: Scene) -> int:
+    """Coordinates that are integrated; 0 leaves closed-form kinematics."""
+    first, second, free = topology(scene)
+    return {0: 0, 1: 2, 2: 4}[first + second] + free
+
+
+def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
+    """Which branches of the kernel are compiled for this scene."""
+    first, second, free = topology(scene)
+    e = scene.effects
+    law = None if e.contact is None else e.contact.law
+    is_table = lambda x: isinstance(x, tuple)  # noqa: E731
+    on = {
+        "crank_rod": first,
+        "rod_slider": second,
+        "fixed": law == "hunt-crossley",
+        "latched": law in contact.LATCHED_LAWS,
+        "coulomb": e.friction.law == "coulomb",
+        "ambrosio": e.friction.law == "ambrosio",
+        "torque": free,
+        "torque_table": free and is_table(scene.drive.torque),  # type: ignore[union-attr]
+        "gravity": e.gravity > 0.0,
+        "load": e.slider_load is not None and not is_table(e.slider_load),
+        "load_table": is_table(e.slider_load),
+        "guide": e.guide_friction is not None,
+        "ledger": scene.numerics.energy if ledger is None else ledger,
+        "series": series,
+    }
+    if not (first or second):
+        on.update(dict.fromkeys(("fixed", "latched", "coulomb", "ambrosio"), False))
+    return at.Effects(**{name: 1 if is_on else None for name, is_on in on.items()})
+
+
+def tableau_of(scene: Scene) -> Tableau:
+    """The embedded pair of ``numerics.method``.
+
+    Raises
+    ------
+    InputError
+        If the method is not available for this scene.
+    """
+    method = scene.numerics.method
+    if method == "auto":
+        return DORMAND_PRINCE
+    if method not in TABLEAUS:
+        raise InputError(
+            "numerics.method", method, "is not available", f"Use auto, {', '.join(TABLEAUS)}"
+        )
+    return TABLEAUS[method]
+
+
+def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
+    """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
+
+    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s.
+    """
+    first, second, free = topology(scene)
+    a = scene.numerics.absolute_tolerance
+    if first and second:
+        lengths = [True, True, False, True]
+    elif first or second:
+        lengths = [False, True]
+    else:
+        lengths = []
+    lengths += [False] * free
+    coordinates = [a if length else 10.0 * a for length in lengths]
+    velocities = [1e3 * a if length else 5e4 * a for length in lengths]
+    return (*coordinates, *velocities)
+
+
+def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = CELLS) -> Array:
+    """A tabulated curve over one turn as cubic cells on a uniform grid, 4 coefficients each (flat).
+
+    Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
+    no overshoot, and smooth enough not to stop the integrator at each of them.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    angles = np.array([a for a, _ in curve])
+    values = np.array([v for _, v in curve])
+    if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
+        angles, values = angles[:-1], values[:-1]
+    # three turns side by side, so that the middle one sees its neighbours
+    turns = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
+    smooth = PchipInterpolator(turns, np.tile(values, 3))
+    grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
+    height = smooth(grid)
+    slope = smooth.derivative()(grid) * (at.TURN / cells)
+    height[-1], slope[-1] = height[0], slope[0]
+    d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
+    return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
+
+
+def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+    """What is common to all samples of a scene."""
+    e = scene.effects
+    torque = getattr(scene.drive, "torque", None)
+    averaged = scene.numerics.averaged_revolutions
+    if averaged == "auto":
+        raise InputError(
+            "numerics.averaged_revolutions", averaged, "is not available", "Give a number of revolutions"
+        )
+    if scene.numerics.formulation != "minimal":
+        raise InputError(
+            "numerics.formulation", scene.numerics.formulation, "is not available", 'Use "minimal"'
+        )
+    return Problem(
+        effects=effects_of(scene, series=series, ledger=ledger),
+        coordinates=coordinate_count(scene),
+        tableau=tableau_of(scene),
+        rtol=scene.numerics.rtol,
+        atol=absolute_tolerances(scene),
+        impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
+        transient=scene.numerics.transient_revolutions,
+        averaged=averaged,
+        max_steps=scene.numerics.max_steps,
+        torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,  # type: ignore[arg-type]
+        load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,  # type: ignore[arg-type]
+    )
+
+
+def parameters(scene: Scene, points: Points | None = None) -> Array:
+    """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
+    get = Numbers(scene, points)
+    p = np.ones((get.size, at.PARAMETERS))
+    body = {name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")}
+    free = scene.drive.kind == "torque"
+    speed = get("drive.initial_speed" if free else "drive.speed")
+    p[:, at.SPEED] = speed
+    p[:, at.PERIOD] = at.TURN / speed
+    p[:, at.FIRST_STEP] = 1e-3 * p[:, at.PERIOD]
+    p[:, at.CRANK_LENGTH] = body["crank.length"]
+    p[:, at.ROD_LENGTH] = body["rod.length"]
+    near = get("mechanism.rod.mass_center")
+    p[:, at.ROD_NEAR], p[:, at.ROD_FAR] = near, body["rod.length"] - near
+    mass, inertia = get("mechanism.rod.mass"), get("mechanism.rod.inertia")
+    p[:, at.ROD_MASS], p[:, at.INV_ROD_MASS] = mass, 1.0 / mass
+    p[:, at.ROD_INERTIA], p[:, at.INV_ROD_INERTIA] = inertia, 1.0 / inertia
+    p[:, at.SLIDER_MASS], p[:, at.INV_SLIDER_MASS] = body["slider.mass"], 1.0 / body["slider.mass"]
+    m1, u1 = get("mechanism.crank.mass"), get("mechanism.crank.mass_center")
+    own = get("mechanism.crank.inertia") + (get("drive.flywheel_inertia") if free else 0.0)
+    p[:, at.CRANK_MASS], p[:, at.CRANK_NEAR], p[:, at.CRANK_OWN_INERTIA] = m1, u1, own
+    p[:, at.CRANK_MOMENT] = m1 * u1
+    p[:, at.CRANK_INERTIA] = own + m1 * u1**2
+    p[:, at.GRAVITY] = get("effects.gravity")
+    _outside_parameters(scene, get, p)
+    for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
+        if joint in scene.clearance_joints():
+            _joint_parameters(scene, get, joint, p[:, base:])
+    return p
+
+
+def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
+    """Drive torque, slider load and guide friction; tables are multiplied by 1."""
+    if isinstance(scene.effects.slider_load, float):
+        p[:, at.LOAD] = get("effects.slider_load")
+    if isinstance(getattr(scene.drive, "torque", None), float):
+        p[:, at.TORQUE] = get("drive.torque")
+    if scene.effects.guide_friction is not None:
+        p[:, at.GUIDE_COEFFICIENT] = get("effects.guide_friction.coefficient")
+        p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")
+
+
+def _joint_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
+    """Fill one joint's block of parameters (a view, first column its first entry)."""
+    key = f"joints.{joint}"
+    clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+    compliance = [
+        contact.reduced_compliance(get(f"{key}.{part}.youngs_modulus"), get(f"{key}.{part}.poisson_ratio"))
+        for part in ("bearing", "journal")
+    ]
+    p[:, at.CLEARANCE] = clearance
+    p[:, at.STIFFNESS] = contact.contact_stiffness(*compliance, bearing, clearance)
+    p[:, at.BEARING_RADIUS] = bearing
+    p[:, at.JOURNAL_RADIUS] = bearing - clearance
+    law: Any = scene.effects.contact
+    if law.law == "hunt-crossley":
+        p[:, at.DAMPING] = get("effects.contact.damping")
+    elif law.law in contact.LATCHED_LAWS:
+        p[:, at.DAMPING] = contact.LATCHED_LAWS[law.law](get("effects.contact.restitution"))
+    friction = scene.effects.friction
+    if friction.law != "none":
+        p[:, at.FRICTION] = get("effects.friction.coefficient")
+    if friction.law == "coulomb":
+        p[:, at.INVERSE_RAMP] = 1.0 / get("effects.friction.ramp_speed")
+    elif friction.law == "ambrosio" and friction.speeds is not None:
+        p[:, at.DEAD_SPEED] = friction.speeds[0]
+        p[:, at.INVERSE_RAMP] = 1.0 / (friction.speeds[1] - friction.speeds[0])
+
+
+def start_states(scene: Scene, p: Array) -> Array:
+    """Start of each sample, shape (samples, STATE): crank and rod outstretched, velocities of the ideal mechanism.
+
+    Journals are centred, or where ``start_eccentricity`` puts them.
+    """
+    first, second, free = topology(scene)
+    crank, length, omega = p[:, at.CRANK_LENGTH], p[:, at.ROD_LENGTH], p[:, at.SPEED]
+    e12, e23 = (_start_eccentricity(scene, joint) for joint in ("crank_rod", "rod_slider"))
+    angle = np.arcsin((e12[1] - e23[1]) / length)
+    spin = -crank * omega / (length * np.cos(angle))
+    pin_x, pin_y = crank - e12[0], np.full(len(p), -e12[1])  # rod's first bearing centre
+    slider = pin_x + length * np.cos(angle) + e23[0]
+    slider_speed = -length * np.sin(angle) * spin
+    near = p[:, at.ROD_NEAR]
+    q, v = [angle, slider], [spin, slider_speed]
+    if first and second:
+        q = [pin_x + near * np.cos(angle), pin_y + near * np.sin(angle), *q]
+        v = [-near * np.sin(angle) * spin, crank * omega + near * np.cos(angle) * spin, *v]
+    elif not (first or second):
+        q, v = [], []
+    if free:
+        q, v = [*q, np.zeros(len(p))], [*v, omega]
+    state = np.zeros((len(p), STATE))
+    for k, (coordinate, velocity) in enumerate(zip(q, v, strict=True)):
+        state[:, k], state[:, at.MAX_COORDINATES + k] = coordinate, velocity
+    _start_contacts(scene, p, state)
+    return state
+
+
+def _start_eccentricity(scene: Scene, joint: str) -> tuple[float, float]:
+    return getattr(getattr(scene.joints, joint), "start_eccentricity", (0.0, 0.0))
+
+
+def _start_contacts(scene: Scene, p: Array, state: Array) -> None:
+    """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
+    law = scene.effects.contact
+    if law is None or not law.latched:
+        return
+    for k, (joint, base) in enumerate((("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23))):
+        if joint in scene.clearance_joints():
+            distance = np.hypot(*_start_eccentricity(scene, joint))
+            touching = distance >= p[:, base + at.CLEARANCE]
+            state[:, 2 * at.MAX_COORDINATES + k] = touching
+            state[:, 2 * at.MAX_COORDINATES + 2 + k] = touching / law.minimum_impact_speed
