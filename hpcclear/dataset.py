@@ -28,6 +28,7 @@ _REFERENCE = (
     "Size Based on Sensitivity Analysis"
 )
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
+_LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 
 # -----------------------------------------------------------------------------------------------
@@ -50,8 +51,8 @@ def dataset(
     coords : mapping of str to array, shape (size of the dimension,)
         The coordinates of the kind, all of them.
     data : mapping of str to array
-        Variables of the kind, and design variables under their names or scene paths. Shapes as
-        in the table.
+        Variables of the kind, and design variables under their names or scene paths; for Kriging
+        models also their limits, NAME_lower and NAME_upper. Shapes as in the table.
     attributes : mapping, optional
         Further global attributes, text or numbers; see `provenance`.
     units : mapping of str to str, optional
@@ -82,8 +83,10 @@ def dataset(
         if name in table.data:
             variables[name] = _variable(name, table.data[name], values, sizes)
         else:
-            given = (units or {}).get(name)
-            variables[variable_name(name, kind)] = _design(name, values, given, table, sizes)
+            row, marks = _design_row(name, data, units or {}, table)
+            variable = _variable(name, row, values, sizes)
+            variable.attrs.update(marks)
+            variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 
@@ -107,18 +110,18 @@ def _variable(name: str, row: Variable, values: ArrayLike, sizes: Mapping[str, i
     return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
 
 
-def _design(
-    name: str, values: ArrayLike, given: str | None, table: Kind, sizes: Mapping[str, int]
-) -> xr.Variable:
-    known = DESIGN_VARIABLES.get(name)
-    units = given if given is not None else known[0] if known is not None else None
-    if units is None or table.design_dims is None:
+def _design_row(
+    name: str, data: Mapping[str, ArrayLike], units: Mapping[str, str], table: Kind
+) -> tuple[Variable, dict[str, str]]:
+    """Row and further attributes of a design variable, or of a limit of one."""
+    dims, base, words, role = table.design_dims, name, "", _ROLE
+    if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
+        dims, base, words, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", _LIMIT
+    unit, long_name = DESIGN_VARIABLES.get(base, (None, f"design variable {base}"))
+    unit = units.get(base, unit)
+    if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    long_name = known[1] if known is not None else f"design variable {name}"
-    row = Variable(table.design_dims, units, long_name, "f8")
-    variable = _variable(name, row, values, sizes)
-    variable.attrs.update(role=_ROLE, scene_path=name)
-    return variable
+    return Variable(dims, unit, words + long_name, "f8"), {"role": role, "scene_path": base}
 
 
 def variable_name(name: str, kind: str = "samples") -> str:
@@ -335,11 +338,13 @@ def _fault(content: xr.Dataset, kind: str | None) -> str | None:
         name = str(key)
         row = table.coords.get(name) or table.data.get(name)
         if row is None:
-            if variable.attrs.get("role") != _ROLE or table.design_dims is None:
+            roles = {_ROLE: table.design_dims, _LIMIT: table.limit_dims}
+            dims = roles.get(str(variable.attrs.get("role")))
+            if dims is None:
                 return f"it holds {name}, which {found} has not"
             if not isinstance(variable.attrs.get("scene_path"), str):
                 return f"{name} does not say which scene path it is"
-            row = Variable(table.design_dims, "", "", "f8")
+            row = Variable(dims, "", "", "f8")
         if variable.dims != row.dims:
             return f"{name} has dimensions {variable.dims}, not {row.dims}"
         kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}

@@ -31,6 +31,7 @@ class Kind(NamedTuple):
     data: dict[str, Variable]
     required: frozenset[str]  # data variables; coordinates always are
     design_dims: tuple[str, ...] | None  # dimensions of its design variables; None: it has none
+    limit_dims: tuple[str, ...] | None  # dimensions of their limits, NAME_lower and NAME_upper
 
 
 DESIGN_VARIABLES = {
@@ -133,21 +134,20 @@ selected          | parameter                            | flag | whether its in
 """ + _FIT.format(dims="surface interval clearance")
 
 _KRIGING = """
-model           | model                   | text  | name of the model
-point           | point                   | count | number of the training point
-other_point     | other_point             | count | number of the training point, again
-parameter       | parameter               | text  | design variable
-training_input* | model point parameter   | 1     | training point, in the unit cube
-training_output | model point             | m     | objective at the training point
-weight*         | model point             | 1     | weight of the training point in a prediction
-cholesky        | model point other_point | 1     | factor of the covariance of the points
-length_scale*   | model parameter         | 1     | correlation length, in the unit cube
-used            | model parameter         | flag  | whether the parameter is an input of the model
-signal_variance | model                   | 1     | variance of the process, in output_scale^2
-noise_variance  | model                   | 1     | variance of the noise, in output_scale^2
-output_mean     | model                   | m     | mean taken off before the fit
-output_scale    | model                   | m     | deviation divided by before the fit
-accepted        | model                   | flag  | whether the model passed on its test points
+model           | model           | text  | name of the model, one for each subinterval
+point           | point           | count | number of the training point
+parameter       | parameter       | text  | design variable
+family          | model           | text  | what the subintervals make up together
+training_output | model point     | m     | objective at the training point
+weight*         | model point     | 1     | weight of the training point in a prediction
+length_scale*   | model parameter | 1     | correlation length, in the unit cube
+used            | model parameter | flag  | whether the parameter is an input of the model
+signal_variance | model           | 1     | variance of the process, in output_scale^2
+noise_variance  | model           | 1     | variance of the noise, in output_scale^2
+output_mean     | model           | m     | mean taken off before the fit
+output_scale    | model           | m     | deviation divided by before the fit
+dropped         | model           | count | number of failed samples left out of the fit
+accepted        | model           | flag  | whether the model passed on its test points
 """ + _FIT.format(dims="model")
 
 _FRONT = """
@@ -201,7 +201,12 @@ _DTYPES = {"count": ("1", "i8"), "flag": ("", "i1"), "text": ("", "text")}
 
 
 def _kind(
-    title: str, table: str, design_dims: tuple[str, ...] | None = None, *, whole: bool = False
+    title: str,
+    table: str,
+    design_dims: tuple[str, ...] | None = None,
+    *,
+    limit_dims: tuple[str, ...] | None = None,
+    whole: bool = False,
 ) -> Kind:
     coords: dict[str, Variable] = {}
     data: dict[str, Variable] = {}
@@ -214,7 +219,8 @@ def _kind(
         (coords if row.dims == (name,) else data)[name] = row
         if starred != name:
             required.add(name)
-    return Kind(title, coords, data, frozenset(data if whole else required), design_dims)
+    needed = frozenset(data if whole else required)
+    return Kind(title, coords, data, needed, design_dims, limit_dims)
 
 
 KINDS = {
@@ -223,7 +229,9 @@ KINDS = {
         "Samples of a mechanism with clearance joints", _SAMPLES, ("sample",), whole=True
     ),
     "sensitivity": _kind("Sensitivity of the objective against clearance", _SENSITIVITY),
-    "kriging": _kind("Kriging models of the objective", _KRIGING, ("model",)),
+    "kriging": _kind(
+        "Kriging models of the objective", _KRIGING, ("model", "point"), limit_dims=("model",)
+    ),
     "front": _kind("Fronts of mean and deviation", _FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", _VERIFICATION, ("design",)),
     "claims": _kind("What the paper claims, tested on our data", _CLAIMS),

@@ -69,6 +69,8 @@ def example(kind: str) -> xr.Dataset:
     data = {name: fill(row) for name, row in table.data.items()}
     if table.design_dims is not None:
         data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
+    if table.limit_dims is not None:
+        data["m2_lower"] = np.zeros(tuple(sizes[dim] for dim in table.limit_dims))
     return dataset.dataset(kind, coords, data, dataset.provenance(SCENE, HASH))
 
 
@@ -204,6 +206,15 @@ def test_samples_that_occur_twice_or_are_not_finite_are_refused():
         dataset.samples_dataset(
             ["a.b", "a_b"], np.ones((4, 2)), {"a.b": "m", "a_b": "m"}, outcomes(4)
         )
+
+
+def test_limits_of_design_variables_stand_beside_them():
+    found = example("kriging")
+    assert found["m2"].dims == ("model", "point")
+    assert found["m2_lower"].dims == ("model",)
+    assert found["m2_lower"].attrs["units"] == "kg"
+    assert found["m2_lower"].attrs["long_name"] == "lower limit of the mass of the rod"
+    assert list(dataset.designs(found)) == ["m2"]
 
 
 def test_timing_and_response_builders():
