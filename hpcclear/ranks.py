@@ -180,12 +180,9 @@ class Ranks:
         run = _Run(self, HandOut(len(points), earlier["sample"], self.size), points, progress)
         run.on_records, run.kept = on_records, [earlier] if keep else None
         progress.start(len(points), earlier)
-        try:
-            with self._timed(name) as spent:
-                if not run.book.done:
-                    run.work(name, kind, payload, spent)
-        finally:
-            progress.close()
+        with contextlib.closing(progress), self._timed(name) as spent:
+            if not run.book.done:
+                run.work(name, kind, payload, spent)
         records = np.concatenate(run.kept or [earlier[:0]])
         return records[np.argsort(records["sample"])]
 

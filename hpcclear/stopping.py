@@ -42,12 +42,15 @@ class StopSwitch:
 
     Parameters
     ----------
-    time_limit : float, optional
-        Seconds from now after which to stop.
+    ends_process : bool, optional
+        Nothing but the end of the process follows: signals are ignored afterwards, since all is
+        said and done, rather than left to kill it. By default, the old handlers come back.
     """
 
-    def __init__(self, time_limit: float | None = None) -> None:
-        self._limit = None if time_limit is None else time.monotonic() + time_limit
+    def __init__(self, ends_process: bool = False) -> None:
+        self._began = time.monotonic()
+        self._ends_process = ends_process
+        self._limit: float | None = None
         self._reason: str | None = None
         self._leave_at: float | None = None
         self._code: int = Exit.STOPPED
@@ -67,6 +70,11 @@ class StopSwitch:
     def is_set(self) -> bool:
         """Whether to stop."""
         return self.reason != ""
+
+    def limit_time(self, seconds: float) -> None:
+        """Stop that many seconds after this switch was made."""
+        self._limit = self._began + seconds
+        self._rouse()
 
     def request(self, reason: str) -> None:
         """Ask to stop; the first reason counts."""
@@ -99,8 +107,12 @@ class StopSwitch:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        for number, handler in self._previous.items():
-            signal.signal(number, handler)  # type: ignore[arg-type]
+        if self._ends_process:
+            for number in STOP_SIGNALS:
+                signal.signal(number, signal.SIG_IGN)
+            return  # the thread stays: who was told to leave leaves in time
+        for former, handler in self._previous.items():
+            signal.signal(former, handler)  # type: ignore[arg-type]
         signal.set_wakeup_fd(self._previous_fd)
         self._closing = True
         self._rouse()
@@ -133,10 +145,10 @@ class StopSwitch:
             return
         now = time.monotonic()
         if number == signal.SIGINT:
-            # one Ctrl-C may arrive twice, from the terminal and from mpiexec
-            if self._interrupted_at is not None and now - self._interrupted_at > 0.5:
+            if self._interrupted_at is None:
+                self._interrupted_at = now
+            elif now - self._interrupted_at > 0.5:  # one Ctrl-C may come twice: terminal, mpiexec
                 self._end(Exit.STOPPED)
-            self._interrupted_at = self._interrupted_at or now
         self.request(f"{signal.Signals(number).name} was received")
 
     def _end(self, code: int) -> None:

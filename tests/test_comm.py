@@ -8,6 +8,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 from hpcclear import comm, launcher
 from hpcclear.ranks import COLUMNS
 from hpcclear.status import OUTCOME
+from hpcclear.stopping import STOP_SIGNALS, StopSwitch
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -237,6 +239,27 @@ def test_a_second_interrupt_ends_a_deaf_process_at_once(tmp_path):
     os.kill(job.pid, signal.SIGINT)
     assert finish(job)[0] == 3
     assert time.monotonic() - told < 1.5
+
+
+def test_a_switch_leaves_a_process_that_goes_on_as_it_was():
+    before = [signal.getsignal(number) for number in STOP_SIGNALS]
+    with StopSwitch() as stop:
+        assert not stop.is_set()
+        os.kill(os.getpid(), signal.SIGUSR1)
+        deadline = time.monotonic() + 10.0
+        while not stop.is_set() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert stop.reason == "SIGUSR1 was received"
+    assert [signal.getsignal(number) for number in STOP_SIGNALS] == before
+    assert "stop-switch" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_switch_knows_its_time_limit():
+    stop = StopSwitch()
+    stop.limit_time(1000.0)
+    assert not stop.is_set()
+    stop.limit_time(0.0)
+    assert stop.reason == "the time limit was reached"
 
 
 def test_copies_that_do_not_see_each_other_are_refused(tmp_path):

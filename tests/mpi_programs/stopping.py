@@ -1,68 +1,20 @@
-"""A run that is told to stop: stopping.py WHERE FOLDER [TIME_LIMIT].
+"""A run that is told to stop: stopping.py WHERE FOLDER [TIME_LIMIT]; see long_run.py."""
 
-FOLDER/ready is touched when WHERE is reached; FOLDER/records holds what was finished, and a second
-run goes on from there; FOLDER/result.npy is written at the end.
-"""
-
-import pathlib
 import sys
-import time
 
-import numpy as np
-from synthetic import SleepingWorker, design, make_sleeping
-
-from hpcclear.comm import run_on_ranks
-from hpcclear.ranks import Ranks
-from hpcclear.status import OUTCOME
 from hpcclear.stopping import StopSwitch
 
-WHERE, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
-LIMIT = float(sys.argv[3]) if len(sys.argv) > 3 else None
 
+def main() -> int:
+    with StopSwitch(ends_process=True) as stop:  # before the slow imports
+        from long_run import MAKERS, program
 
-def reached(where: str) -> None:
-    if where == WHERE:
-        (FOLDER / "ready").touch()
+        from hpcclear.comm import run_on_ranks
 
-
-def save(records: np.ndarray) -> None:
-    with open(FOLDER / "records", "ab") as file:
-        file.write(records.tobytes())
-    reached("sampling")
-
-
-def make_slowly(payload: dict, ranks: Ranks) -> SleepingWorker:
-    if not ranks.is_root:
-        reached("set-up of a rank")
-        time.sleep(60.0)
-    return make_sleeping(payload, ranks)
-
-
-def program(ranks: Ranks) -> None:
-    reached("begin")
-    if WHERE == "begin":
-        time.sleep(0.3)
-    if WHERE == "set-up of a rank":
-        ranks.run_points("slow", {"cost": 1e-3}, design(10**6))
-    if WHERE == "polling":
-        with ranks.stage("fit"):
-            while True:
-                reached("polling")
-                time.sleep(0.05)
-                ranks.raise_if_stopped()
-    if WHERE == "deaf":
-        reached("deaf")
-        time.sleep(60.0)
-    path = FOLDER / "records"
-    completed = np.frombuffer(path.read_bytes() if path.exists() else b"", OUTCOME)
-    payload = {"cost": 4e-3, "lanes": 2}
-    result = ranks.run_points(
-        "sleep", payload, design(800), completed=completed, on_records=save, stage="sampling"
-    )
-    np.save(FOLDER / "result.npy", result)
+        if len(sys.argv) > 3:
+            stop.limit_time(float(sys.argv[3]))
+        return run_on_ranks(program, MAKERS, stop)
 
 
 if __name__ == "__main__":
-    with StopSwitch(LIMIT) as stop:
-        code = run_on_ranks(program, {"sleep": make_sleeping, "slow": make_slowly}, stop)
-    sys.exit(code)
+    sys.exit(main())
