@@ -96,7 +96,9 @@ friction_force      | time joint | N     | tangential contact force
 crank_moment        | time       | N m   | reaction moment on the crank
 kinetic_energy      | time       | J     | kinetic energy
 elastic_energy      | time       | J     | energy stored in the contacts
+potential_energy    | time       | J     | potential energy against y = 0
 driving_work        | time       | J     | work done by the drive since the start
+load_work           | time       | J     | work done by the slider load since the start
 dissipated_energy   | time       | J     | energy dissipated since the start
 energy_residual     | time       | J     | what the energy balance leaves unexplained
 """ + _OUTCOME.replace("| sample joint |", "| joint |").replace("| sample ", "| ")

@@ -178,6 +178,13 @@ class Lanes:
         """Whether the record must be emptied before the stepper can go on."""
         return self.record is not None and self.counters[RECORDED] >= len(self.record)
 
+    def take_record(self) -> Array:
+        """The recorded rows since the last call (a copy); the record is empty afterwards."""
+        assert self.record is not None
+        rows = self.record[: int(self.counters[RECORDED])].copy()
+        self.counters[RECORDED] = 0
+        return rows
+
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running."""
         p = self.problem

@@ -2,6 +2,7 @@
 
 from ..jit import lane_function
 from . import layout as at
+from .lifecycle import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
 (TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
@@ -18,7 +19,7 @@ def record_step(record, counters, work, stages, book, n, W):
     """Append the new state of lane 0 to `record`; True when it is full and the stepper must return."""
     if record is not None:
         if work[at.ACCEPT * W] * work[at.RUNNING * W] == 1.0:
-            row = counters[3]
+            row = counters[RECORDED]
             record[row, TIME] = book[at.ELAPSED * W] + work[at.TIME * W]
             record[row, TURN_TIME] = work[at.TIME * W]
             record[row, REVOLUTION] = book[at.REVOLUTION * W]
@@ -33,7 +34,7 @@ def record_step(record, counters, work, stages, book, n, W):
                 record[row, STATE + k] = work[(at.Q + k) * W]
                 record[row, STATE + n + k] = work[(at.V + k) * W]
                 record[row, STATE + 2 * n + k] = stages[k * W]
-            counters[3] = row + 1
-        return counters[3] >= record.shape[0]
+            counters[RECORDED] = row + 1
+        return counters[RECORDED] >= record.shape[0]
     else:
         return False
