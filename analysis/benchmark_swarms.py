@@ -1,11 +1,12 @@
 """The swarm beside those of pymoo and Platypus: same problems, evaluations, seeds and cut.
 
-    python analysis/benchmark_swarms.py              # 25 000 evaluations, seeds 1-5, about 10 min
+    python analysis/benchmark_swarms.py              # 25 000 evaluations, seeds 1-5, about 15 min on a busy core
     python analysis/benchmark_swarms.py --quick      # 5 000 evaluations, seeds 1-2, about 1 min
 
 ZDT1 to 3 (30 variables) and DTLZ2 (12 variables, 3 objectives), populations of 100, the front of
 every method cut to 100 points by `hpcclear.pareto.cut`, hypervolume for the reference point 1.1 in
-each objective. The peers run with their own defaults. Writes benchmark_swarms.nc and .png.
+each objective. The peers run with their own defaults (OMOPSO has none
+for its epsilons: 0.005). Writes benchmark_swarms.nc and .png.
 Peers: pip install pymoo platypus-opt (one that is missing is reported and left out).
 """
 
@@ -275,7 +276,7 @@ def main() -> None:
     result.to_netcdf(partial, engine="h5netcdf")
     partial.replace(written)
     figure(result, options.output / "benchmark_swarms.png")
-    print(f"{budget} evaluations, seeds {seeds[0]}-{seeds[-1]}; {result.attrs['versions']}")
+    print(f"{budget} evaluations, seeds {seeds[0]}-{seeds[-1]}\n{result.attrs['versions']}")
     print(table(result, full=not options.quick))
     print(f"written: {written}, {written.with_suffix('.png')}")
 
