@@ -1,6 +1,6 @@
 """The swarm beside those of pymoo and Platypus: same problems, evaluations, seeds and cut.
 
-    python analysis/benchmark_swarms.py              # 25 000 evaluations, seeds 1-5, about 15 min on a busy core
+    python analysis/benchmark_swarms.py              # 25 000 evaluations, seeds 1-5, about 15 min
     python analysis/benchmark_swarms.py --quick      # 5 000 evaluations, seeds 1-2, about 1 min
 
 ZDT1 to 3 (30 variables) and DTLZ2 (12 variables, 3 objectives), populations of 100, the front of
