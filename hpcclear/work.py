@@ -1,0 +1,106 @@
+"""A design of any scene through the dynamics, on all ranks: what `sample` and `run` share."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .checkpoint import Checkpoint
+from .evaluate import DEFAULT_LANES, Evaluator
+from .progress import Progress
+from .ranks import Maker, Ranks
+from .scene import Scene, load_scene
+from .scene.points import Points
+
+KIND = "points"
+"""The kind of stage that simulates designs; see `MAKERS`."""
+
+
+def payload_of(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> dict[str, Any]:
+    """What a rank needs to know before it gets points: plain content, small, the same everywhere.
+
+    The study is left out: ranks simulate, whatever for.
+    """
+    content = scene.resolved()
+    content.pop("study", None)
+    return {"scene": content, "names": points.names, "paths": points.paths, "lanes": lanes}
+
+
+def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Evaluator:
+    """A rank's worker; the kernel is compiled by one rank of each node and loaded by the others."""
+    nothing = np.empty((0, len(payload["names"])))
+    columns = Points(payload["names"], nothing, payload["paths"])
+    evaluator = Evaluator(load_scene(payload["scene"]), columns, payload["lanes"])
+    ranks.first_on_node(lambda: evaluator.advance(0.0))  # without samples it only compiles
+    return evaluator
+
+
+MAKERS: Mapping[str, Maker] = {KIND: make_evaluator}
+"""For `hpcclear.comm.run_on_ranks` and `hpcclear.comm.alone`."""
+
+
+def sample_points(
+    scene: Scene,
+    points: Points,
+    ranks: Ranks,
+    checkpoint: Checkpoint | None = None,
+    progress: Progress | None = None,
+    *,
+    stage: str = "samples",
+    first: int = 0,
+) -> np.ndarray:
+    """Simulate a design on all ranks; call it on root.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : Points
+        Designs, SI.
+    ranks : Ranks
+        Made with `MAKERS`.
+    checkpoint : Checkpoint, optional
+        Knows the samples finished earlier, and gets each new one; its names are those of `points`.
+        Everything finished is on disk when this returns or raises.
+    progress : Progress, optional
+    stage : str
+        Name for reports and timing.
+    first : int
+        Number of the first point in the checkpoint, for designs that come one after the other.
+
+    Returns
+    -------
+    structured ndarray of `hpcclear.status.OUTCOME`, shape (n,)
+        In the points' order; samples numbered from 0.
+
+    Raises
+    ------
+    Stopped, RankFailed, InputError
+        As `Ranks.run_points`.
+    """
+    completed = None
+    if checkpoint is not None:
+        completed = checkpoint.completed()
+        inside = (completed["sample"] >= first) & (completed["sample"] < first + len(points))
+        completed = completed[inside]
+        completed["sample"] -= first
+
+    def keep(records: np.ndarray) -> None:
+        if checkpoint is not None:
+            numbered = records.copy()
+            numbered["sample"] += first
+            checkpoint.add(numbered, points.values[records["sample"]])
+
+    try:
+        return ranks.run_points(
+            KIND,
+            payload_of(scene, points),
+            points.values,
+            stage=stage,
+            completed=completed,
+            on_records=keep,
+            progress=progress,
+        )
+    finally:
+        if checkpoint is not None:
+            with ranks.writing():
+                checkpoint.flush()
