@@ -1,3 +1,40 @@
-"""Robust design of mechanisms with clearance joints, as an MPI-parallel batch study."""
+"""Robust design of mechanisms with clearance joints, as an MPI-parallel batch study.
+
+Public names are loaded when they are first used, so that importing the package costs nothing:
+
+- `load_scene`, `Scene`: a scene file, validated
+- `simulate`: one response as an xarray Dataset
+- `evaluate`: many designs as an xarray Dataset, in this process
+- `run_study`: the whole study
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import evaluate
+    from .response import simulate
+    from .scene import Scene, load_scene
+    from .study import run_study
 
 __version__ = "0.1.0"
+
+__all__ = ["Scene", "evaluate", "load_scene", "run_study", "simulate"]
+
+_HOME = {
+    "Scene": "scene",
+    "load_scene": "scene",
+    "simulate": "response",
+    "evaluate": "api",
+    "run_study": "study",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,0 +1,137 @@
+"""The `sample` command: points -> ranks -> one dataset, checkpointed on the way."""
+
+import hashlib
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from . import __version__, dataset, storage
+from .checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from .errors import InputError
+from .lock import Lock
+from .progress import Progress, Style
+from .ranks import COLUMNS, Ranks
+from .sampling import latin_hypercube, monte_carlo, read_points
+from .scene import Scene
+from .scene.paths import flatten
+from .scene.points import Points
+from .work import sample_points
+
+
+def design(scene: Scene, table: Path | None) -> Points:
+    """The points to simulate: a user's table, or the study's sampling.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or a point makes no mechanism.
+    """
+    if table is not None:
+        return read_points(table, scene)
+    if scene.study is None:
+        raise InputError(
+            "study", None, "the scene says nothing about sampling", "Add a [study] table, or give --points designs.csv"
+        )
+    return latin_hypercube(scene) if scene.study.method == "lhs" else monte_carlo(scene)
+
+
+def run_key(scene: Scene, points: Points) -> dict[str, str]:
+    """What makes a run what it is: every scene entry, the version, and the points themselves."""
+    digest = hashlib.sha256(points.values.tobytes() + repr((points.names, points.paths)).encode())
+    entries = {name: repr(value) for name, value in flatten(scene.resolved())}
+    return {**entries, "hpcclear version": __version__, "points": digest.hexdigest()[:16]}
+
+
+def finished(path: Path, key: dict[str, str]) -> xr.Dataset | None:
+    """The result of the same command from an earlier run, if it is there; another run's is refused."""
+    if not path.exists():
+        return None
+    content = dataset.read(path, "samples")
+    check_key(content, key, path)
+    return content
+
+
+def run_sample(
+    scene: Scene,
+    output: Path,
+    ranks: Ranks,
+    *,
+    table: Path | None = None,
+    fresh: bool = False,
+    style: Style = "auto",
+) -> int:
+    """Simulate a design on all ranks and write it; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+    output : Path
+        NetCDF file; timing.nc goes beside it, finished samples into a hidden directory until it is written.
+    ranks : Ranks
+    table : Path, optional
+        CSV of designs.
+    fresh : bool
+        Start anew beside an earlier result.
+    style : str
+        How progress is shown.
+
+    Returns
+    -------
+    int
+        Exit code 0.
+
+    Raises
+    ------
+    InputError, StorageError, Stopped, RankFailed
+    """
+    from .describe import describe_samples
+
+    start = time.perf_counter()
+    storage.probe(output)
+    if fresh:
+        output = fresh_sibling(output)
+    points = design(scene, table)
+    key = run_key(scene, points)
+    with Lock(output.parent, f".{output.name}.lock"):
+        samples = finished(output, key)
+        if samples is None:
+            samples = _simulate(scene, points, output, key, ranks, style)
+    timing = output.parent / "timing.nc"
+    dataset.write(timing_of(ranks), timing)
+    describe_samples(samples, ranks, time.perf_counter() - start, {"samples": output, "timing": timing})
+    return 0
+
+
+def _simulate(
+    scene: Scene, points: Points, output: Path, key: dict[str, str], ranks: Ranks, style: Style
+) -> xr.Dataset:
+    """Simulate what is not finished yet, write the dataset, drop the checkpoint."""
+    units = dict(zip(points.names, points.units, strict=True))
+    attributes: dict[str, Any] = dataset.provenance(scene.text or scene.to_toml(), scene.hash)
+    checkpoint = Checkpoint(
+        output.parent / f".{output.name}.parts", key, names=points.names, units=units, attributes=attributes
+    )
+    for problem in checkpoint.problems:
+        sys.stderr.write(f"{problem}\n")
+    records = sample_points(scene, points, ranks, checkpoint, Progress("samples", style))
+    samples = dataset.samples_dataset(
+        points.names, points.values, units, records, {**attributes, **key_attribute(key)}
+    )
+    with ranks.writing():
+        dataset.write(samples, output)
+        checkpoint.finish()
+    return samples
+
+
+def timing_of(ranks: Ranks) -> xr.Dataset:
+    """Where the time of this job went, by rank and stage."""
+    stages = list(ranks.stage_seconds) or ["none"]
+    empty = np.zeros((ranks.size, len(COLUMNS)))
+    seconds = np.stack([ranks.stage_seconds.get(stage, empty) for stage in stages], axis=1)
+    data = {name: seconds[:, :, k] for k, name in enumerate(COLUMNS)}
+    return dataset.timing_dataset(stages, data, shlex.join(sys.argv))

@@ -1,0 +1,218 @@
+"""The commands. Each parses its words, calls one function of the package, and prints what a person wants to know.
+
+Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goes on from there).
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from . import __version__
+from .errors import InputError, StorageError
+from .launcher import launched_rank, pin_threads
+from .stopping import Exit, StopSwitch
+
+if TYPE_CHECKING:
+    from .ranks import Ranks
+    from .scene import Scene
+
+_FILE = click.argument("file", type=click.Path(path_type=Path))
+_SET = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY.PATH=VALUE", help="Override an entry of the file; repeatable."
+)
+_FRESH = click.option("--fresh", is_flag=True, help="Start anew beside earlier results, never over them.")
+_LIMIT = click.option(
+    "--time-limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS", help="Stop early, resumable, after this time."
+)
+_PROGRESS = click.option(
+    "--progress",
+    type=click.Choice(["auto", "bar", "log", "quiet"]),
+    default="auto",
+    show_default=True,
+    help="How progress is shown.",
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="hpcclear")
+def cli() -> None:
+    """Robust design of mechanisms with clearance joints.
+
+    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy and plan under mpiexec
+    to use more than one core:
+
+        mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
+    """
+
+
+def _scene(file: Path, overrides: tuple[str, ...]) -> "Scene":
+    from .scene import load_scene
+
+    return load_scene(file, overrides)
+
+
+def _is_root() -> bool:
+    return launched_rank() in (0, None)
+
+
+def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
+    """Run a command that uses every rank."""
+    from .comm import run_on_ranks
+    from .work import MAKERS
+
+    stop: StopSwitch = click.get_current_context().obj
+    if time_limit is not None:
+        stop.limit_time(time_limit)
+    return run_on_ranks(program, MAKERS, stop)
+
+
+@cli.command()
+@_FILE
+@_SET
+@click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
+def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
+    """Validate a scene or study and say what would be simulated.
+
+    Example: hpcclear check jobs/slider_crank.toml --set effects.gravity=9.81
+    """
+    if not _is_root():
+        return Exit.DONE
+    from .describe import describe_scene
+
+    describe_scene(_scene(file, overrides), cost)
+    return Exit.DONE
+
+
+@cli.command()
+@_FILE
+@_SET
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write.")
+def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
+    """Simulate one response: time series, forces, energies, objective.
+
+    Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
+    """
+    if not _is_root():
+        return Exit.DONE
+    from . import dataset, storage
+    from .describe import describe_response
+    from .response import simulate as simulate_scene
+
+    scene = _scene(file, overrides)
+    storage.probe(output)
+    response = simulate_scene(scene)
+    dataset.write(response, output)
+    describe_response(response, output)
+    return Exit.DONE
+
+
+@cli.command()
+@_FILE
+@_SET
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write.")
+@click.option("--points", type=click.Path(path_type=Path), help="CSV table of designs instead of the study's sampling.")
+@_FRESH
+@_LIMIT
+@_PROGRESS
+def sample(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    points: Path | None,
+    fresh: bool,
+    time_limit: float | None,
+    progress: Any,
+) -> int:
+    """Send the study's points, or a table of yours, through the dynamics.
+
+    Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from .batch import run_sample
+
+        return run_sample(_scene(file, overrides), output, ranks, table=points, fresh=fresh, style=progress)
+
+    return _on_ranks(program, time_limit)
+
+
+@cli.command()
+@_FILE
+@_SET
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Directory for the results.")
+@_FRESH
+@_LIMIT
+@_PROGRESS
+def run(
+    file: Path, overrides: tuple[str, ...], output: Path, fresh: bool, time_limit: float | None, progress: Any
+) -> int:
+    """Carry a whole study: sensitivity, surrogates, robust optimisation, verified designs.
+
+    Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from .study import run_study
+
+        return run_study(_scene(file, overrides), output, ranks, fresh=fresh, progress_style=progress)
+
+    return _on_ranks(program, time_limit)
+
+
+@cli.command()
+@click.argument("directory", type=click.Path(path_type=Path))
+def report(directory: Path) -> int:
+    """Write figures and a self-contained HTML page about a directory of results.
+
+    Example: hpcclear report results/quickstart
+    """
+    if not _is_root():
+        return Exit.DONE
+    from .report.page import write_report
+
+    click.echo(f"report  {write_report(directory)}")
+    return Exit.DONE
+
+
+@cli.command()
+def schema() -> int:
+    """Print the JSON schema of scene files, for editors."""
+    import json
+
+    from .scene import scene_schema
+
+    click.echo(json.dumps(scene_schema(), indent=2))
+    return Exit.DONE
+
+
+def _say(text: str) -> None:
+    """An error message, from root only."""
+    if _is_root():
+        click.echo(text, err=True)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
+    pin_threads()  # before numpy is imported: ranks fill the cores, not threads
+    with StopSwitch(ends_process=True) as stop:
+        try:
+            code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
+        except click.ClickException as error:
+            if _is_root():
+                error.show()
+            code = Exit.BAD_INPUT
+        except (click.Abort, KeyboardInterrupt):
+            code = Exit.STOPPED
+        except InputError as error:
+            _say(f"Error: {error}")
+            code = Exit.BAD_INPUT
+        except StorageError as error:
+            _say(f"Error: {error}")
+            code = Exit.FAILED
+        except BrokenPipeError:  # the reader of a pipe has seen enough
+            sys.stderr.close()
+            code = Exit.DONE
+    sys.exit(int(code or 0))
