@@ -26,8 +26,12 @@ def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
     if isinstance(points, Points):
         return points
     if not points:
-        raise InputError("points", {}, "there is nothing to vary", "Give at least one name and its values")
-    columns = {str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()}
+        raise InputError(
+            "points", {}, "there is nothing to vary", "Give at least one name and its values"
+        )
+    columns = {
+        str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
+    }
     values = np.column_stack(np.broadcast_arrays(*columns.values()))
     paths = tuple(_paths(scene, name) for name in columns)
     made = Points(tuple(columns), values, paths)

@@ -35,7 +35,10 @@ def design(scene: Scene, table: Path | None) -> Points:
         return read_points(table, scene)
     if scene.study is None:
         raise InputError(
-            "study", None, "the scene says nothing about sampling", "Add a [study] table, or give --points designs.csv"
+            "study",
+            None,
+            "the scene says nothing about sampling",
+            "Add a [study] table, or give --points designs.csv",
         )
     return latin_hypercube(scene) if scene.study.method == "lhs" else monte_carlo(scene)
 
@@ -103,7 +106,9 @@ def run_sample(
             samples = _simulate(scene, points, output, key, ranks, style)
     timing = output.parent / "timing.nc"
     dataset.write(timing_of(ranks), timing)
-    describe_samples(samples, ranks, time.perf_counter() - start, {"samples": output, "timing": timing})
+    describe_samples(
+        samples, ranks, time.perf_counter() - start, {"samples": output, "timing": timing}
+    )
     return 0
 
 
@@ -114,7 +119,11 @@ def _simulate(
     units = dict(zip(points.names, points.units, strict=True))
     attributes: dict[str, Any] = dataset.provenance(scene.text or scene.to_toml(), scene.hash)
     checkpoint = Checkpoint(
-        output.parent / f".{output.name}.parts", key, names=points.names, units=units, attributes=attributes
+        output.parent / f".{output.name}.parts",
+        key,
+        names=points.names,
+        units=units,
+        attributes=attributes,
     )
     for problem in checkpoint.problems:
         sys.stderr.write(f"{problem}\n")

@@ -21,11 +21,20 @@ if TYPE_CHECKING:
 
 _FILE = click.argument("file", type=click.Path(path_type=Path))
 _SET = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY.PATH=VALUE", help="Override an entry of the file; repeatable."
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY.PATH=VALUE",
+    help="Override an entry of the file; repeatable.",
 )
-_FRESH = click.option("--fresh", is_flag=True, help="Start anew beside earlier results, never over them.")
+_FRESH = click.option(
+    "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
+)
 _LIMIT = click.option(
-    "--time-limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS", help="Stop early, resumable, after this time."
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="Stop early, resumable, after this time.",
 )
 _PROGRESS = click.option(
     "--progress",
@@ -89,7 +98,9 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
 @cli.command()
 @_FILE
 @_SET
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
+)
 def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
@@ -112,8 +123,14 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 @cli.command()
 @_FILE
 @_SET
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write.")
-@click.option("--points", type=click.Path(path_type=Path), help="CSV table of designs instead of the study's sampling.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
+)
+@click.option(
+    "--points",
+    type=click.Path(path_type=Path),
+    help="CSV table of designs instead of the study's sampling.",
+)
 @_FRESH
 @_LIMIT
 @_PROGRESS
@@ -134,7 +151,9 @@ def sample(
     def program(ranks: "Ranks") -> int | None:
         from .batch import run_sample
 
-        return run_sample(_scene(file, overrides), output, ranks, table=points, fresh=fresh, style=progress)
+        return run_sample(
+            _scene(file, overrides), output, ranks, table=points, fresh=fresh, style=progress
+        )
 
     return _on_ranks(program, time_limit)
 
@@ -142,12 +161,23 @@ def sample(
 @cli.command()
 @_FILE
 @_SET
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="Directory for the results.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Directory for the results.",
+)
 @_FRESH
 @_LIMIT
 @_PROGRESS
 def run(
-    file: Path, overrides: tuple[str, ...], output: Path, fresh: bool, time_limit: float | None, progress: Any
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    fresh: bool,
+    time_limit: float | None,
+    progress: Any,
 ) -> int:
     """Carry a whole study: sensitivity, surrogates, robust optimisation, verified designs.
 
@@ -157,7 +187,9 @@ def run(
     def program(ranks: "Ranks") -> int | None:
         from .study import run_study
 
-        return run_study(_scene(file, overrides), output, ranks, fresh=fresh, progress_style=progress)
+        return run_study(
+            _scene(file, overrides), output, ranks, fresh=fresh, progress_style=progress
+        )
 
     return _on_ranks(program, time_limit)
 

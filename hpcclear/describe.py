@@ -25,7 +25,9 @@ def console() -> Console:
 
 def table(title: str, rows: list[tuple[str, str]]) -> Table:
     """Two columns: what, and its value."""
-    made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
+    made = Table(
+        title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=False, pad_edge=False
+    )
     made.add_column(no_wrap=True)
     made.add_column(overflow="fold")
     for row in rows:
@@ -50,7 +52,10 @@ def describe_scene(scene: Scene, cost: bool) -> None:
     rows += [
         ("states", f"{states} (positions and velocities) + {open_joints} integrals of the gaps"),
         ("method", f"{problem.tableau.name}, rtol {scene.numerics.rtol:g}"),
-        ("revolutions", f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged"),
+        (
+            "revolutions",
+            f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
+        ),
         ("scene hash", scene.hash[:16]),
         ("MPI", _mpi()),
     ]
@@ -73,14 +78,20 @@ def _mpi() -> str:
         return "none found: one process"
     cores = _cores()
     copies = launched_size()[1]
-    crowded = f"; {copies} ranks on {cores} cores: more ranks than cores are slower" if copies > cores else ""
+    crowded = (
+        f"; {copies} ranks on {cores} cores: more ranks than cores are slower"
+        if copies > cores
+        else ""
+    )
     return f"{library}; {cores} cores here{crowded}"
 
 
 def _cores() -> int:
     import os
 
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    return (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    )
 
 
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -92,7 +103,9 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
             unit = scene.unit(variable.paths[0])
             rows.append((variable.name, f"{variable.range[0]:g} to {variable.range[1]:g} {unit}"))
         elif variable.ratio is not None:
-            rows.append((variable.name, f"{variable.ratio[0]:g} to {variable.ratio[1]:g} times m L^2/12"))
+            rows.append(
+                (variable.name, f"{variable.ratio[0]:g} to {variable.ratio[1]:g} times m L^2/12")
+            )
     return rows
 
 
@@ -167,18 +180,38 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
         if count and code is not Status.OK:
             rows.append((f"  {code.name.lower()}", f"{count}: {code.message}; {code.remedy}"))
     if len(good):
-        rows.append(("f", f"{good.min() * 1e3:.4g} to {good.max() * 1e3:.4g} mm, median {np.median(good) * 1e3:.4g} mm"))
+        rows.append(
+            (
+                "f",
+                f"{good.min() * 1e3:.4g} to {good.max() * 1e3:.4g} mm, median {np.median(good) * 1e3:.4g} mm",
+            )
+        )
         spread = samples["objective_spread"].to_numpy()[status == Status.OK] / good
-        rows.append(("spread of f between revolutions", f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f"))
+        rows.append(
+            (
+                "spread of f between revolutions",
+                f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f",
+            )
+        )
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
     rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
     busy = sum(t[:, 0] for t in ranks.stage_seconds.values())
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
-        rows.append(("throughput", f"{len(f) / busy.sum():.0f} samples a second and core, {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation"))
+        rows.append(
+            (
+                "throughput",
+                f"{len(f) / busy.sum():.0f} samples a second and core, {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
+            )
+        )
     rows.append(("wall time", f"{wall:.1f} s"))
     for rank, row in enumerate(sum(ranks.stage_seconds.values())):
-        rows.append((f"rank {rank}", "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s".format(*row)))
+        rows.append(
+            (
+                f"rank {rank}",
+                "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s".format(*row),
+            )
+        )
     out.print(table("Samples", rows))
     for what, path in files.items():
         out.print(f"{what:8} {path}")

@@ -28,7 +28,9 @@ class Motion:
     eccentricity_y: Array
 
 
-def motion(open_joints: tuple[bool, bool], par: Array, phi: Array, omega: Array, q: Array, v: Array) -> Motion:
+def motion(
+    open_joints: tuple[bool, bool], par: Array, phi: Array, omega: Array, q: Array, v: Array
+) -> Motion:
     """All bodies from minimal coordinates.
 
     Parameters

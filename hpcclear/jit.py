@@ -29,7 +29,12 @@ def source_key() -> str:
     for path in sorted(root.rglob("*.py")):
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
-    for version in (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version()):
+    for version in (
+        numba.__version__,
+        llvmlite.__version__,
+        np.__version__,
+        platform.python_version(),
+    ):
         digest.update(version.encode())
     digest.update(str(root).encode())
     return digest.hexdigest()[:16]

@@ -10,7 +10,7 @@ from . import dataset, geometry
 from .evaluate import outcome_records
 from .kernel import layout as at
 from .kernel import record as rec
-from .kernel.lanes import Lanes
+from .kernel.lanes import Lanes, Problem
 from .kernel.observe import observe
 from .lowering import parameters, problem_of, start_states, topology
 from .scene import Scene
@@ -64,7 +64,7 @@ def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
     return steps, outcome_records(labels, out), par[0]
 
 
-def _first_row(problem, par: Array, state: Array, n: int) -> Array:  # type: ignore[no-untyped-def]
+def _first_row(problem: Problem, par: Array, state: Array, n: int) -> Array:
     """The start as a row of the record."""
     row = np.zeros((1, rec.columns(n)))
     velocities = state[at.MAX_COORDINATES : at.MAX_COORDINATES + n]
@@ -72,11 +72,13 @@ def _first_row(problem, par: Array, state: Array, n: int) -> Array:  # type: ign
     contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
     row[0, contacts] = state[2 * at.MAX_COORDINATES :]
     states = row[:, rec.STATE : rec.STATE + 2 * n]
-    row[0, rec.STATE + 2 * n :] = _observed(problem, par[0], states, row[:, contacts], np.zeros(1))[0, :n]
+    row[0, rec.STATE + 2 * n :] = _observed(problem, par[0], states, row[:, contacts], np.zeros(1))[
+        0, :n
+    ]
     return row
 
 
-def _observed(problem, par: Array, states: Array, contacts: Array, times: Array) -> Array:  # type: ignore[no-untyped-def]
+def _observed(problem: Problem, par: Array, states: Array, contacts: Array, times: Array) -> Array:
     """Accelerations (n) and rates (RATES) at each instant."""
     n = problem.coordinates
     out = np.zeros((len(times), n + at.RATES))
@@ -87,7 +89,9 @@ def _observed(problem, par: Array, states: Array, contacts: Array, times: Array)
     return out
 
 
-def _between(steps: Steps, times: Array, free: bool) -> tuple[Array, Array, Array, Array, Array]:
+def _between(
+    steps: Steps, times: Array, free: bool
+) -> tuple[Array, Array, Array, NDArray[np.intp], Array]:
     """States, contacts, step index and time within the step at given times.
 
     Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
@@ -110,7 +114,7 @@ def _between(steps: Steps, times: Array, free: bool) -> tuple[Array, Array, Arra
     return position, velocity, steps.contacts[k], k, s[:, 0]
 
 
-def _works_between(steps: Steps, powers: Array, k: Array, s: Array) -> Array:
+def _works_between(steps: Steps, powers: Array, k: NDArray[np.intp], s: Array) -> Array:
     """Works (t, 4) by the cubic through works and powers at both ends of the step."""
     h = (steps.time[k + 1] - steps.time[k])[:, None]
     s = s[:, None]
@@ -129,7 +133,10 @@ def instants(scene: Scene, steps: Steps) -> Array:
     borders = np.concatenate([[0.0], steps.time[ends]])
     if steps.time[-1] > borders[-1]:
         borders = np.append(borders, steps.time[-1])
-    parts = [np.linspace(a, b, count, endpoint=False) for a, b in zip(borders[:-1], borders[1:], strict=True)]
+    parts = [
+        np.linspace(a, b, count, endpoint=False)
+        for a, b in zip(borders[:-1], borders[1:], strict=True)
+    ]
     return np.append(np.concatenate(parts), borders[-1])
 
 
@@ -171,8 +178,16 @@ def simulate(scene: Scene) -> xr.Dataset:
     m = geometry.motion((first, second), par, phi, omega, q.T, v.T)
     data = _series(scene, m, par, seen, n, contacts, works)
     data["crank_angle"] = phi
-    names = ("objective", "objective_spread", "objective_uncertainty", "mean_gap", "peak_contact_force")
-    outcome = {name: record[name][0] for name in (*names, "latched", "rhs_evaluations", "status", "flags")}
+    names = (
+        "objective",
+        "objective_spread",
+        "objective_uncertainty",
+        "mean_gap",
+        "peak_contact_force",
+    )
+    outcome = {
+        name: record[name][0] for name in (*names, "latched", "rhs_evaluations", "status", "flags")
+    }
     return dataset.response_dataset(
         times, {**data, **outcome}, dataset.provenance(scene.text or scene.to_toml(), scene.hash)
     )

@@ -65,7 +65,10 @@ OUTCOME = np.dtype(
         ("sample", np.int64),  # index in the design; -1 never leaves the evaluator
         ("objective", np.float64),  # m, eq. 13
         ("objective_spread", np.float64),  # m, standard deviation between averaged revolutions
-        ("objective_uncertainty", np.float64),  # m, scatter over kicked copies; NaN unless asked for
+        (
+            "objective_uncertainty",
+            np.float64,
+        ),  # m, scatter over kicked copies; NaN unless asked for
         ("mean_gap", np.float64, 2),  # m, time mean of | |e| - c | at each joint
         ("peak_contact_force", np.float64, 2),  # N, at each joint over the averaged revolutions
         ("latched", np.int8, 2),

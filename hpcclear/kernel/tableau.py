@@ -48,7 +48,13 @@ class Tableau:
 
 
 def _pair(
-    name: str, order: int, error_order: int, rows: list[list[F]], b: list[F], other: list[F], source: str
+    name: str,
+    order: int,
+    error_order: int,
+    rows: list[list[F]],
+    b: list[F],
+    other: list[F],
+    source: str,
 ) -> Tableau:
     """Assemble a tableau from exact fractions, adding the new point as last stage where it is missing."""
     n = len(b)
@@ -59,7 +65,9 @@ def _pair(
     as_float = lambda row: [float(x) for x in row]  # noqa: E731
     a = np.array([as_float(row) for row in matrix])
     error = [x - y for x, y in zip(b, other, strict=True)]
-    return Tableau(name, order, error_order, a, np.array(as_float(b)), np.array(as_float(error)), source)
+    return Tableau(
+        name, order, error_order, a, np.array(as_float(b)), np.array(as_float(error)), source
+    )
 
 
 DORMAND_PRINCE = _pair(

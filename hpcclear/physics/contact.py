@@ -13,16 +13,25 @@ only which of the three forms applies. All quantities in SI units.
 
 import math
 from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..jit import lane_function
 
+Number = TypeVar("Number", float, NDArray[np.float64])
+"""A float, or an array of them."""
 
-def reduced_compliance(youngs_modulus: float, poisson_ratio: float) -> float:
+
+def reduced_compliance(youngs_modulus: Number, poisson_ratio: Number) -> Number:
     """Return h = (1 - nu^2)/E in 1/Pa (paper eq. 6)."""
     return (1.0 - poisson_ratio**2) / youngs_modulus
 
 
-def contact_stiffness(h_bearing, h_journal, bearing_radius, clearance):
+def contact_stiffness(
+    h_bearing: Number, h_journal: Number, bearing_radius: Number, clearance: Number
+) -> Number:
     """Return Hertz's K in N/m^1.5 of a journal in a bearing (paper eq. 4); floats or arrays in SI.
 
     Eq. 4 as printed lacks R_J and is not dimensionally consistent; this is the form of the cited
@@ -33,37 +42,37 @@ def contact_stiffness(h_bearing, h_journal, bearing_radius, clearance):
     return 4.0 / (3.0 * (h_bearing + h_journal)) * shape
 
 
-def lankarani_nikravesh(restitution: float) -> float:
+def lankarani_nikravesh(restitution: Number) -> Number:
     """Return a = 3 (1 - c_e^2)/4 (paper eq. 7; doi:10.1115/1.2912617). Made for c_e near 1; exact only in that limit."""
     return 0.75 * (1.0 - restitution**2)
 
 
-def flores(restitution: float) -> float:
+def flores(restitution: Number) -> Number:
     """Return a = 8 (1 - c_e)/(5 c_e) (Flores et al. 2011, doi:10.1007/s11044-010-9237-4). For 0 < c_e <= 1, soft ones too."""
     return 1.6 * (1.0 - restitution) / restitution
 
 
-def gonthier(restitution: float) -> float:
+def gonthier(restitution: Number) -> Number:
     """Return a = (1 - c_e^2)/c_e (Gonthier et al. 2004, doi:10.1023/B:MUBO.0000029392.21648.bc). For 0 < c_e <= 1."""
     return (1.0 - restitution**2) / restitution
 
 
-def hu_guo(restitution: float) -> float:
+def hu_guo(restitution: Number) -> Number:
     """Return a = 3 (1 - c_e)/(2 c_e) (Hu and Guo 2015, doi:10.1007/s11012-015-0135-1). For 0 < c_e <= 1."""
     return 1.5 * (1.0 - restitution) / restitution
 
 
-def herbert_mcwhannell(restitution: float) -> float:
+def herbert_mcwhannell(restitution: Number) -> Number:
     """Return a = 6 (1 - c_e)/((2 c_e - 1)^2 + 3) (Herbert and McWhannell 1977, doi:10.1115/1.3439270). For 0 <= c_e <= 1."""
     return 6.0 * (1.0 - restitution) / ((2.0 * restitution - 1.0) ** 2 + 3.0)
 
 
-def lee_wang(restitution: float) -> float:
+def lee_wang(restitution: Number) -> Number:
     """Return a = 3 (1 - c_e)/4 (Lee and Wang 1983, doi:10.1115/1.3267402). For c_e near 1 or near 0."""
     return 0.75 * (1.0 - restitution)
 
 
-LATCHED_LAWS: dict[str, Callable[[float], float]] = {
+LATCHED_LAWS: dict[str, Callable[[Any], Any]] = {
     "lankarani-nikravesh": lankarani_nikravesh,
     "flores": flores,
     "gonthier": gonthier,
