@@ -43,6 +43,8 @@ DESIGN_VARIABLES = {
     "I2": ("kg m^2", "inertia of the rod about its mass centre"),
     "m3": ("kg", "mass of the slider"),
     "C": ("m", "radial clearance"),
+    "r1": ("1", "inertia of the crank over that of a slender rod, m1 L1^2/12"),
+    "r2": ("1", "inertia of the rod over that of a slender rod, m2 L2^2/12"),
 }
 """Units and long names of the design variables of the paper (its Table 3)."""
 
@@ -61,6 +63,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "converged": {"flag_values": _NO_YES, "flag_meanings": "not_determined determined"},
     "selected": {"flag_values": _NO_YES, "flag_meanings": "left_out selected"},
     "used": {"flag_values": _NO_YES, "flag_meanings": "not_an_input input"},
+    "surface_accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "verified": {"flag_values": _NO_YES, "flag_meanings": "not_simulated simulated"},
 }
@@ -116,24 +119,39 @@ r2*          | {dims} | 1     | 1 - SSE/SST on test points
 rmae*        | {dims} | 1     | largest test error over their standard deviation
 r2_explained | {dims} | 1     | explained variance ratio, eq. 26 as printed
 rmae_mean    | {dims} | 1     | largest test error over their mean, eq. 27 as printed
+rmse         | {dims} | m     | root mean square error on test points
 points       | {dims} | count | number of points fitted
 """
 
 _SENSITIVITY = """
-surface           | surface                              | text | inputs of the response surface
-interval          | interval                             | 1    | interval, fraction of the range
-clearance         | clearance                            | m    | radial clearance
-parameter         | parameter                            | text | design variable
-sensitivity*      | surface interval clearance parameter | m    | slope at midpoint, times range
-standard_error*   | surface interval clearance parameter | m    | standard error of it
-converged*        | surface clearance parameter          | flag | whether it is determined
-sobol_first       | clearance parameter                  | 1    | first-order Sobol index
-sobol_first_error | clearance parameter                  | 1    | its standard error
-sobol_total       | clearance parameter                  | 1    | total Sobol index
-sobol_total_error | clearance parameter                  | 1    | its standard error
-influence         | parameter                            | m    | what the parameters are ranked by
-selected          | parameter                            | flag | whether its influence is great
-""" + _FIT.format(dims="surface interval clearance")
+surface              | surface | text | inputs of the response surface
+interval             | interval | 1 | interval, fraction of the range
+clearance            | clearance | m | radial clearance
+parameter            | parameter | text | design variable
+sensitivity*         | surface interval clearance parameter | m | slope at midpoint, times range
+standard_error*      | surface interval clearance parameter | m | standard error of it
+r2*                  | surface interval clearance | 1 | 1 - SSE/SST on test points
+rmae*                | surface interval clearance | 1 | largest test error over their standard deviation
+leave_one_out_r2     | surface interval clearance | 1 | 1 - SSE/SST of leave-one-out errors
+converged*           | surface clearance parameter | flag | whether it is determined
+convergence_interval | surface clearance parameter | 1 | interval where it is determined
+plateau_interval     | surface clearance parameter | 1 | widest interval from which on it agrees
+best_sensitivity     | surface clearance parameter | m | slope where determined, times range
+uncertainty          | surface clearance parameter | m | standard error of it, truncation included
+surface_r2           | surface clearance | 1 | 1 - SSE/SST on test points, global surface
+surface_rmae         | surface clearance | 1 | largest test error over their deviation
+surface_r2_explained | surface clearance | 1 | explained variance ratio, eq. 26 as printed
+surface_rmae_mean    | surface clearance | 1 | largest test error over their mean, eq. 27
+surface_order        | surface clearance | count | order of the global surface
+surface_points       | surface clearance | count | points it was fitted to
+surface_accepted     | surface clearance | flag | whether it passed on its test points
+sobol_first          | parameter | 1 | first-order Sobol index
+sobol_first_error    | parameter | 1 | its standard error
+sobol_total          | parameter | 1 | total Sobol index
+sobol_total_error    | parameter | 1 | its standard error
+influence            | parameter | m | mean effect, what parameters are ranked by
+selected             | parameter | flag | whether its influence is great
+"""
 
 _KRIGING = """
 model           | model           | text  | name of the model, one for each subinterval
@@ -188,6 +206,21 @@ verdict* | claim | text  | holds, does not hold, or cannot be told
 figure*  | claim | text  | the number that decides
 """
 
+_READINGS = """
+reading             | reading        | text  | how the text of the paper is read
+design              | design         | text  | design of the paper, its Table 4
+case                | design         | text  | case of the robust design
+objective_smallest* | reading design | m     | objective at the smallest clearance
+mean*               | reading design | m     | mean of the objective, by direct simulation
+mean_error          | reading design | m     | standard error of it
+deviation*          | reading design | m     | standard deviation of the objective
+deviation_error     | reading design | m     | standard error of it
+failed              | reading design | count | number of simulations that failed
+mean_paper          | design         | m     | mean as printed
+deviation_paper     | design         | m     | deviation as printed
+distance            | reading        | 1     | root mean square of ln(mean / printed mean)
+"""
+
 _TIMING = """
 rank     | rank       | count | MPI rank
 stage    | stage      | text  | stage of the run
@@ -237,6 +270,7 @@ KINDS = {
     "front": _kind("Fronts of mean and deviation", _FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", _VERIFICATION, ("design",)),
     "claims": _kind("What the paper claims, tested on our data", _CLAIMS),
+    "readings": _kind("The paper's designs under readings of its text", _READINGS),
     "timing": _kind("Where the time went", _TIMING),
 }
 """Every result file by its kind."""

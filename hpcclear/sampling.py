@@ -17,7 +17,15 @@ from hpcclear.scene.domain import box, slender_inertias, study_of, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.variables import TAIL, RandomInput
 
-__all__ = ["Points", "check_points", "latin_hypercube", "monte_carlo", "read_points", "unit_lhs"]
+__all__ = [
+    "Points",
+    "check_points",
+    "generator",
+    "latin_hypercube",
+    "monte_carlo",
+    "read_points",
+    "unit_lhs",
+]
 
 Array = NDArray[np.float64]
 
@@ -83,7 +91,7 @@ def latin_hypercube(
     if count < 1:
         raise InputError("samples", count, "a design needs at least one point", "Ask for 1 or more")
     region = box(scene, names, widen)
-    rng = np.random.default_rng(_seed(study.seed, f"lhs {purpose}"))
+    rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
     coordinates = region.lower + unit * (region.upper - region.lower)
     points = Points(
@@ -170,6 +178,11 @@ def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str
 def _words(text: str) -> tuple[int, ...]:
     """A text as words of a spawn key."""
     return tuple(int(word) for word in np.frombuffer(hashlib.sha256(text.encode()).digest(), "<u4"))
+
+
+def generator(seed: int, *labels: str) -> np.random.Generator:
+    """A stream of random numbers of its own for each purpose, from the study's seed."""
+    return np.random.default_rng(_seed(seed, *labels))
 
 
 def _seed(seed: int, *labels: str) -> np.random.SeedSequence:

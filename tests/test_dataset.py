@@ -90,6 +90,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "front": "mean deviation",
         "verification": "mean_true deviation_true",
         "claims": "text verdict figure",
+        "readings": "objective_smallest mean deviation",
         "timing": "busy idle compile write command",
     }
     dims = {
@@ -100,6 +101,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "front": "case run solution",
         "verification": "design",
         "claims": "claim",
+        "readings": "reading design",
         "timing": "rank stage",
     }
     assert set(KINDS) == set(contract)

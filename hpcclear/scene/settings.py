@@ -36,15 +36,16 @@ class Sensitivity(Table):
     """Largest error on the test points, over their standard deviation."""
     resamplings: Annotated[int, Count(0, 20)] = 3
     """How often the sample is doubled before a surface counts as not fitted."""
-    shrink: Share = 0.1
-    """Share of the interval taken off at both limits together, in each round of the convergence
-    loop."""
-    rounds: Annotated[int, Count(1, 50)] = 8
-    """Rounds of that loop at most."""
+    shrink: Share = 0.3
+    """Share of its length by which every interval is shortened about its midpoint, from one round
+    of the convergence loop to the next."""
+    rounds: Annotated[int, Count(1, 50)] = 6
+    """Intervals looked at, the global one included."""
     influence: Share = 0.1
     """Inputs whose range times sensitivity reaches this share of the largest form X_G-I."""
-    sobol_samples: Annotated[int, Count(0, 2**24)] = 2**12
-    """Base samples of the global indices, a power of two; 0 leaves them out."""
+    sobol_samples: Annotated[int, Count(0, 2**24)] = 2**10
+    """Base samples of the global indices, a power of two, each as many simulations as there are
+    variables and two more; 0 leaves the indices out."""
 
     def check(self) -> None:
         """Contradictions between the entries; PydanticCustomError with a key below the study."""
@@ -116,3 +117,9 @@ class Verification(Table):
     """Clearance of the responses that are compared, m (Fig. 10)."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2
     """Steady revolutions of these responses."""
+    response_windows: Annotated[int, Count(2, 1000)] = 10
+    """How many such stretches their averages, fluctuations and peaks are taken over, to know how
+    much these scatter."""
+    audit_samples: Annotated[int, Count(0, 10**6)] = 1000
+    """Direct Monte Carlo samples of each of the paper's designs under each reading of its text; 0
+    leaves the comparison out."""
