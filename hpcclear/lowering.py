@@ -46,6 +46,8 @@ def topology(scene: Scene) -> tuple[bool, bool, bool]:
 
 def coordinate_count(scene: Scene) -> int:
     """Coordinates that are integrated; 0 leaves closed-form kinematics."""
+    if scene.numerics.formulation == "baumgarte":
+        return at.MAX_COORDINATES
     first, second, free = topology(scene)
     return {0: 0, 1: 2, 2: 4}[first + second] + free
 
@@ -69,6 +71,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         "load": e.slider_load is not None and not is_table(e.slider_load),
         "load_table": is_table(e.slider_load),
         "guide": e.guide_friction is not None,
+        "baumgarte": scene.numerics.formulation == "baumgarte",
         "ledger": scene.numerics.energy if ledger is None else ledger,
         "series": series,
     }
@@ -102,7 +105,9 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     """
     first, second, free = topology(scene)
     a = scene.numerics.absolute_tolerance
-    if first and second:
+    if scene.numerics.formulation == "baumgarte":
+        lengths, free = [True, True, True, True, False, True, True, False], True
+    elif first and second:
         lengths = [True, True, False, True]
     elif first or second:
         lengths = [False, True]
@@ -146,10 +151,6 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         raise InputError(
             "numerics.averaged_revolutions", averaged, "is not available", "Give a number of revolutions"
         )
-    if scene.numerics.formulation != "minimal":
-        raise InputError(
-            "numerics.formulation", scene.numerics.formulation, "is not available", 'Use "minimal"'
-        )
     return Problem(
         effects=effects_of(scene, series=series, ledger=ledger),
         coordinates=coordinate_count(scene),
@@ -189,6 +190,8 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     p[:, at.CRANK_MOMENT] = m1 * u1
     p[:, at.CRANK_INERTIA] = own + m1 * u1**2
     p[:, at.GRAVITY] = get("effects.gravity")
+    p[:, at.BAUMGARTE_ALPHA2] = 2.0 * scene.numerics.alpha
+    p[:, at.BAUMGARTE_BETA2] = scene.numerics.beta**2
     _outside_parameters(scene, get, p)
     for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
         if joint in scene.clearance_joints():
@@ -249,12 +252,17 @@ def start_states(scene: Scene, p: Array) -> Array:
     slider_speed = -length * np.sin(angle) * spin
     near = p[:, at.ROD_NEAR]
     q, v = [angle, slider], [spin, slider_speed]
-    if first and second:
+    baumgarte = scene.numerics.formulation == "baumgarte"
+    if baumgarte or (first and second):
         q = [pin_x + near * np.cos(angle), pin_y + near * np.sin(angle), *q]
         v = [-near * np.sin(angle) * spin, crank * omega + near * np.cos(angle) * spin, *v]
+    if baumgarte:
+        zero = np.zeros(len(p))
+        q = [p[:, at.CRANK_NEAR], zero, *q, zero, zero]
+        v = [zero, p[:, at.CRANK_NEAR] * omega, *v, zero, zero]
     elif not (first or second):
         q, v = [], []
-    if free:
+    if free or baumgarte:
         q, v = [*q, np.zeros(len(p))], [*v, omega]
     state = np.zeros((len(p), STATE))
     for k, (coordinate, velocity) in enumerate(zip(q, v, strict=True)):

@@ -16,8 +16,8 @@ Coordinates (free crank angle last, only with a torque drive):
 
 import math
 
-from ..physics.angles import sincos
 from ..jit import lane_function
+from ..physics.angles import sincos
 from ..physics.contact import elastic_force, normal_force
 from ..physics.friction import friction_ratio, saturated
 from . import layout as at
@@ -76,7 +76,23 @@ def guide_ratio(guide, par, speed, i, W):
 
 
 @lane_function
-def joint_force(effects, work, par, joint, row, active, inverse_impact, ex, ey, vx, vy, spin_journal, spin_bearing, i, W):
+def joint_force(
+    effects,
+    work,
+    par,
+    joint,
+    row,
+    active,
+    inverse_impact,
+    ex,
+    ey,
+    vx,
+    vy,
+    spin_journal,
+    spin_bearing,
+    i,
+    W,
+):
     """Contact and friction in one open joint.
 
     Parameters are the journal's position and velocity relative to the bearing's centre and both bodies'
@@ -200,7 +216,7 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
         i,
         W,
     )
-    fx2, fy2, mb2, mj2, loss2 = joint_force(
+    fx2, fy2, mb2, _, loss2 = joint_force(
         effects,
         work,
         par,
@@ -222,9 +238,7 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
     ratio = guide_ratio(effects.guide, par, v3, i, W)
     reaction = abs(fy2 + par[at.SLIDER_MASS * W + i] * g)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
-    crank_load = (
-        crank * (sphi * fx1 - cphi * fy1) + mj1 - par[at.CRANK_MOMENT * W + i] * g * cphi
-    )
+    crank_load = crank * (sphi * fx1 - cphi * fy1) + mj1 - par[at.CRANK_MOMENT * W + i] * g * cphi
     inverse_mass = par[at.INV_ROD_MASS * W + i]
     moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2) + mb1 + mb2
     work[at.ACC * W + i] = (fx1 + fx2) * inverse_mass
@@ -288,7 +302,21 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     b1 = length * (st * fx - ct * fy) + mb + m2 * g * far * ct
     b2 = fx + load - m2 * far * ct * spin * spin
     alpha, a3, friction = sliding_pair(
-        effects.guide, par, a11, a12, a22, b1, b2, m2 * far, st, ct, spin, v3, (m2 + m3) * g - fy, i, W
+        effects.guide,
+        par,
+        a11,
+        a12,
+        a22,
+        b1,
+        b2,
+        m2 * far,
+        st,
+        ct,
+        spin,
+        v3,
+        (m2 + m3) * g - fy,
+        i,
+        W,
     )
     work[at.ACC * W + i] = alpha
     work[(at.ACC + 1) * W + i] = a3
@@ -350,7 +378,7 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
     length = par[at.ROD_LENGTH * W + i]
     near = par[at.ROD_NEAR * W + i]
     crank = par[at.CRANK_LENGTH * W + i]
-    fx, fy, mb, mj, loss = joint_force(
+    fx, fy, mb, _, loss = joint_force(
         effects,
         work,
         par,
@@ -425,7 +453,6 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
     sphi, cphi = s_c[0], s_c[1]
     crank = par[at.CRANK_LENGTH * W + i]
     length = par[at.ROD_LENGTH * W + i]
-    near = par[at.ROD_NEAR * W + i]
     far = par[at.ROD_FAR * W + i]
     m2 = par[at.ROD_MASS * W + i]
     m3 = par[at.SLIDER_MASS * W + i]
@@ -450,77 +477,50 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
         + par[at.ROD_INERTIA * W + i] * k * k
         + m3 * x3 * x3
     )
-    slope = m2 * (x2 * dx2 + y2 * dy2) + par[at.ROD_INERTIA * W + i] * k * dk + m3 * x3 * dx3
+    change = m2 * (x2 * dx2 + y2 * dy2) + par[at.ROD_INERTIA * W + i] * k * dk + m3 * x3 * dx3
     force = (
         torque
         + load * x3
         - g * (par[at.CRANK_MOMENT * W + i] * cphi + m2 * y2)
-        - slope * omega * omega
+        - change * omega * omega
     )
-    alpha, friction = guided_crank(
-        effects.guide,
-        par,
-        inertia,
-        force,
-        x3,
-        # guide reaction N = n0 + n1 alpha: slider and rod balance, moments of the rod about its mass centre
-        m2,
-        m3,
-        par[at.ROD_INERTIA * W + i],
-        k,
-        dk,
-        x2,
-        dx2,
-        y2,
-        dy2,
-        dx3,
-        st,
-        ct,
-        near,
-        far,
-        length,
-        g,
-        load,
-        omega,
-        v3,
-        i,
-        W,
-    )
+    w2 = omega * omega
+    slope = st / ct
+    # guide reaction n0 + n1 alpha - slope f
+    n1 = reaction_slope(par, st, ct, k, x2, y2, x3, i, W)
+    n0 = reaction_slope(par, st, ct, dk * w2, dx2 * w2, dy2 * w2 + g, dx3 * w2, i, W)
+    n0 = n0 + load * slope + m3 * g
+    alpha, friction = guided_crank(effects.guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
     work[at.ACC * W + i] = alpha
-    store_power(
-        effects.ledger, effects.series, work, torque, omega, friction * v3, load * v3, i, W
-    )
+    store_power(effects.ledger, effects.series, work, torque, omega, friction * v3, load * v3, i, W)
 
 
 @lane_function
-def guided_crank(
-    guide, par, inertia, force, x3, m2, m3, i2, k, dk, x2, dx2, y2, dy2, dx3, st, ct, near, far, length, g, load,
-    omega, v3, i, W,
-):  # fmt: skip
-    """Crank acceleration with guide friction, whose reaction depends on the acceleration.
+def reaction_slope(par, st, ct, alpha2, ax2, ay2, ax3, i, W):
+    """Force Ry that a rod between ideal pins takes from the slider for given accelerations, without load and friction.
 
-    The slider pin carries (Rx, Ry) on the rod. Slider: m3 a3 = load - Rx - f; N = m3 g + Ry, f = ratio |N|.
-    Rod about its first pin end: I2 alpha2 = far (ct Ry - st Rx) + near (st Px - ct Py), P the crank pin's force on it.
+    Moments about the rod's first pin: I2 alpha2 + m2 near (ct ay2 - st ax2) = length (ct Ry - st Rx), and the
+    slider's balance Rx = load - f - m3 ax3. Gravity counts as part of ay2.
+    """
+    length = par[at.ROD_LENGTH * W + i]
+    m2_near = par[at.ROD_MASS * W + i] * par[at.ROD_NEAR * W + i]
+    moment = par[at.ROD_INERTIA * W + i] * alpha2 + m2_near * (ct * ay2 - st * ax2)
+    return (moment - length * st * par[at.SLIDER_MASS * W + i] * ax3) / (length * ct)
+
+
+@lane_function
+def guided_crank(guide, par, inertia, force, x3, n0, n1, slope, v3, i, W):
+    """Crank acceleration with guide friction f = ratio |N|, whose reaction N = n0 + n1 alpha - slope f depends on it.
+
+    Solve for N > 0, and for N < 0 where that sign does not hold. Returns acceleration and f.
     """
     if guide is not None:
         ratio = guide_ratio(guide, par, v3, i, W)
-        w2 = omega * omega
-        # Ry = [i2 a2 + far st Rx - near st (m2 ax - Rx) + near ct (m2 (ay + g) - Ry) ] / (far ct)
-        #  => length ct Ry = i2 a2 + length st Rx - near m2 (st ax - ct (ay + g)), Rx = load - f - m3 a3
-        n1 = (i2 * k - near * m2 * (st * x2 - ct * y2) - length * st * m3 * x3) / (length * ct)
-        n0 = (
-            i2 * dk * w2
-            - near * m2 * (st * dx2 * w2 - ct * (dy2 * w2 + g))
-            + length * st * (load - m3 * dx3 * w2)
-        ) / (length * ct) + m3 * g
-        # N (1 + t ratio s) = n0 + n1 alpha with t = st/ct and s the sign of N; inertia alpha = force - ratio s N x3
-        t = st / ct
-        scale = 1.0 / (1.0 + t * ratio)
-        alpha = (force - ratio * scale * n0 * x3) / (inertia + ratio * scale * n1 * x3)
-        sign = 1.0 if (n0 + n1 * alpha) * scale >= 0.0 else -1.0
-        ratio = ratio * sign
-        scale = 1.0 / (1.0 + t * ratio)
-        alpha = (force - ratio * scale * n0 * x3) / (inertia + ratio * scale * n1 * x3)
-        return alpha, ratio * scale * (n0 + n1 * alpha)
+        scaled = ratio / (1.0 + slope * ratio)  # f = scaled (n0 + n1 alpha)
+        alpha = (force - scaled * n0 * x3) / (inertia + scaled * n1 * x3)
+        ratio = ratio if n0 + n1 * alpha >= 0.0 else -ratio
+        scaled = ratio / (1.0 + slope * ratio)
+        alpha = (force - scaled * n0 * x3) / (inertia + scaled * n1 * x3)
+        return alpha, scaled * (n0 + n1 * alpha)
     else:
         return force / inertia, 0.0

@@ -2,6 +2,7 @@
 
 from ..jit import lane_function
 from . import layout as at
+from .baumgarte import nine_coordinates
 from .motion import both_ideal, crank_rod_open, rod_slider_open, two_open
 
 
@@ -17,8 +18,30 @@ def crank_motion(torque, work, par, last, i, W):
 
 @lane_function
 def lane_motion(effects, crank_rod, rod_slider, torque, work, par, torque_table, load_table, i, W):
-    """Dispatch on the open joints; what is not called is not compiled."""
-    if crank_rod is not None:
+    """Accelerations and rates of lane i."""
+    formulated(
+        effects,
+        effects.baumgarte,
+        crank_rod,
+        rod_slider,
+        torque,
+        work,
+        par,
+        torque_table,
+        load_table,
+        i,
+        W,
+    )
+
+
+@lane_function
+def formulated(
+    effects, baumgarte, crank_rod, rod_slider, torque, work, par, torque_table, load_table, i, W
+):
+    """Dispatch on formulation and open joints; what is not called is not compiled."""
+    if baumgarte is not None:
+        nine_coordinates(effects, crank_rod, rod_slider, work, par, torque_table, load_table, i, W)
+    elif crank_rod is not None:
         if rod_slider is not None:
             phi, omega = crank_motion(torque, work, par, 4, i, W)
             two_open(effects, work, par, torque_table, load_table, phi, omega, i, W)

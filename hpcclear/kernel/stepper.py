@@ -36,6 +36,7 @@ from .lifecycle import (
 )
 from .record import record_step
 from .rhs import accelerations
+from .stiff import sense_stiffness, settle_methods, take_implicit_steps
 
 
 @lane_function
@@ -57,9 +58,9 @@ def start_state(work, n, W):
 
 @lane_function
 def adopt_fresh(work, stages, n, W):
-    """Take over accelerations and rates at the start of the step on fresh lanes only."""
+    """Take over accelerations and rates at the start of the step on fresh lanes of the explicit method only."""
     for i in range(W):
-        if work[at.FRESH * W + i] == 1.0:
+        if work[at.FRESH * W + i] > work[at.STIFF * W + i]:
             for k in range(n):
                 stages[k * W + i] = work[(at.ACC + k) * W + i]
             for r in range(at.RATES):
@@ -123,9 +124,9 @@ def impacts(latched, lane, W, work, settings):
 
 
 @lane_function
-def wrap_free_crank(torque, lane, W, work, last):
-    """Count a free crank's angle anew each turn, so that it keeps its precision."""
-    if torque is not None:
+def wrap_crank(torque, baumgarte, lane, W, work, last):
+    """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
+    if torque is not None or baumgarte is not None:
         work[(at.Q + last) * W + lane] -= at.TURN
 
 
@@ -135,21 +136,25 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
 
     Its arguments: effects (`layout.Effects`), number of stages, packed tableau, settings,
     work, stages (stages n W), par, book, drive and load tables, the queue (parameters, states), out,
-    finished, counters, record (array or None) and budget: how many block steps to take at most.
+    finished, counters, record (array or None), memory of the implicit method (lanes, MEMORY; None switches it off)
+    and budget: how many block steps to take at most.
     It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
     vector length.
     """
 
+    size = (0,) * n  # a length the compiler knows, for scalar code
+
     @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
     def stepper(
         effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
-        queue_par, queue_state, out, finished, counters, record, budget,
+        queue_par, queue_state, out, finished, counters, record, memory, budget,
     ):  # fmt: skip
         # offsets in the packed tableau: c, A, A A, b, e, e A
         A = count
         AA = A + count * count
         E = AA + count * count + count
         EA = E + count
+        LAST = EA + count
         atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
         running = 0.0
         for i in range(W):
@@ -159,28 +164,35 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
         while budget > 0 and running > 0.0:
             budget -= 1
             choose_step(work, par, effects.torque, W)
-            fresh = 0.0
-            for i in range(W):
-                fresh += work[at.FRESH * W + i]
-            for s in range(0 if fresh > 0.0 else 1, count):
-                if s == 0:
-                    start_state(work, n, W)
-                else:
-                    any_stage_state(
-                        work, stages, weights, weights[s], A + s * count, AA + s * count, n, s, W
-                    )
-                begin_stage(work, par, effects.torque, weights[s], W)
-                accelerations(effects, work, par, torque_table, load_table, W)
-                if s == 0:
-                    adopt_fresh(work, stages, n, W)
-                else:
-                    weigh_stage(effects, work, weights, s, count, W)
-            step_error(
-                effects.crank_rod, effects.rod_slider, work, stages, par, weights, E, EA, n,
-                settings[RTOL], atol, 6, W,
-            )  # fmt: skip
-            for i in range(W):
-                work[at.EVALUATIONS * W + i] += count - 1.0
+            implicit = settle_methods(memory, settings, work, W)
+            if implicit < running:
+                fresh = 0.0
+                for i in range(W):
+                    fresh += max(work[at.FRESH * W + i] - work[at.STIFF * W + i], 0.0)
+                for s in range(0 if fresh > 0.0 else 1, count):
+                    if s == 0:
+                        start_state(work, n, W)
+                    else:
+                        any_stage_state(
+                            work, stages, weights, weights[s], A + s * count, AA + s * count, n, s, W
+                        )
+                    begin_stage(work, par, effects.torque, weights[s], W)
+                    accelerations(effects, work, par, torque_table, load_table, W)
+                    if s == 0:
+                        adopt_fresh(work, stages, n, W)
+                    else:
+                        weigh_stage(effects, work, weights, s, count, W)
+                step_error(
+                    effects.crank_rod, effects.rod_slider, work, stages, par, weights, E, EA, n,
+                    settings[RTOL], atol, 6, W,
+                )  # fmt: skip
+                sense_stiffness(memory, work, stages, weights, LAST, atol, n, 6, W)
+                for i in range(W):
+                    work[at.EVALUATIONS * W + i] += (count - 1.0) * (1.0 - work[at.STIFF * W + i])
+            if implicit > 0.0:
+                take_implicit_steps(
+                    effects, size, work, stages, par, torque_table, load_table, memory, settings, W
+                )
             special = judge_step(
                 work, settings[EXPONENT], settings[BETA], settings[MAX_STEPS], settings[SMALLEST_STEP], W
             )
@@ -210,7 +222,7 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
             if ended > 0.0:
                 for i in range(W):
                     if work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i] == 1.0:
-                        wrap_free_crank(effects.torque, i, W, work, n - 1)
+                        wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
                         if end_revolution(i, W, work, book, settings):
                             finish(i, W, n, OK, work, book, out, finished, counters)
                             load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)

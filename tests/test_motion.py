@@ -1,0 +1,279 @@
+"""Equations of motion against a dense nine-coordinate model that shares no formula with them."""
+
+import math
+
+import numpy as np
+import pytest
+from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
+
+from hpcclear.kernel import baumgarte as bg
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.observe import observe
+
+CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
+ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}
+SLIDER_MASS = 0.14
+SPEED = 520.0
+GUIDE = (0.2, 0.5)  # coefficient, ramp speed
+DAMPING = 0.5
+RESTITUTION_FACTOR = 0.4
+MU, RAMP = 0.1, 0.3
+DEAD = 0.05
+KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
+
+FULL = {"gravity", "load", "guide", "ledger", "series"}
+TOPOLOGIES = {
+    "two": {"crank_rod", "rod_slider"},
+    "O12": {"crank_rod"},
+    "O23": {"rod_slider"},
+    "none": set(),
+}
+MOTIONS = [
+    ("two", {"fixed", "coulomb"}),
+    ("two", FULL | {"latched", "ambrosio"}),
+    ("two", FULL | {"fixed", "coulomb", "torque"}),
+    ("O12", {"latched", "coulomb"}),
+    ("O12", FULL | {"fixed", "ambrosio"}),
+    ("O12", FULL | {"latched", "coulomb", "torque"}),
+    ("O23", {"fixed", "coulomb"}),
+    ("O23", FULL | {"latched", "coulomb"}),
+    ("O23", FULL | {"fixed", "ambrosio", "torque"}),
+    ("none", {"torque", "ledger", "series"}),
+    ("none", FULL | {"torque"}),
+]
+
+
+def clip(x):
+    return min(max(x, -1.0), 1.0)
+
+
+def row_of_parameters(effects, rng):
+    """Parameters as the kernel reads them, with this file's constants and two different joints."""
+    par = np.ones(at.PARAMETERS)
+    values = {
+        at.SPEED: SPEED,
+        at.CRANK_LENGTH: CRANK["length"],
+        at.CRANK_MASS: CRANK["mass"],
+        at.CRANK_NEAR: CRANK["u"],
+        at.CRANK_OWN_INERTIA: CRANK["inertia"],
+        at.CRANK_MOMENT: CRANK["mass"] * CRANK["u"],
+        at.CRANK_INERTIA: CRANK["inertia"] + CRANK["mass"] * CRANK["u"] ** 2,
+        at.ROD_LENGTH: ROD["length"],
+        at.ROD_NEAR: ROD["u"],
+        at.ROD_FAR: ROD["length"] - ROD["u"],
+        at.ROD_MASS: ROD["mass"],
+        at.INV_ROD_MASS: 1 / ROD["mass"],
+        at.ROD_INERTIA: ROD["inertia"],
+        at.INV_ROD_INERTIA: 1 / ROD["inertia"],
+        at.SLIDER_MASS: SLIDER_MASS,
+        at.INV_SLIDER_MASS: 1 / SLIDER_MASS,
+        at.GRAVITY: 9.81,
+        at.LOAD: -35.0,
+        at.TORQUE: 2.5,
+        at.GUIDE_COEFFICIENT: GUIDE[0],
+        at.GUIDE_INVERSE_RAMP: 1 / GUIDE[1],
+        at.BAUMGARTE_ALPHA2: 2 * 250.0,
+        at.BAUMGARTE_BETA2: 240.0**2,
+    }
+    for base, clearance in ((at.JOINT_12, 3e-4), (at.JOINT_23, 5e-4)):
+        values |= {
+            base + at.CLEARANCE: clearance,
+            base + at.STIFFNESS: 3e9 * (1 + clearance),
+            base + at.DAMPING: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
+            base + at.BEARING_RADIUS: 0.02,
+            base + at.JOURNAL_RADIUS: 0.02 - clearance,
+            base + at.FRICTION: MU,
+            base + at.INVERSE_RAMP: 1 / RAMP,
+            base + at.DEAD_SPEED: DEAD,
+        }
+    for place, value in values.items():
+        par[place] = value
+    return par
+
+
+def joint_of(effects, par, base, active, impact_speed):
+    def factor(rate):
+        if "fixed" in effects:
+            return 1 + DAMPING * rate
+        return 1 + (RESTITUTION_FACTOR * rate / impact_speed if "latched" in effects else 0.0)
+
+    def friction(sliding):
+        if "coulomb" in effects:
+            return MU * clip(sliding / RAMP)
+        if "ambrosio" in effects:
+            size = min(max((abs(sliding) - DEAD) / RAMP, 0.0), 1.0)
+            return MU * math.copysign(size, sliding)
+        return 0.0
+
+    clearance, stiffness = par[base + at.CLEARANCE], par[base + at.STIFFNESS]
+    return Joint(
+        clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0
+    )
+
+
+def dense_model(effects, par, contacts, feedback=False):
+    on = effects.__contains__
+    joints = {}
+    for k, (name, base, flag) in enumerate(
+        (("o12", at.JOINT_12, "crank_rod"), ("o23", at.JOINT_23, "rod_slider"))
+    ):
+        if on(flag):
+            joints[name] = joint_of(effects, par, base, contacts[k], 1 / contacts[2 + k])
+    return Dense(
+        CRANK,
+        ROD,
+        SLIDER_MASS,
+        speed=None if on("torque") else SPEED,
+        torque=2.5,
+        gravity=9.81 if on("gravity") else 0.0,
+        load=-35.0 if on("load") else 0.0,
+        guide=(lambda v: GUIDE[0] * clip(v / GUIDE[1])) if on("guide") else None,
+        alpha=250.0 if feedback else 0.0,
+        beta=240.0 if feedback else 0.0,
+        **joints,
+    )
+
+
+def random_state(mech, rng, par):
+    """A state that meets the constraints, journals up to 1.3 clearances off centre; and its time."""
+    eccentric = []
+    for joint in (mech.o12, mech.o23):
+        reach = 0.0 if joint is None else joint.clearance * rng.uniform(0.7, 1.3)
+        angle = rng.uniform(0, at.TURN)
+        eccentric.append(reach * np.array([np.cos(angle), np.sin(angle)]))
+    phi = rng.uniform(0, at.TURN)
+    q = assembled(mech, phi, *eccentric)
+    wanted = rng.normal(size=9) * np.array([5, 5, SPEED, 8, 8, 90, 10, 0, 0])
+    wanted[PHI] = SPEED * rng.uniform(0.5, 1.5)
+    t = phi / SPEED
+    return q, admissible(mech, q, wanted, t), t
+
+
+def reduced(effects, values):
+    """Minimal coordinates among the nine."""
+    topology = ("crank_rod" in effects, "rod_slider" in effects)
+    rows = {(True, True): [X2, Y2, THETA2, X3], (False, False): []}.get(topology, [THETA2, X3])
+    return values[rows + [PHI] * ("torque" in effects)]
+
+
+def seen_by_kernel(effects, par, q, v, contacts, t):
+    """Accelerations and rates of one state from the kernel."""
+    flags = at.Effects(**dict.fromkeys(effects, 1))
+    out = np.zeros((1, len(q) + at.RATES))
+    table = np.zeros(4)
+    states = np.concatenate([q, v])[None]
+    observe(flags, len(q), par, table, table, states, contacts[None], np.array([t]), out)
+    return out[0, : len(q)], out[0, len(q) :]
+
+
+def cases(rng, effects, count=25):
+    """Random states of a set of effects with the model that describes each."""
+    par = row_of_parameters(effects, rng)
+    for _ in range(count):
+        contacts = np.array([*rng.integers(0, 2, 2), *rng.uniform(0.3, 3.0, 2)], float)
+        mech = dense_model(effects, par, contacts)
+        yield par, contacts, mech, *random_state(mech, rng, par)
+
+
+def scale_of(reference):
+    return np.abs(reference).max()
+
+
+def check_rates(effects, mech, rates, v):
+    """Gaps, forces and powers of the kernel against the dense model's."""
+    for name, flag, gap, friction in (
+        ("o12", "crank_rod", at.GAP_12, at.FRICTION_12),
+        ("o23", "rod_slider", at.GAP_23, at.FRICTION_23),
+    ):
+        if flag in effects:
+            seen = mech.seen[name]
+            np.testing.assert_allclose(rates[gap], seen["gap"], rtol=0, atol=1e-16)
+            np.testing.assert_allclose(rates[gap + 1], seen["normal"], rtol=1e-10, atol=1e-9)
+            np.testing.assert_allclose(rates[gap + 2], seen["rate"], rtol=1e-10, atol=1e-11)
+            if "series" in effects:
+                np.testing.assert_allclose(
+                    rates[friction], seen["tangential"], rtol=1e-9, atol=1e-9
+                )
+    if "ledger" in effects:
+        drive = mech.seen["drive"]
+        scale = abs(drive) + 1.0
+        assert rates[at.DRIVE_MOMENT] == pytest.approx(drive, rel=1e-9, abs=1e-9 * scale)
+        assert rates[at.DRIVE_POWER] == pytest.approx(drive * v[PHI], rel=1e-9, abs=1e-6 * scale)
+        assert rates[at.ABS_DRIVE_POWER] == abs(rates[at.DRIVE_POWER])
+        assert rates[at.LOAD_POWER] == pytest.approx(mech.load * v[X3], rel=1e-12)
+        losses = sum(mech.seen[j]["loss"] for j in ("o12", "o23") if j in mech.seen)
+        losses += mech.seen["guide_friction"] * v[X3]
+        assert rates[at.DISSIPATION] == pytest.approx(losses, rel=1e-9, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+)
+def test_minimal_accelerations_equal_the_dense_model(topology, effects):
+    effects = effects | TOPOLOGIES[topology]
+    contacts_met = 0
+    for par, contacts, mech, q, v, t in cases(np.random.default_rng(3), effects):
+        reference = mech.accelerations(q, v, t)
+        a, rates = seen_by_kernel(
+            effects, par, reduced(effects, q), reduced(effects, v), contacts, t
+        )
+        expected = reduced(effects, reference)
+        np.testing.assert_allclose(a, expected, rtol=1e-10, atol=1e-10 * scale_of(reference))
+        check_rates(effects, mech, rates, v)
+        contacts_met += any(mech.seen[j]["normal"] > 0 for j in ("o12", "o23") if j in mech.seen)
+    assert contacts_met > 2 or topology == "none"
+
+
+@pytest.mark.parametrize(
+    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+)
+def test_power_balance_closes_at_every_instant(topology, effects):
+    """Kinetic, potential and stored energy change by what the ledger says, state by state."""
+    effects = effects | TOPOLOGIES[topology] | {"ledger", "series"}
+    for par, contacts, mech, q, v, t in cases(np.random.default_rng(4), effects, 10):
+        a = mech.accelerations(q, v, t)
+        _, rates = seen_by_kernel(
+            effects, par, reduced(effects, q), reduced(effects, v), contacts, t
+        )
+        kinetic = (mech.masses() * v) @ a
+        weight = mech.gravity * (mech.masses() * v)[[1, 4]].sum()
+        stored = sum(mech.seen[j]["elastic_power"] for j in ("o12", "o23") if j in mech.seen)
+        supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * ("load" in effects)
+        terms = np.array([kinetic, weight, stored, supplied, rates[at.DISSIPATION]])
+        rest = kinetic + weight + stored - supplied + rates[at.DISSIPATION]
+        assert abs(rest) < 1e-10 * np.abs(terms).max() + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("topology", "effects"),
+    [*MOTIONS, ("none", FULL)],
+    ids=lambda x: x if isinstance(x, str) else "",
+)
+def test_baumgarte_accelerations_equal_the_dense_solve(topology, effects):
+    """Also where constraints are violated, so that the feedback matters."""
+    effects = effects | TOPOLOGIES[topology] | {"baumgarte"}
+    rng = np.random.default_rng(5)
+    for par, contacts, _, q, v, t in cases(rng, effects):
+        mech = dense_model(effects, par, contacts, feedback=True)
+        q = q + 1e-5 * rng.normal(size=9)
+        v = v + 1e-2 * rng.normal(size=9)
+        reference = mech.accelerations(q, v, t)
+        a, rates = seen_by_kernel(effects, par, q[KERNEL_ORDER], v[KERNEL_ORDER], contacts, t)
+        np.testing.assert_allclose(
+            a, reference[KERNEL_ORDER], rtol=1e-10, atol=1e-10 * scale_of(reference)
+        )
+        check_rates(effects, mech, rates, v)
+
+
+def test_constraint_violation_is_the_largest_constraint():
+    rng = np.random.default_rng(6)
+    for names in TOPOLOGIES.values():
+        par = row_of_parameters(names, rng)
+        mech = dense_model(names, par, np.ones(4))
+        q = random_state(mech, rng, par)[0] + 1e-6 * rng.normal(size=9)
+        rows = np.delete(mech.constraints(q, q[PHI] / SPEED), 4)
+        rows[3] *= ROD["length"]
+        got = bg.constraint_violation(
+            "crank_rod" in names, "rod_slider" in names, par, q[KERNEL_ORDER][:, None]
+        )
+        np.testing.assert_allclose(got, [np.abs(rows).max()], rtol=1e-9)
