@@ -1,0 +1,88 @@
+"""Words for axes: what is drawn, its symbol and a unit of a readable size."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+class Scale(NamedTuple):
+    """A unit to show numbers in: multiply by `factor`, write `unit` behind."""
+
+    factor: float
+    unit: str
+
+    def label(self, words: str) -> str:
+        """An axis label."""
+        return f"{words} ({self.unit})"
+
+
+def plain(units: str) -> str:
+    """A unit as the tables of this package write it: ``kg*m**2`` becomes kg m^2, none becomes 1."""
+    return units.replace("**", "^").replace("*", " ").strip() or "1"
+
+
+def pretty(units: str) -> str:
+    """A unit as it is printed: ``kg m^2`` becomes kg m², a bare number a dash."""
+    units = plain(units)
+    if units == "1":
+        return "–"
+    return re.sub(r"\^(-?\d+)", lambda match: match[1].translate(_SUPERSCRIPTS), units)
+
+
+def scale(units: str, values: ArrayLike) -> Scale:
+    """A unit in which the largest of the values reads as 1 to 999.
+
+    Only a unit that begins with m, N, J, W, Pa or s takes a prefix (its power counts); masses stay in kg, inertias
+    go to kg mm^2, and lengths from a tenth of a millimetre on to mm, as drawings have them.
+    """
+    units = plain(units)
+    finite = np.abs(np.asarray(values, dtype=float))
+    finite = finite[np.isfinite(finite)]
+    largest = float(finite.max()) if finite.size else 0.0
+    if units == "kg m^2" and 0.0 < largest < 0.1:
+        return Scale(1e6, "kg mm²")
+    if units == "m" and 1e-4 <= largest < 1.0:
+        return Scale(1e3, "mm")
+    match = re.match(r"(m|N|J|W|Pa|s)(?:\^(\d))?(?![A-Za-z^])", units)
+    if match is None or not largest > 0.0 or units == "m/s":
+        return Scale(1.0, pretty(units))
+    power = int(match[2] or 1)
+    exponent = int(np.floor(np.log10(largest) / (3 * power) + 1e-9)) * 3
+    limit = 0 if match[1] == "m" and "/" not in units else 9  # lengths above a metre stay in metres
+    exponent = min(max(exponent, -9), limit)
+    return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
+
+
+def of(variable: xr.DataArray) -> Scale:
+    """The scale of a variable of a dataset."""
+    return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())
+
+
+def words(variable: xr.DataArray) -> str:
+    """What a variable is called on an axis; a design variable by its symbol or scene path."""
+    return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
+
+
+def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
+    """The design variables of a dataset in its order."""
+    return [v for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"]
+
+
+def clearance(content: xr.Dataset) -> xr.DataArray | None:
+    """The design variable that is a clearance, if there is one."""
+    for variable in design_variables(content):
+        path = str(variable.attrs.get("scene_path", ""))
+        if path == "C" or path.rpartition(".")[2] == "clearance":
+            return variable
+    return None
+
+
+def literal(text: str) -> str:
+    """Text from a file so that matplotlib prints it as it is, without reading formulas into it."""
+    return text.replace("$", r"\$")
