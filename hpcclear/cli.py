@@ -50,8 +50,8 @@ _PROGRESS = click.option(
 def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
-    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy and plan under mpiexec
-    to use more than one core:
+    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy
+    and plan under mpiexec to use more than one core:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """

@@ -201,7 +201,8 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
         rows.append(
             (
                 "throughput",
-                f"{len(f) / busy.sum():.0f} samples a second and core, {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
+                f"{len(f) / busy.sum():.0f} samples a second and core, "
+                f"{busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
             )
         )
     rows.append(("wall time", f"{wall:.1f} s"))

@@ -219,7 +219,7 @@ def _joint_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
         for part in ("bearing", "journal")
     ]
     p[:, at.CLEARANCE] = clearance
-    p[:, at.STIFFNESS] = contact.contact_stiffness(*compliance, bearing, clearance)
+    p[:, at.CONTACT_STIFFNESS] = contact.contact_stiffness(*compliance, bearing, clearance)
     p[:, at.BEARING_RADIUS] = bearing
     p[:, at.JOURNAL_RADIUS] = bearing - clearance
     law: Any = scene.effects.contact

@@ -1,5 +1,6 @@
 """One response, whole: the motion step by step, and from it forces, energies and time series."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,10 +134,7 @@ def instants(scene: Scene, steps: Steps) -> Array:
     borders = np.concatenate([[0.0], steps.time[ends]])
     if steps.time[-1] > borders[-1]:
         borders = np.append(borders, steps.time[-1])
-    parts = [
-        np.linspace(a, b, count, endpoint=False)
-        for a, b in zip(borders[:-1], borders[1:], strict=True)
-    ]
+    parts = [np.linspace(a, b, count, endpoint=False) for a, b in itertools.pairwise(borders)]
     return np.append(np.concatenate(parts), borders[-1])
 
 
@@ -214,7 +212,7 @@ def _series(
     rates = seen[:, n:]
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
     gaps = np.where(open_, rates[:, [at.GAP_12, at.GAP_23]], 0.0)
-    stiffness = np.where(open_, par[[at.JOINT_12 + at.STIFFNESS, at.JOINT_23 + at.STIFFNESS]], 0.0)
+    stiffness = np.where(open_, par[[at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS]], 0.0)
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
     elastic = geometry.elastic_energy(gaps, active, stiffness)

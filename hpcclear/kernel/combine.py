@@ -71,7 +71,7 @@ def gap_error(flag, work, par, gap, clearance, rtol, i, W):
 
 @lane_function
 def step_error(crank_rod, rod_slider, work, stages, par, weights, ev, eq, n, rtol, atol, terms, W):
-    """Mean square over coordinates and velocities of the scaled error, per lane; `terms` stages before the new point."""
+    """Mean square of the scaled error, per lane; `terms` stages come before the new point."""
     for i in range(W):
         h = work[at.STEP * W + i]
         total = gap_error(crank_rod, work, par, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, i, W)

@@ -107,7 +107,7 @@ def joint_force(
     gap = square * inverse - par[(joint + at.CLEARANCE) * W + i]
     rate = vx * nx + vy * ny
     depth = 0.5 * (gap + abs(gap))
-    stiffness = par[(joint + at.STIFFNESS) * W + i]
+    stiffness = par[(joint + at.CONTACT_STIFFNESS) * W + i]
     normal = normal_force(
         effects.fixed,
         effects.latched,

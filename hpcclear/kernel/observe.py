@@ -1,4 +1,4 @@
-"""Forces and accelerations at given states: the same equations of motion as in the stepper, read instead of integrated."""
+"""Forces and accelerations at given states: the stepper's equations of motion, read instead of integrated."""
 
 from ..jit import scalar_function
 from . import layout as at

@@ -43,12 +43,18 @@ def contact_stiffness(
 
 
 def lankarani_nikravesh(restitution: Number) -> Number:
-    """Return a = 3 (1 - c_e^2)/4 (paper eq. 7; doi:10.1115/1.2912617). Made for c_e near 1; exact only in that limit."""
+    """Return a = 3 (1 - c_e^2)/4 (paper eq. 7; doi:10.1115/1.2912617).
+
+    Made for c_e near 1; the restitution is met exactly only in that limit.
+    """
     return 0.75 * (1.0 - restitution**2)
 
 
 def flores(restitution: Number) -> Number:
-    """Return a = 8 (1 - c_e)/(5 c_e) (Flores et al. 2011, doi:10.1007/s11044-010-9237-4). For 0 < c_e <= 1, soft ones too."""
+    """Return a = 8 (1 - c_e)/(5 c_e) (Flores et al. 2011, doi:10.1007/s11044-010-9237-4).
+
+    For 0 < c_e <= 1, soft contacts too.
+    """
     return 1.6 * (1.0 - restitution) / restitution
 
 
@@ -63,7 +69,10 @@ def hu_guo(restitution: Number) -> Number:
 
 
 def herbert_mcwhannell(restitution: Number) -> Number:
-    """Return a = 6 (1 - c_e)/((2 c_e - 1)^2 + 3) (Herbert and McWhannell 1977, doi:10.1115/1.3439270). For 0 <= c_e <= 1."""
+    """Return a = 6 (1 - c_e)/((2 c_e - 1)^2 + 3) (Herbert and McWhannell 1977, doi:10.1115/1.3439270).
+
+    For 0 <= c_e <= 1.
+    """
     return 6.0 * (1.0 - restitution) / ((2.0 * restitution - 1.0) ** 2 + 3.0)
 
 
