@@ -55,6 +55,8 @@ def judge_step(work, expo, beta, max_steps, smallest, W):
         asked = work[at.NEXT_STEP * W + i]
         cut = accept * work[at.ENDING * W + i]
         proposal = max(proposal, asked) if cut == 1.0 else proposal
+        # the implicit method has its own control
+        proposal = asked if work[at.STIFF * W + i] == 1.0 else proposal
         attempts = work[at.ATTEMPTS * W + i] + running
         work[at.ATTEMPTS * W + i] = attempts
         work[at.ACCEPT * W + i] = accept

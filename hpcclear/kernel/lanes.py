@@ -15,6 +15,7 @@ from .lifecycle import (
     EXPONENT,
     FINISHED,
     GAP_TOLERANCE,
+    IMPLICIT,
     ANGLE_TOLERANCE,
     IMPACT_FLOOR,
     MAX_STEPS,
@@ -28,11 +29,15 @@ from .lifecycle import (
     TRANSIENT,
 )
 from .stepper import make_stepper
+from .stiff import MEMORY
 from .tableau import Tableau
 
 Array = NDArray[np.float64]
 
 _NO_TABLE = np.zeros(4)
+
+IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
+"""When lanes take implicit steps: never, where their motion is stiff, always."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Problem:
     transient, averaged, max_steps : int
     torque_table, load_table : numpy.ndarray
         Cubic cells of a periodic table, 4 coefficients a cell.
+    implicit : str
+        When lanes take implicit steps, a key of `IMPLICIT_USE`.
     """
 
     effects: at.Effects
@@ -65,6 +72,7 @@ class Problem:
     max_steps: int
     torque_table: Array = None  # type: ignore[assignment]
     load_table: Array = None  # type: ignore[assignment]
+    implicit: str = "never"
 
     def settings(self) -> Array:
         """The numbers of the stepper's control, as it reads them."""
@@ -80,6 +88,7 @@ class Problem:
         s[SMALLEST_STEP] = 1e-14
         s[EXPONENT] = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s[BETA] = 0.04
+        s[IMPLICIT] = IMPLICIT_USE[self.implicit]
         s[ATOL : ATOL + n] = self.atol[:n]
         s[ATOL + at.MAX_COORDINATES : ATOL + at.MAX_COORDINATES + n] = self.atol[n:]
         return s
@@ -109,6 +118,8 @@ class Lanes:
         self._stages = np.zeros(stages * n * width)
         self._par = np.ones(at.PARAMETERS * width)  # ones: a resting lane divides by them
         self._book = np.zeros(at.BOOK * width)
+        # absent, it keeps the implicit method from being compiled
+        self._memory = None if problem.implicit == "never" else np.zeros((width, MEMORY))
         self._tables = [_NO_TABLE if t is None else t for t in (problem.torque_table, problem.load_table)]
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
@@ -205,6 +216,7 @@ class Lanes:
                 self._finished,
                 self.counters,
                 self.record,
+                self._memory,
                 budget,
             )
         )

@@ -65,7 +65,7 @@ JOINT_23 = 36
 # within a joint's block
 (
     CLEARANCE,
-    STIFFNESS,
+    CONTACT_STIFFNESS,
     DAMPING,
     BEARING_RADIUS,
     JOURNAL_RADIUS,
@@ -118,8 +118,14 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     REJECTED,  # 1 after a rejection: the next step must not grow
     SPECIAL,  # 1 when this step needs a look by the scalar code
     ENDING,  # 1 when this step ends the revolution
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 25)
-WORK = INTEGRAL + RATES + 25
+    STIFF,  # 1 while the implicit method runs this lane
+    EDGE_SCORE,  # of explicit steps at the edge of stability
+    REJECTION_SCORE,  # of rejected explicit steps
+    STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
+    STIFF_STEPS,  # implicit steps tried for this sample
+    CALM,  # implicit steps in a row that the explicit method could have taken
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 31)
+WORK = INTEGRAL + RATES + 31
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (

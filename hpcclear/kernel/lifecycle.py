@@ -25,8 +25,9 @@ STALLED = int(Status.STALLED)
     SMALLEST_STEP,  # relative to the time
     EXPONENT,
     BETA,
+    IMPLICIT,  # 0 never, 1 where the motion is stiff, 2 always
     ATOL,  # first of 2 * MAX_COORDINATES
-) = range(11)
+) = range(12)
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 
 # ---- counters shared by all lanes
@@ -98,6 +99,7 @@ def finish(lane, W, n, status, work, book, out, finished, counters):
     out[slot, at.OUT_INVERSE_IMPACT_12] = work[at.INVERSE_IMPACT_12 * W + lane]
     out[slot, at.OUT_INVERSE_IMPACT_23] = work[at.INVERSE_IMPACT_23 * W + lane]
     out[slot, at.OUT_ATTEMPTS] = work[at.ATTEMPTS * W + lane]
+    out[slot, at.OUT_STIFF_STEPS] = work[at.STIFF_STEPS * W + lane]
     for k in range(n):
         out[slot, at.OUT_STATE + k] = work[(at.Q + k) * W + lane]
         out[slot, at.OUT_STATE + at.MAX_COORDINATES + k] = work[(at.V + k) * W + lane]

@@ -42,8 +42,9 @@ class Tableau:
         return len(self.b)
 
     def packed(self) -> np.ndarray:
-        """Coefficients for the stepper: c, A, A A, b, e, e A in one flat array."""
-        rows = (self.a.sum(axis=1), self.a, self.a @ self.a, self.b, self.e, self.e @ self.a)
+        """Coefficients for the stepper: c, A, A A, b, e, e A, b - (the stage before) in one flat array."""
+        last = self.b - self.a[-2]
+        rows = (self.a.sum(axis=1), self.a, self.a @ self.a, self.b, self.e, self.e @ self.a, last)
         return np.concatenate([np.ravel(x) for x in rows])
 
 
