@@ -78,7 +78,7 @@ def row_of_parameters(effects, rng):
     for base, clearance in ((at.JOINT_12, 3e-4), (at.JOINT_23, 5e-4)):
         values |= {
             base + at.CLEARANCE: clearance,
-            base + at.STIFFNESS: 3e9 * (1 + clearance),
+            base + at.CONTACT_STIFFNESS: 3e9 * (1 + clearance),
             base + at.DAMPING: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
             base + at.BEARING_RADIUS: 0.02,
             base + at.JOURNAL_RADIUS: 0.02 - clearance,
@@ -105,7 +105,7 @@ def joint_of(effects, par, base, active, impact_speed):
             return MU * math.copysign(size, sliding)
         return 0.0
 
-    clearance, stiffness = par[base + at.CLEARANCE], par[base + at.STIFFNESS]
+    clearance, stiffness = par[base + at.CLEARANCE], par[base + at.CONTACT_STIFFNESS]
     return Joint(
         clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0
     )

@@ -1,0 +1,170 @@
+"""The mechanism without clearance: closed forms, dense inverse dynamics, works."""
+
+import numpy as np
+import pytest
+from dense_mechanism import PHI, THETA2, X2, X3, Y2, admissible, assembled
+from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_of_parameters
+
+from hpcclear.kernel import ideal
+from hpcclear.kernel import layout as at
+from hpcclear.lowering import periodic_cells
+
+ANGLES = np.linspace(0, 3 * at.TURN, 721)
+ZERO = np.zeros(2)
+
+
+def response(effects, angles=ANGLES, **more):
+    par = row_of_parameters(effects, None)
+    flags = at.Effects(**dict.fromkeys(effects, 1))
+    return ideal.ideal_response(flags, par, None, angles, **more), par
+
+
+def relative_to_peak(got, expected):
+    return np.abs(got - expected).max() / np.abs(expected).max()
+
+
+def test_slider_equals_the_textbook():
+    """x = r cos + sqrt(l^2 - r^2 sin^2) and its derivatives in the crank angle, written out."""
+    seen, _ = response(set())
+    r, length = CRANK["length"], ROD["length"]
+    s, c = np.sin(ANGLES), np.cos(ANGLES)
+    root = np.sqrt(length**2 - r**2 * s**2)
+    x = r * c + root
+    v = -SPEED * (r * s + r**2 * s * c / root)
+    a = -(SPEED**2) * (r * c + r**2 * (c**2 - s**2) / root + r**4 * s**2 * c**2 / root**3)
+    assert relative_to_peak(seen[ideal.SLIDER_X], x) < 1e-12
+    assert relative_to_peak(seen[ideal.SLIDER_V], v) < 1e-12
+    assert relative_to_peak(seen[ideal.SLIDER_A], a) < 1e-12
+
+
+def test_reactions_equal_the_textbook():
+    """Rod without mass at its ends: the slider's inertia goes along the rod to the crank (two-force member)."""
+    effects = {"load"}
+    par = row_of_parameters(effects, None)
+    par[[at.ROD_MASS, at.ROD_INERTIA]] = 0.0
+    flags = at.Effects(load=1)
+    seen = ideal.ideal_response(flags, par, None, ANGLES)
+    r, length = CRANK["length"], ROD["length"]
+    s, c = np.sin(ANGLES), np.cos(ANGLES)
+    root = np.sqrt(length**2 - r**2 * s**2)
+    a = -(SPEED**2) * (r * c + r**2 * (c**2 - s**2) / root + r**4 * s**2 * c**2 / root**3)
+    along = par[at.LOAD] - SLIDER_MASS * a  # on the rod from the slider, x
+    across = along * (-r * s) / root  # a two-force member pulls along itself
+    assert relative_to_peak(seen[ideal.FORCE_23_X], along) < 1e-12
+    assert relative_to_peak(seen[ideal.FORCE_23_Y], across) < 1e-12
+    assert relative_to_peak(seen[ideal.FORCE_12_X], -along) < 1e-12
+    assert relative_to_peak(seen[ideal.FORCE_12_Y], -across) < 1e-12
+    assert relative_to_peak(seen[ideal.GUIDE_FORCE], across) < 1e-12
+    centripetal = CRANK["mass"] * CRANK["u"] * SPEED**2
+    assert relative_to_peak(seen[ideal.BEARING_X], -along - centripetal * c) < 1e-12
+    assert relative_to_peak(seen[ideal.BEARING_Y], -across - centripetal * s) < 1e-12
+    # virtual power: moment times speed plus force times slider speed is zero
+    moment = along * (r * s + r**2 * s * c / root)
+    assert relative_to_peak(seen[ideal.CRANK_MOMENT], moment) < 1e-12
+
+
+@pytest.mark.parametrize("effects", [set(), FULL, {"gravity"}, {"guide", "load"}], ids=sorted)
+def test_reactions_equal_the_multipliers_of_the_dense_model(effects):
+    """All bodies with mass, gravity, load and guide friction."""
+    seen, par = response(effects, ANGLES[:240:7])
+    mech = dense_model(effects, par, np.ones(4))
+    expected = []
+    for phi in ANGLES[:240:7]:
+        q = assembled(mech, phi, ZERO, ZERO)
+        v = admissible(mech, q, np.zeros(9), phi / SPEED)
+        a = mech.accelerations(q, v, phi / SPEED)
+        bearing_x, bearing_y, guide, _, drive, px, py, rx, ry = mech.seen["multipliers"]
+        motion = [
+            q[X3],
+            v[X3],
+            a[X3],
+            q[X2],
+            q[Y2],
+            q[THETA2],
+            v[X2],
+            v[Y2],
+            v[THETA2],
+            a[X2],
+            a[Y2],
+            a[THETA2],
+        ]
+        forces = [
+            -px,
+            -py,
+            -rx,
+            -ry,
+            bearing_x,
+            bearing_y,
+            guide,
+            mech.seen["guide_friction"],
+            mech.load,
+            drive,
+        ]
+        if v[X3] < 0:
+            forces[7] = mech.seen["guide_friction"]
+        expected.append(motion + forces)
+    expected = np.array(expected).T
+    for row, (got, wanted) in enumerate(zip(seen, expected, strict=True)):
+        scale = np.abs(wanted).max()
+        assert np.abs(got - wanted).max() <= 1e-11 * scale, row
+
+
+def test_a_torque_driven_crank_gets_its_torque_back():
+    """With the acceleration that a torque gives, inverse dynamics returns this torque."""
+    effects = FULL | {"torque"}
+    rng = np.random.default_rng(8)
+    par = row_of_parameters(effects, rng)
+    mech = dense_model(effects, par, np.ones(4))
+    for phi in rng.uniform(0, at.TURN, 10):
+        q = assembled(mech, phi, ZERO, ZERO)
+        wanted = np.zeros(9)
+        wanted[PHI] = SPEED
+        v = admissible(mech, q, wanted)
+        v *= SPEED / v[PHI]
+        a = mech.accelerations(q, v)
+        seen, _ = response(
+            effects, np.array([phi]), speed=v[PHI : PHI + 1], acceleration=a[PHI : PHI + 1]
+        )
+        assert seen[ideal.CRANK_MOMENT, 0] == pytest.approx(2.5, rel=1e-9)
+        assert seen[ideal.SLIDER_A, 0] == pytest.approx(a[X3], rel=1e-11)
+
+
+def test_works_close_the_energy_balance():
+    """Kinetic and potential energy at the instants against the integrals between them."""
+    effects = FULL
+    seen, par = response(effects)
+    flags = at.Effects(**dict.fromkeys(effects, 1))
+    drive, size, lost, load = ideal.ideal_works(flags, par, None, ANGLES)
+    m2, i2 = ROD["mass"], ROD["inertia"]
+    kinetic = (
+        m2 * (seen[ideal.ROD_VX] ** 2 + seen[ideal.ROD_VY] ** 2) + i2 * seen[ideal.ROD_SPIN] ** 2
+    )
+    kinetic = 0.5 * (kinetic + SLIDER_MASS * seen[ideal.SLIDER_V] ** 2)
+    height = par[at.CRANK_MOMENT] * np.sin(ANGLES) + m2 * seen[ideal.ROD_Y]
+    total = kinetic + 9.81 * height
+    rest = total - total[0] - drive - load + lost
+    # the guide reaction changes sign inside a few intervals, where |N| has a kink
+    assert np.abs(rest).max() < 1e-6 * size[-1]
+    assert (np.diff(lost) >= 0).all()
+    assert (np.diff(size) >= 0).all()
+
+
+def test_tabulated_load_is_taken_at_the_crank_angle():
+    cells = periodic_cells(((0.0, 1.0), (1.0, 3.0), (3.0, -2.0), (5.0, 0.5)))
+    par = row_of_parameters(set(), None)
+    par[at.LOAD] = 1.0
+    seen = ideal.ideal_response(
+        at.Effects(load_table=1), par, cells, np.array([0.0, 1.0, 3.0, 5.0, 1.0 + at.TURN])
+    )
+    np.testing.assert_allclose(seen[ideal.LOAD_FORCE], [1.0, 3.0, -2.0, 0.5, 3.0], atol=1e-4)
+
+
+def test_outcomes_have_no_gap():
+    par = np.tile(row_of_parameters(set(), None), (3, 1))
+    par[:, at.PERIOD] = at.TURN / SPEED
+    rows = ideal.ideal_outcomes(par, 5, 4)
+    assert (
+        rows[:, [at.OUT_STATUS, at.OUT_OBJECTIVE, at.OUT_SPREAD, at.OUT_EVALUATIONS]] == 0
+    ).all()
+    np.testing.assert_allclose(rows[:, at.OUT_TIME], 9 * at.TURN / SPEED)
+    assert np.isnan(ideal.ideal_outcomes(par, 5, 1)[:, at.OUT_SPREAD]).all()
