@@ -5,13 +5,32 @@ from numpy.typing import NDArray
 
 from .kernel import layout as at
 from .kernel.lanes import Lanes
+from .kernel.lifecycle import STATE
 from .lowering import parameters, problem_of, start_states
 from .scene import Scene
 from .scene.points import Points
 from .status import OUTCOME, Flag, Status
 
+Array = NDArray[np.float64]
+
 DEFAULT_LANES = 32
 """Lanes of an ensemble; at least twice the vector length, or the compiler leaves them scalar."""
+
+KICK = 1e-10
+"""Relative size of the kicks to the start of a sample's copies."""
+
+COPIES = ((1.0, 1), (1.0, -1), (10.0, 0), (100.0, 0))
+"""Copies run beside a sample when its uncertainty is asked for: (tolerance divided by, sign of the kick)."""
+
+COVERAGE = 2.0
+"""Stated uncertainty over the scatter of sample and copies; chosen so that two runs overlap, see the manual."""
+
+HERTZ_RANGE = 0.25
+"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
+
+Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
+the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
+"""
 
 
 class Evaluator:
@@ -20,6 +39,7 @@ class Evaluator:
     Parameters
     ----------
     scene : Scene
+        With ``numerics.uncertainty`` each sample runs with kicked and stricter copies beside it.
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
@@ -35,43 +55,103 @@ class Evaluator:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
+        self._copies = 1 + len(COPIES) * scene.numerics.uncertainty
         self._lanes = Lanes(problem_of(scene), lanes)
+        self._partial: dict[int, NDArray[np.void]] = {}
 
     @property
     def pending(self) -> int:
-        """Samples submitted and not finished."""
-        return self._lanes.pending
+        """Samples submitted and not finished (copies count for a share)."""
+        return -(-self._lanes.pending // self._copies)
 
-    def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
+    def submit(self, index: NDArray[np.int64], points: Array) -> None:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
-        self._lanes.queue(par, start_states(self.scene, par), np.asarray(index, np.int64))
+        state = start_states(self.scene, par)
+        labels = np.asarray(index, np.int64) * self._copies
+        if self._copies > 1:
+            par, state, labels = with_copies(par, state, labels)
+        self._lanes.queue(par, state, labels)
 
     def advance(self, seconds: float) -> NDArray[np.void]:
         """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
         self._lanes.advance(seconds)
-        labels, rows = self._lanes.collect()
-        return outcome_records(labels, rows)
+        records = outcome_records(*self._lanes.collect())
+        return records if self._copies == 1 else self._join(records)
+
+    def _join(self, records: NDArray[np.void]) -> NDArray[np.void]:
+        """Records of samples whose copies are all in, with the uncertainty these state."""
+        done = []
+        for record in records:
+            sample, copy = divmod(int(record["sample"]), self._copies)
+            group = self._partial.setdefault(sample, np.zeros(self._copies, OUTCOME))
+            group[copy] = record
+            group["flags"][copy] |= _ARRIVED
+            if (group["flags"] & _ARRIVED).all():
+                done.append(joined(sample, self._partial.pop(sample)))
+        return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
-def outcome_records(labels: NDArray[np.int64], rows: NDArray[np.float64]) -> NDArray[np.void]:
-    """Kernel outcome rows (m, OUT) as records: numbers of failed samples are NaN."""
+_ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
+
+
+def with_copies(
+    par: Array, state: Array, labels: NDArray[np.int64]
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Each sample followed by its copies: kicked starts, and stricter tolerances."""
+    kicks = np.array([0] + [sign for _, sign in COPIES])
+    strict = np.array([1.0] + [factor for factor, _ in COPIES])
+    count, n = len(kicks), 2 * at.MAX_COORDINATES
+    par, state = np.repeat(par, count, axis=0), np.repeat(state, count, axis=0)
+    par[:, at.STRICTNESS] = np.tile(strict**2, len(labels))
+    # Signs alternate over the coordinates, so that the kick is no motion of the mechanism as a whole.
+    pattern = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)
+    state[:, :n] *= 1.0 + KICK * np.tile(kicks, len(labels))[:, None] * pattern
+    copies = (labels[:, None] + np.arange(count)).ravel()
+    return par, state[:, :STATE], copies
+
+
+def joined(sample: int, group: NDArray[np.void]) -> NDArray[np.void]:
+    """One record from a sample (first) and its copies: its own numbers, and how far they can be trusted."""
+    record = group[0].copy()
+    record["sample"] = sample
+    record["flags"] &= ~_ARRIVED
+    record["rhs_evaluations"] = group["rhs_evaluations"].sum()
+    values = group["objective"]
+    # A copy that failed leaves the uncertainty unknown, and NaN says so.
+    record["objective_uncertainty"] = COVERAGE * np.std(values, ddof=1)
+    return record
+
+
+def outcome_records(labels: NDArray[np.int64], rows: Array, par: Array) -> NDArray[np.void]:
+    """Kernel outcome rows (m, OUT) and parameters (m, PARAMETERS) as records: numbers of failed samples are NaN."""
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
     records["status"] = rows[:, at.OUT_STATUS]
     records["rhs_evaluations"] = rows[:, at.OUT_EVALUATIONS]
-    failed = records["status"] != Status.OK
+    valid = np.isin(records["status"], [status for status in Status if status.valid])
     records["objective"] = rows[:, at.OUT_OBJECTIVE]
     records["objective_spread"] = rows[:, at.OUT_SPREAD]
     records["objective_uncertainty"] = np.nan
     records["mean_gap"] = rows[:, [at.OUT_GAP_12, at.OUT_GAP_23]]
     records["peak_contact_force"] = rows[:, [at.OUT_PEAK_12, at.OUT_PEAK_23]]
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
-        records[name][failed] = np.nan
+        records[name][~valid] = np.nan
     latched = rows[:, [at.OUT_LATCHED_12, at.OUT_LATCHED_23]] == 1.0
-    records["latched"] = latched & ~failed[:, None]
-    records["flags"] = np.where(latched.any(axis=1) & ~failed, int(Flag.LATCHED), 0)
+    records["latched"] = latched & valid[:, None]
+    flags = int(Flag.LATCHED) * latched.any(axis=1) + int(Flag.BEYOND_HERTZ) * beyond_hertz(rows, par)
+    flags += int(Flag.STIFF) * (rows[:, at.OUT_STIFF_STEPS] > 0.0)
+    records["flags"] = np.where(valid, flags, 0)
     return records
+
+
+def beyond_hertz(rows: Array, par: Array) -> NDArray[np.bool_]:
+    """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
+    beyond = np.zeros(len(rows), bool)
+    for joint, deepest in ((at.JOINT_12, at.OUT_DEEPEST_12), (at.JOINT_23, at.OUT_DEEPEST_23)):
+        ratio = par[:, joint + at.JOURNAL_RADIUS] / par[:, joint + at.BEARING_RADIUS]
+        beyond |= rows[:, deepest] > HERTZ_RANGE * ratio * par[:, joint + at.CLEARANCE]
+    return beyond
 
 
 def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> NDArray[np.void]:

@@ -16,6 +16,9 @@ from .scene.points import Points
 
 Array = NDArray[np.float64]
 
+LEAST_AVERAGED = 10
+"""Revolutions before an automatic average may end: fewer say nothing about its standard error."""
+
 CELLS = 2048
 """Cells of a tabulated torque or load over one turn."""
 
@@ -146,11 +149,8 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     """What is common to all samples of a scene."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
-    averaged = scene.numerics.averaged_revolutions
-    if averaged == "auto":
-        raise InputError(
-            "numerics.averaged_revolutions", averaged, "is not available", "Give a number of revolutions"
-        )
+    averaged: Any = scene.numerics.averaged_revolutions
+    auto = averaged == "auto"
     return Problem(
         effects=effects_of(scene, series=series, ledger=ledger),
         coordinates=coordinate_count(scene),
@@ -159,7 +159,9 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         atol=absolute_tolerances(scene),
         impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
         transient=scene.numerics.transient_revolutions,
-        averaged=averaged,
+        averaged=LEAST_AVERAGED if auto else averaged,
+        averaged_cap=scene.numerics.max_averaged_revolutions if auto else averaged,
+        objective_tolerance=scene.numerics.objective_tolerance if auto else 0.0,
         max_steps=scene.numerics.max_steps,
         torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,  # type: ignore[arg-type]
         load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,  # type: ignore[arg-type]

@@ -49,7 +49,7 @@ def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
         lanes.advance(0.2)
         chunks.append(lanes.take_record())
     rows = np.concatenate(chunks)
-    labels, out = lanes.collect()
+    labels, out, finished = lanes.collect()
     s = rec.STATE
     contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
     steps = Steps(
@@ -62,7 +62,7 @@ def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
         rows[:, s + n : s + 2 * n],
         rows[:, s + 2 * n :],
     )
-    return steps, outcome_records(labels, out), par[0]
+    return steps, outcome_records(labels, out, finished), par[0]
 
 
 def _first_row(problem: Problem, par: Array, state: Array, n: int) -> Array:

@@ -12,13 +12,19 @@ JOINTS = ("crank_rod", "rod_slider")
 
 
 class Status(IntEnum):
-    """Outcome of one simulation; `OK` is the only one whose numbers are not NaN."""
+    """Outcome of one simulation. Numbers are NaN unless it is `valid`."""
 
     OK = 0
     STEP_CAP = 1
     STEP_TOO_SMALL = 2
     NOT_FINITE = 3
     STALLED = 4
+    AVERAGE_CAP = 5
+
+    @property
+    def valid(self) -> bool:
+        """Whether the simulation ran to its end, so that its numbers mean something."""
+        return self in (Status.OK, Status.AVERAGE_CAP)
 
     @property
     def message(self) -> str:
@@ -48,6 +54,10 @@ _TEXT = {
     Status.STALLED: (
         "the crank stopped before it had turned the revolutions asked for",
         "raise the drive torque, the initial speed or the flywheel inertia",
+    ),
+    Status.AVERAGE_CAP: (
+        "the standard error of the objective was still above its target at the last revolution allowed",
+        "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
     ),
 }
 

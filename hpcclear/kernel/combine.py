@@ -89,4 +89,4 @@ def step_error(crank_rod, rod_slider, work, stages, par, weights, ev, eq, n, rto
             dq = h * h * dq / (atol[k] + rtol * q)
             dv = h * dv / (atol[at.MAX_COORDINATES + k] + rtol * v)
             total += dq * dq + dv * dv
-        work[at.ERROR * W + i] = total * (0.5 / n)
+        work[at.ERROR * W + i] = total * (0.5 / n) * par[at.STRICTNESS * W + i]

@@ -8,18 +8,20 @@ from numpy.typing import NDArray
 
 from . import layout as at
 from .lifecycle import (
+    ANGLE_TOLERANCE,
     ATOL,
     AVERAGED,
+    AVERAGED_CAP,
     BETA,
     COUNTERS,
     EXPONENT,
     FINISHED,
     GAP_TOLERANCE,
-    IMPLICIT,
-    ANGLE_TOLERANCE,
     IMPACT_FLOOR,
+    IMPLICIT,
     MAX_STEPS,
     NEXT_SLOT,
+    OBJECTIVE_TOLERANCE,
     RECORDED,
     RTOL,
     SETTINGS,
@@ -55,6 +57,9 @@ class Problem:
     impact_floor : float
         Least latched impact speed, m/s.
     transient, averaged, max_steps : int
+    averaged_cap, objective_tolerance
+        The average goes on until the relative standard error of the objective is below this, or to the cap;
+        a tolerance of 0 averages over `averaged` revolutions.
     torque_table, load_table : numpy.ndarray
         Cubic cells of a periodic table, 4 coefficients a cell.
     implicit : str
@@ -70,6 +75,8 @@ class Problem:
     transient: int
     averaged: int
     max_steps: int
+    averaged_cap: int = 0
+    objective_tolerance: float = 0.0
     torque_table: Array = None  # type: ignore[assignment]
     load_table: Array = None  # type: ignore[assignment]
     implicit: str = "never"
@@ -85,6 +92,8 @@ class Problem:
         s[ANGLE_TOLERANCE] = max(self.rtol * 1e-3, 1e-13)
         s[IMPACT_FLOOR] = self.impact_floor
         s[TRANSIENT], s[AVERAGED], s[MAX_STEPS] = self.transient, self.averaged, self.max_steps
+        s[AVERAGED_CAP] = max(self.averaged_cap, self.averaged)
+        s[OBJECTIVE_TOLERANCE] = self.objective_tolerance
         s[SMALLEST_STEP] = 1e-14
         s[EXPONENT] = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s[BETA] = 0.04
@@ -221,9 +230,9 @@ class Lanes:
             )
         )
 
-    def collect(self) -> tuple[NDArray[np.int64], Array]:
-        """Labels (m,) and outcome rows (m, OUT) of what finished since the last call."""
+    def collect(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Labels (m,), outcome rows (m, OUT) and parameters (m, PARAMETERS) of what finished since the last call."""
         count = int(self.counters[FINISHED])
         slots = self._finished[:count].copy()
         self.counters[FINISHED] = 0
-        return self._labels[slots], self._out[slots]
+        return self._labels[slots], self._out[slots], self._queue_par[slots]

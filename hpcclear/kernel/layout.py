@@ -59,9 +59,10 @@ class Effects(NamedTuple):
     CRANK_NEAR,  # u1
     CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
     SLIDER_INERTIA,
-) = range(26)
-JOINT_12 = 26
-JOINT_23 = 36
+    STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
+) = range(27)
+JOINT_12 = 27
+JOINT_23 = 37
 # within a joint's block
 (
     CLEARANCE,
@@ -73,7 +74,7 @@ JOINT_23 = 36
     INVERSE_RAMP,
     DEAD_SPEED,
 ) = range(8)
-PARAMETERS = 46
+PARAMETERS = 47
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
 (GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
@@ -144,8 +145,11 @@ WORK = INTEGRAL + RATES + 31
     DISSIPATED,
     LOAD_WORK,
     ELAPSED,  # s, whole revolutions so far
-) = range(15)
-BOOK = 15
+    LAST_F,  # the objective of the revolution before
+    LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
+    FIRST_F,
+) = range(18)
+BOOK = 18
 
 # ---- one finished sample --------------------------------------------------------------------------
 (

@@ -12,6 +12,8 @@ STEP_CAP = int(Status.STEP_CAP)
 STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
 NOT_FINITE = int(Status.NOT_FINITE)
 STALLED = int(Status.STALLED)
+AVERAGE_CAP = int(Status.AVERAGE_CAP)
+UNFINISHED = -1
 
 # ---- settings shared by all lanes
 (
@@ -20,14 +22,16 @@ STALLED = int(Status.STALLED)
     ANGLE_TOLERANCE,  # rad, likewise for the end of a revolution of a free crank
     IMPACT_FLOOR,  # m/s, least latched impact speed
     TRANSIENT,  # revolutions
-    AVERAGED,
+    AVERAGED,  # revolutions; at least so many if OBJECTIVE_TOLERANCE > 0
+    AVERAGED_CAP,  # and at most so many
+    OBJECTIVE_TOLERANCE,  # relative standard error of the objective to reach; 0: a fixed number
     MAX_STEPS,
     SMALLEST_STEP,  # relative to the time
     EXPONENT,
     BETA,
     IMPLICIT,  # 0 never, 1 where the motion is stiff, 2 always
     ATOL,  # first of 2 * MAX_COORDINATES
-) = range(12)
+) = range(14)
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 
 # ---- counters shared by all lanes
@@ -209,8 +213,40 @@ def end_turn_of_free_crank(lane, W, work, settings, last):
 
 
 @lane_event
+def standard_error(count, m2, lag):
+    """Standard error of the mean of a revolution's objective, whose neighbours are correlated.
+
+    First-order autocorrelation: s/sqrt(n) times sqrt((1 + rho)/(1 - rho)); a negative rho is not trusted to help.
+    """
+    if count < 3.0 or m2 <= 0.0:
+        return 0.0 if count >= 3.0 else math.inf
+    rho = min(max(lag / m2, 0.0), 0.99)
+    return math.sqrt(m2 / (count - 1.0) / count * (1.0 + rho) / (1.0 - rho))
+
+
+@lane_event
+def verdict(lane, W, book, settings):
+    """Whether the average may end: a status, or UNFINISHED."""
+    averaged = book[at.COUNT_F * W + lane]
+    if averaged < settings[AVERAGED]:
+        return UNFINISHED
+    if settings[OBJECTIVE_TOLERANCE] == 0.0:
+        return OK
+    # sum of (f_k - mean)(f_{k+1} - mean) from products about the first f
+    mean = book[at.MEAN_F * W + lane]
+    shift = mean - book[at.FIRST_F * W + lane]
+    total = averaged * shift
+    last = book[at.LAST_F * W + lane] - book[at.FIRST_F * W + lane]
+    lag = book[at.LAG_F * W + lane] - shift * (2.0 * total - last) + (averaged - 1.0) * shift * shift
+    error = standard_error(averaged, book[at.M2_F * W + lane], lag)
+    if error <= settings[OBJECTIVE_TOLERANCE] * mean:
+        return OK
+    return AVERAGE_CAP if averaged >= settings[AVERAGED_CAP] else UNFINISHED
+
+
+@lane_event
 def end_revolution(lane, W, work, book, settings):
-    """Close the books of a revolution; True when it was the last one."""
+    """Close the books of a revolution; the status of the sample when it was the last one, else UNFINISHED."""
     time = work[at.TIME * W + lane]
     book[at.ELAPSED * W + lane] += time
     revolution = book[at.REVOLUTION * W + lane] + 1.0
@@ -223,6 +259,11 @@ def end_revolution(lane, W, work, book, settings):
         book[at.TIME_SUM * W + lane] += time
         f = math.sqrt(gap_12 * gap_12 + gap_23 * gap_23) / time
         count = book[at.COUNT_F * W + lane] + 1.0
+        if count == 1.0:
+            book[at.FIRST_F * W + lane] = f
+        first = book[at.FIRST_F * W + lane]
+        book[at.LAG_F * W + lane] += (f - first) * (book[at.LAST_F * W + lane] - first) * (count > 1.0)
+        book[at.LAST_F * W + lane] = f
         step = f - book[at.MEAN_F * W + lane]
         mean = book[at.MEAN_F * W + lane] + step / count
         book[at.M2_F * W + lane] += step * (f - mean)
@@ -243,4 +284,4 @@ def end_revolution(lane, W, work, book, settings):
     work[at.ENDED_23 * W + lane] = 0.0
     work[at.ENDING * W + lane] = 0.0
     work[at.AVERAGING * W + lane] = 1.0 if revolution >= settings[TRANSIENT] else 0.0
-    return revolution >= settings[TRANSIENT] + settings[AVERAGED]
+    return verdict(lane, W, book, settings)

@@ -26,6 +26,7 @@ from .lifecycle import (
     RTOL,
     SLOTS,
     SMALLEST_STEP,
+    UNFINISHED,
     end_revolution,
     end_turn_of_free_crank,
     failure,
@@ -223,8 +224,9 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                 for i in range(W):
                     if work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i] == 1.0:
                         wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
-                        if end_revolution(i, W, work, book, settings):
-                            finish(i, W, n, OK, work, book, out, finished, counters)
+                        status = end_revolution(i, W, work, book, settings)
+                        if status != UNFINISHED:
+                            finish(i, W, n, status, work, book, out, finished, counters)
                             load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
                             running += work[at.RUNNING * W + i] - 1.0
             if full:
