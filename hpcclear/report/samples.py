@@ -129,7 +129,7 @@ def _cloud(axes: "Axes", variable: xr.DataArray, result: xr.DataArray, colour: A
     x, y = _values(variable), _values(result)
     good = np.isfinite(y)
     size = float(np.clip(2000.0 / max(len(x), 1), 0.5, 6.0))
-    options = {
+    options: dict[str, Any] = {
         "s": size,
         "cmap": style.COLOURS,
         "linewidths": 0,

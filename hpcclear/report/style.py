@@ -112,9 +112,10 @@ def page(height: float) -> "Figure":
     """An empty figure of one column's width and `height` in mm."""
     matplotlib()
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH / 25.4, height / 25.4), dpi=300, layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.02, hspace=0.02)
+    pads = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.02, hspace=0.02)
+    figure = Figure(figsize=(WIDTH / 25.4, height / 25.4), dpi=300, layout=pads)
     return figure
 
 
