@@ -1,33 +1,47 @@
-"""A design of any scene through the dynamics, on all ranks: what `sample` and `run` share."""
+"""A design of any scene through the dynamics, on all ranks: what `sample` and `run` share.
 
+The kernel, scenes and files are imported where they are used: inside the rank boundary, where an import
+that fails on one rank ends them all.
+"""
+
+import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .checkpoint import Checkpoint
-from .evaluate import DEFAULT_LANES, Evaluator
 from .progress import Progress
 from .ranks import Maker, Ranks
-from .scene import Scene, load_scene
-from .scene.points import Points
+
+if TYPE_CHECKING:
+    from .checkpoint import Checkpoint
+    from .evaluate import Evaluator
+    from .scene import Scene
+    from .scene.points import Points
 
 KIND = "points"
 """The kind of stage that simulates designs; see `MAKERS`."""
 
 
-def payload_of(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> dict[str, Any]:
+def payload_of(scene: "Scene", points: "Points", lanes: int | None = None) -> dict[str, Any]:
     """What a rank needs to know before it gets points: plain content, small, the same everywhere.
 
     The study is left out: ranks simulate, whatever for.
     """
+    from .evaluate import DEFAULT_LANES
+
+    lanes = DEFAULT_LANES if lanes is None else lanes
     content = scene.resolved()
     content.pop("study", None)
     return {"scene": content, "names": points.names, "paths": points.paths, "lanes": lanes}
 
 
-def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Evaluator:
+def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Evaluator":
     """A rank's worker; the kernel is compiled by one rank of each node and loaded by the others."""
+    from .evaluate import Evaluator
+    from .scene import load_scene
+    from .scene.points import Points
+
     nothing = np.empty((0, len(payload["names"])))
     columns = Points(payload["names"], nothing, payload["paths"])
     evaluator = Evaluator(load_scene(payload["scene"]), columns, payload["lanes"])
@@ -39,11 +53,28 @@ MAKERS: Mapping[str, Maker] = {KIND: make_evaluator}
 """For `hpcclear.comm.run_on_ranks` and `hpcclear.comm.alone`."""
 
 
+def run_key(scene: "Scene", command: str, lanes: int | None = None) -> dict[str, str]:
+    """What makes a run what it is, so that only the same run goes on from its results.
+
+    The scene entry by entry, so that a message can name those that changed; besides, all that
+    shapes the last bits of a result. The number of ranks is not among it.
+    """
+    from .dataset import provenance
+    from .evaluate import DEFAULT_LANES
+    from .scene.paths import flatten
+
+    lanes = DEFAULT_LANES if lanes is None else lanes
+    origin = provenance(scene.text, scene.hash)
+    entries = {path: json.dumps(value) for path, value in flatten(scene.resolved())}
+    made_by = {name: origin[name] for name in ("hpcclear_version", "versions", "processor")}
+    return {"command": command, "lanes": str(lanes), **made_by, **entries}
+
+
 def sample_points(
-    scene: Scene,
-    points: Points,
+    scene: "Scene",
+    points: "Points",
     ranks: Ranks,
-    checkpoint: Checkpoint | None = None,
+    checkpoint: "Checkpoint | None" = None,
     progress: Progress | None = None,
     *,
     stage: str = "samples",
@@ -60,7 +91,7 @@ def sample_points(
         Made with `MAKERS`.
     checkpoint : Checkpoint, optional
         Knows the samples finished earlier, and gets each new one; its names are those of `points`.
-        Everything finished is on disk when this returns or raises.
+        Everything finished is on disk when this raises.
     progress : Progress, optional
     stage : str
         Name for reports and timing.
@@ -91,7 +122,7 @@ def sample_points(
             checkpoint.add(numbered, points.values[records["sample"]])
 
     try:
-        return ranks.run_points(
+        records = ranks.run_points(
             KIND,
             payload_of(scene, points),
             points.values,
@@ -100,7 +131,9 @@ def sample_points(
             on_records=keep,
             progress=progress,
         )
-    finally:
+    except BaseException:
         if checkpoint is not None:
             with ranks.writing():
                 checkpoint.flush()
+        raise
+    return records
