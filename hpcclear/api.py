@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import dataset
 from .errors import InputError
-from .evaluate import evaluate_records
+from .evaluator import evaluate_records
 from .scene import Scene
 from .scene.points import Points, check_points
 from .scene.variables import PAPER_PATHS

@@ -223,6 +223,11 @@ class Checkpoint:
         pieces = [part.records for part in self._parts] + [records for records, _ in self._buffer]
         return _join(pieces, [np.empty((len(piece), 0)) for piece in pieces])[0]
 
+    def contents(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
+        pieces = [(part.records, part.values) for part in self._parts] + self._buffer
+        return _join([records for records, _ in pieces], [values for _, values in pieces])
+
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
         records, values = _join([records], [values])
         content = dataset.samples_dataset(self.names, values, self.units, records, self.attributes)

@@ -111,7 +111,7 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
 
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
-    from .evaluate import DEFAULT_LANES, evaluate_records
+    from .evaluator import DEFAULT_LANES, evaluate_records
     from .scene.points import Points
 
     path = "mechanism.slider.mass"

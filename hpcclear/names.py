@@ -145,6 +145,8 @@ surface_rmae_mean    | surface clearance | 1 | largest test error over their mea
 surface_order        | surface clearance | count | order of the global surface
 surface_points       | surface clearance | count | points it was fitted to
 surface_accepted     | surface clearance | flag | whether it passed on its test points
+mean_objective       | clearance | m | mean of the objective over the box
+mean_objective_error | clearance | m | standard error of it
 sobol_first          | parameter | 1 | first-order Sobol index
 sobol_first_error    | parameter | 1 | its standard error
 sobol_total          | parameter | 1 | total Sobol index
@@ -232,6 +234,35 @@ samples  | rank stage | count | number of samples simulated
 command* |            | text  | the command that was run
 """
 
+_STATISTICS = """
+joint              | joint  | text  | joint
+bin                | bin    | count | number of the bin; the first lies below the edges, the last at or above
+edge               | edge   | count | number of the edge between two bins
+status             | status | flag  | how a simulation ended
+flags              | flags  | flag  | with which care a result is to be read
+samples_by_status* | status | count | number of samples that ended so
+samples_by_flag*   | flags  | count | number of samples with this flag
+"""
+
+_STATISTICS_OF = """
+{name}_count*     | {dims}      | count  | number of finite values of the {words}
+{name}_mean*      | {dims}      | {unit} | mean of the {words}
+{name}_deviation* | {dims}      | {unit} | sample standard deviation of the {words}
+{name}_minimum*   | {dims}      | {unit} | least {words}
+{name}_maximum*   | {dims}      | {unit} | greatest {words}
+{name}_histogram* | {dims} bin  | count  | number of samples by {words}
+{name}_edges*     | {dims} edge | {unit} | edges of the bins of the {words}
+"""
+
+for _row in (
+    {"name": "objective", "dims": "", "unit": "m", "words": "objective"},
+    {"name": "objective_spread", "dims": "", "unit": "m", "words": "deviation between revolutions"},
+    {"name": "mean_gap", "dims": "joint", "unit": "m", "words": "mean gap"},
+    {"name": "peak_contact_force", "dims": "joint", "unit": "N", "words": "peak contact force"},
+    {"name": "rhs_evaluations", "dims": "", "unit": "1", "words": "number of force evaluations"},
+):
+    _STATISTICS += _STATISTICS_OF.format(**_row)
+
 _DTYPES = {"count": ("1", "i8"), "flag": ("", "i1"), "text": ("", "text")}
 
 
@@ -271,6 +302,7 @@ KINDS = {
     "verification": _kind("Designs simulated directly", _VERIFICATION, ("design",)),
     "claims": _kind("What the paper claims, tested on our data", _CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", _READINGS),
+    "statistics": _kind("Statistics of many samples, streamed", _STATISTICS),
     "timing": _kind("Where the time went", _TIMING),
 }
 """Every result file by its kind."""

@@ -8,7 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from . import dataset, geometry
-from .evaluate import outcome_records
+from .evaluator import outcome_records
 from .kernel import layout as at
 from .kernel import record as rec
 from .kernel.lanes import Lanes, Problem

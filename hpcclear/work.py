@@ -15,7 +15,7 @@ from .ranks import Maker, Ranks
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
-    from .evaluate import Evaluator
+    from .evaluator import Evaluator
     from .scene import Scene
     from .scene.points import Points
 
@@ -28,7 +28,7 @@ def payload_of(scene: "Scene", points: "Points", lanes: int | None = None) -> di
 
     The study is left out: ranks simulate, whatever for.
     """
-    from .evaluate import DEFAULT_LANES
+    from .evaluator import DEFAULT_LANES
 
     lanes = DEFAULT_LANES if lanes is None else lanes
     content = scene.resolved()
@@ -38,7 +38,7 @@ def payload_of(scene: "Scene", points: "Points", lanes: int | None = None) -> di
 
 def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Evaluator":
     """A rank's worker; the kernel is compiled by one rank of each node and loaded by the others."""
-    from .evaluate import Evaluator
+    from .evaluator import Evaluator
     from .scene import load_scene
     from .scene.points import Points
 
@@ -60,7 +60,7 @@ def run_key(scene: "Scene", command: str, lanes: int | None = None) -> dict[str,
     shapes the last bits of a result. The number of ranks is not among it.
     """
     from .dataset import provenance
-    from .evaluate import DEFAULT_LANES
+    from .evaluator import DEFAULT_LANES
     from .scene.paths import flatten
 
     lanes = DEFAULT_LANES if lanes is None else lanes

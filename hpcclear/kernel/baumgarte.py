@@ -17,11 +17,14 @@ from ..physics.angles import sincos
 from . import layout as at
 from .motion import (
     drive_moment_of,
+    either_product,
     gravity_of,
+    guide_friction,
     guide_ratio,
     guided_crank,
     joint_force,
     load_of,
+    product,
     reaction_slope,
     sliding_pair,
     store_power,
@@ -114,7 +117,7 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, torque_table, lo
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
     # on the crank about its bearing, from everything but the rod
-    rest = moment * (s * rx - c * ry - g * c)
+    rest = moment * (s * rx - c * ry) - product(effects.gravity, moment * c, g)
     alpha1, drive, friction = bodies(
         effects, crank_rod, rod_slider, work, par, s, c, st, ct, phi, omega, spin, v3, ay3, pin,
         e12, de12, e23, de23, force_1, force_2, g, load, torque, rest, i, W,
@@ -206,8 +209,9 @@ def free_rod(effects, work, par, st, ct, v3, ay3, force_1, force_2, g, load, i, 
 @lane_function
 def free_slider(effects, work, par, v3, ay3, fx, fy, g, load, i, W):
     """Slider with an open joint, (fx, fy) its force on the rod. Returns the guide's friction."""
-    reaction = par[at.SLIDER_MASS * W + i] * (ay3 + g) + fy
-    friction = guide_ratio(effects.guide, par, v3, i, W) * abs(reaction)
+    friction = guide_friction(
+        effects.guide, par, v3, par[at.SLIDER_MASS * W + i] * (ay3 + g) + fy, i, W
+    )
     work[(at.ACC + X3) * W + i] = (load - fx - friction) * par[at.INV_SLIDER_MASS * W + i]
     return friction
 
@@ -331,7 +335,12 @@ def closed_chain(
     y20 = by - far * (ct * k0 - st * w2)
     inertia = par[at.CRANK_INERTIA * W + i] + m2 * (x2 * x2 + y2 * y2) + i2 * k * k + m3 * x3 * x3
     force = (
-        torque + rest + load * x3 - m2 * (x2 * x20 + y2 * (y20 + g)) - i2 * k * k0 - m3 * x3 * x30
+        torque
+        + rest
+        + either_product(effects.load, effects.load_table, load, x3)
+        - m2 * (x2 * x20 + y2 * (y20 + g))
+        - i2 * k * k0
+        - m3 * x3 * x30
     )
     n1 = reaction_slope(par, st, ct, k, x2, y2, x3, i, W)
     n0 = reaction_slope(par, st, ct, k0, x20, y20 + g, x30, i, W) + load * st / ct + m3 * (g + ay3)
@@ -354,10 +363,18 @@ def chain_acceleration(
         return guided_crank(guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
     else:
         alpha1 = crank_acceleration(None, par, inertia, force, phi, omega, time, i, W)
+        return alpha1, known_guide_friction(guide, par, n0 + n1 * alpha1, slope, v3, i, W)
+
+
+@lane_function
+def known_guide_friction(guide, par, free, slope, v3, i, W):
+    """Guide friction f = ratio |N| where N = free - slope f."""
+    if guide is not None:
         ratio = guide_ratio(guide, par, v3, i, W)
-        push = n0 + n1 * alpha1
-        ratio = ratio if push >= 0.0 else -ratio
-        return alpha1, ratio * push / (1.0 + slope * ratio)
+        ratio = ratio if free >= 0.0 else -ratio
+        return ratio * free / (1.0 + slope * ratio)
+    else:
+        return 0.0
 
 
 def constraint_violation(

@@ -38,6 +38,24 @@ def table_value(table, angle):
 
 
 @lane_function
+def product(flag, a, b):
+    """a b, or 0 with the effect off: a product with 0 is not dropped by the compiler, since b may be infinite."""
+    if flag is not None:
+        return a * b
+    else:
+        return 0.0
+
+
+@lane_function
+def either_product(flag, other, a, b):
+    """`product` for an effect with two forms: friction laws, constant and tabulated loads."""
+    if flag is not None:
+        return a * b
+    else:
+        return product(other, a, b)
+
+
+@lane_function
 def gravity_of(gravity, par, i, W):
     if gravity is not None:
         return par[at.GRAVITY * W + i]
@@ -71,6 +89,15 @@ def guide_ratio(guide, par, speed, i, W):
     if guide is not None:
         ramp = saturated(speed * par[at.GUIDE_INVERSE_RAMP * W + i])
         return par[at.GUIDE_COEFFICIENT * W + i] * ramp
+    else:
+        return 0.0
+
+
+@lane_function
+def guide_friction(guide, par, speed, reaction, i, W):
+    """Friction of the guide on the slider, against +x, in N, for a reaction that does not depend on it."""
+    if guide is not None:
+        return guide_ratio(guide, par, speed, i, W) * abs(reaction)
     else:
         return 0.0
 
@@ -121,23 +148,27 @@ def joint_force(
     arm_bearing = par[(joint + at.BEARING_RADIUS) * W + i] + 0.5 * depth
     arm_journal = par[(joint + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
     sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
-    tangential = normal * friction_ratio(
-        effects.coulomb,
-        effects.ambrosio,
+    coulomb, ambrosio = effects.coulomb, effects.ambrosio
+    ratio = friction_ratio(
+        coulomb,
+        ambrosio,
         par[(joint + at.FRICTION) * W + i],
         par[(joint + at.DEAD_SPEED) * W + i],
         par[(joint + at.INVERSE_RAMP) * W + i],
         sliding,
     )
-    fx = normal * nx - tangential * ny
-    fy = normal * ny + tangential * nx
+    tangential = either_product(coulomb, ambrosio, normal, ratio)
+    fx = normal * nx - either_product(coulomb, ambrosio, tangential, ny)
+    fy = normal * ny + either_product(coulomb, ambrosio, tangential, nx)
+    moment_bearing = either_product(coulomb, ambrosio, tangential, arm_bearing)
+    moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
-    loss = (normal - elastic) * rate + tangential * sliding
+    loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
     work[(at.RATE_NOW + row) * W + i] = gap
     work[(at.RATE_NOW + row + 1) * W + i] = normal
     work[(at.RATE_NOW + row + 2) * W + i] = rate
     store_friction(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
-    return fx, fy, arm_bearing * tangential, -arm_journal * tangential, loss
+    return fx, fy, moment_bearing, -moment_journal, loss
 
 
 @lane_function
@@ -235,16 +266,19 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
     )
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
-    ratio = guide_ratio(effects.guide, par, v3, i, W)
-    reaction = abs(fy2 + par[at.SLIDER_MASS * W + i] * g)
+    guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
-    crank_load = crank * (sphi * fx1 - cphi * fy1) + mj1 - par[at.CRANK_MOMENT * W + i] * g * cphi
+    crank_load = (
+        crank * (sphi * fx1 - cphi * fy1)
+        + mj1
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
+    )
     inverse_mass = par[at.INV_ROD_MASS * W + i]
     moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2) + mb1 + mb2
     work[at.ACC * W + i] = (fx1 + fx2) * inverse_mass
     work[(at.ACC + 1) * W + i] = (fy1 + fy2) * inverse_mass - g
     work[(at.ACC + 2) * W + i] = moment * par[at.INV_ROD_INERTIA * W + i]
-    work[(at.ACC + 3) * W + i] = (load - fx2 - ratio * reaction) * par[at.INV_SLIDER_MASS * W + i]
+    work[(at.ACC + 3) * W + i] = (load - fx2 - guide) * par[at.INV_SLIDER_MASS * W + i]
     store_crank(
         effects.torque, work, 4, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
     )
@@ -254,7 +288,7 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
         work,
         drive_moment_of(effects.torque, torque, -crank_load),
         omega,
-        loss1 + loss2 + ratio * reaction * v3,
+        loss1 + loss2 + guide * v3,
         load * v3,
         i,
         W,
@@ -299,7 +333,7 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
     a12 = m2 * far * st
     a22 = m2 + m3
-    b1 = length * (st * fx - ct * fy) + mb + m2 * g * far * ct
+    b1 = length * (st * fx - ct * fy) + mb + product(effects.gravity, m2 * far * ct, g)
     b2 = fx + load - m2 * far * ct * spin * spin
     alpha, a3, friction = sliding_pair(
         effects.guide,
@@ -320,7 +354,11 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     )
     work[at.ACC * W + i] = alpha
     work[(at.ACC + 1) * W + i] = a3
-    crank_load = crank * (sphi * fx - cphi * fy) + mj - par[at.CRANK_MOMENT * W + i] * g * cphi
+    crank_load = (
+        crank * (sphi * fx - cphi * fy)
+        + mj
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
+    )
     store_crank(
         effects.torque, work, 2, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
     )
@@ -398,18 +436,22 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
     torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
-    ratio = guide_ratio(effects.guide, par, v3, i, W)
-    reaction = abs(fy + par[at.SLIDER_MASS * W + i] * g)
+    guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
     m2 = par[at.ROD_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near
     coupling = m2 * near * crank
     cos_d = cphi * ct + sphi * st
     sin_d = sphi * ct - cphi * st  # sin(phi - theta)
-    b1 = length * (ct * fy - st * fx) + mb - m2 * g * near * ct + coupling * omega * omega * sin_d
+    b1 = (
+        length * (ct * fy - st * fx)
+        + mb
+        - product(effects.gravity, m2 * near * ct, g)
+        + coupling * omega * omega * sin_d
+    )
     # moment about the crank's bearing from everything but the drive and the angular accelerations
     b3 = (
         crank * (cphi * fy - sphi * fx)
-        - (par[at.CRANK_MOMENT * W + i] + m2 * crank) * g * cphi
+        - product(effects.gravity, (par[at.CRANK_MOMENT * W + i] + m2 * crank) * cphi, g)
         - coupling * spin * spin * sin_d
     )
     alpha, crank_alpha = crank_pair(
@@ -421,7 +463,7 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
         b3 + torque,
     )
     work[at.ACC * W + i] = alpha
-    work[(at.ACC + 1) * W + i] = (load - fx - ratio * reaction) * par[at.INV_SLIDER_MASS * W + i]
+    work[(at.ACC + 1) * W + i] = (load - fx - guide) * par[at.INV_SLIDER_MASS * W + i]
     store_crank(effects.torque, work, 2, crank_alpha, i, W)
     store_power(
         effects.ledger,
@@ -429,7 +471,7 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
         work,
         drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3),
         omega,
-        loss + ratio * reaction * v3,
+        loss + guide * v3,
         load * v3,
         i,
         W,
@@ -480,8 +522,8 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
     change = m2 * (x2 * dx2 + y2 * dy2) + par[at.ROD_INERTIA * W + i] * k * dk + m3 * x3 * dx3
     force = (
         torque
-        + load * x3
-        - g * (par[at.CRANK_MOMENT * W + i] * cphi + m2 * y2)
+        + either_product(effects.load, effects.load_table, load, x3)
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi + m2 * y2, g)
         - change * omega * omega
     )
     w2 = omega * omega

@@ -22,7 +22,7 @@ KICK = 1e-10
 COPIES = ((1.0, 1), (1.0, -1), (10.0, 0), (100.0, 0))
 """Copies run beside a sample when its uncertainty is asked for: (tolerance divided by, sign of the kick)."""
 
-COVERAGE = 2.0
+COVERAGE = 2.1
 """Stated uncertainty over the scatter of sample and copies; chosen so that two runs overlap, see the manual."""
 
 HERTZ_RANGE = 0.25
