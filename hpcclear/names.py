@@ -55,6 +55,10 @@ FURTHER: dict[str, dict[str, object]] = {
         "flag_values": np.array([int(status) for status in Status], np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     },
+    "outcome": {
+        "flag_values": np.array([int(status) for status in Status], np.int8),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
+    },
     "flags": {
         "flag_masks": np.array([int(flag) for flag in Flag], np.int8),
         "flag_meanings": " ".join(flag.name.lower() for flag in Flag),
@@ -238,9 +242,9 @@ _STATISTICS = """
 joint              | joint  | text  | joint
 bin                | bin    | count | number of the bin; the first lies below the edges, the last at or above
 edge               | edge   | count | number of the edge between two bins
-status             | status | flag  | how a simulation ended
+outcome            | outcome | flag  | how a simulation ended
 flags              | flags  | flag  | with which care a result is to be read
-samples_by_status* | status | count | number of samples that ended so
+samples_by_status* | outcome | count | number of samples that ended so
 samples_by_flag*   | flags  | count | number of samples with this flag
 """
 

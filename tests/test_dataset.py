@@ -91,6 +91,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "verification": "mean_true deviation_true",
         "claims": "text verdict figure",
         "readings": "objective_smallest mean deviation",
+        "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
         "timing": "busy idle compile write command",
     }
     dims = {
@@ -102,6 +103,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "verification": "design",
         "claims": "claim",
         "readings": "reading design",
+        "statistics": "joint bin edge",
         "timing": "rank stage",
     }
     assert set(KINDS) == set(contract)

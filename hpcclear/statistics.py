@@ -1,0 +1,332 @@
+"""Statistics of direct Monte Carlo as the samples finish, without keeping them.
+
+Samples are gathered by fixed blocks of indices. A block that is complete becomes one partial result, worked
+out in the order of its indices, and partial results are merged in the order of the blocks: so the numbers
+are the same bit for bit whichever rank made which sample, and whenever. Only blocks that are still incomplete
+are held in memory.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .status import OUTCOME, Flag, Status
+
+Array = NDArray[np.float64]
+
+BLOCK = 4096
+"""Samples in a block. Part of what makes results reproducible: another length merges in another order."""
+
+BINS = 200
+"""Bins of a histogram, besides one below and one above."""
+
+QUANTITIES = ("objective", "objective_spread", "mean_gap", "peak_contact_force", "rhs_evaluations")
+"""Fields of `hpcclear.status.OUTCOME` that are summarised; those with two joints fill two rows."""
+
+ROWS = tuple((name, k) for name in QUANTITIES for k in range(max(1, *OUTCOME[name].shape, 1)))
+"""Every summarised number: field, joint (0 for scalars)."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Statistics of some samples; of none, when made by `empty`.
+
+    Attributes
+    ----------
+    count : ndarray of int64, shape (rows,)
+        Finite numbers, for each of `ROWS`.
+    mean, squares, minimum, maximum : ndarray of float, shape (rows,)
+        Mean, sum of squared deviations from it, extremes; SI.
+    histogram : ndarray of int64, shape (rows, bins + 2)
+        Numbers below the edges, between each two, and at or above the last.
+    status : ndarray of int64, shape (outcomes,)
+        Samples by `hpcclear.status.Status`.
+    flags : ndarray of int64, shape (flags,)
+        Samples by `hpcclear.status.Flag`.
+    """
+
+    count: NDArray[np.int64]
+    mean: Array
+    squares: Array
+    minimum: Array
+    maximum: Array
+    histogram: NDArray[np.int64]
+    status: NDArray[np.int64]
+    flags: NDArray[np.int64]
+
+    @property
+    def deviation(self) -> Array:
+        """Sample standard deviation, shape (rows,); NaN for fewer than two numbers."""
+        freedom = np.where(self.count > 1, self.count - 1, 1)
+        return np.where(self.count > 1, np.sqrt(self.squares / freedom), np.nan)
+
+    def quantile(self, probability: float, edges: Array) -> Array:
+        """Quantiles read off the histogram, linear within a bin; NaN in the outer bins, shape (rows,)."""
+        found = np.full(len(ROWS), np.nan)
+        for row, counts in enumerate(self.histogram):
+            below = np.concatenate([[0], np.cumsum(counts)])
+            wanted = probability * below[-1]
+            cell = int(np.searchsorted(below, wanted, side="left")) - 1
+            if below[-1] > 0 and 1 <= cell <= len(counts) - 2:
+                share = (wanted - below[cell]) / counts[cell]
+                low, high = edges[row, cell - 1], edges[row, cell]
+                found[row] = low + share * (high - low)
+        return found
+
+
+def empty(bins: int = BINS) -> Summary:
+    """The summary of no samples."""
+    rows = len(ROWS)
+    return Summary(
+        np.zeros(rows, np.int64),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.full(rows, np.inf),
+        np.full(rows, -np.inf),
+        np.zeros((rows, bins + 2), np.int64),
+        np.zeros(len(Status), np.int64),
+        np.zeros(len(Flag), np.int64),
+    )
+
+
+def columns(records: np.ndarray) -> Array:
+    """The summarised numbers of records (m,) of `OUTCOME`, shape (rows, m); NaN where a sample failed."""
+    pieces = [np.atleast_2d(records[name].T).astype(float) for name in QUANTITIES]
+    values = np.concatenate(pieces)
+    values[:, records["status"] != Status.OK] = np.nan
+    return values
+
+
+def histogram_edges(records: np.ndarray, bins: int = BINS) -> Array:
+    """Edges that suit some first samples, shape (rows, bins + 1): their range and half as much on both sides."""
+    edges = np.empty((len(ROWS), bins + 1))
+    for row, values in enumerate(columns(records)):
+        known = values[np.isfinite(values)]
+        low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
+        margin = max(0.5 * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-300)
+        edges[row] = np.linspace(low - margin, high + margin, bins + 1)
+    return edges
+
+
+def summarise(records: np.ndarray, edges: Array) -> Summary:
+    """Summary of records of `OUTCOME`, shape (m,), in their order; `edges` as `histogram_edges`."""
+    result = empty(edges.shape[1] - 1)
+    for row, values in enumerate(columns(records)):
+        known = values[np.isfinite(values)]
+        result.count[row] = known.size
+        if known.size == 0:
+            continue
+        result.mean[row] = known.mean()
+        result.squares[row] = np.square(known - known.mean()).sum()
+        result.minimum[row], result.maximum[row] = known.min(), known.max()
+        cells = np.searchsorted(edges[row], known, side="right")
+        result.histogram[row] = np.bincount(cells, minlength=edges.shape[1] + 1)
+    result.status[:] = np.bincount(records["status"], minlength=len(Status))
+    for k, flag in enumerate(Flag):
+        result.flags[k] = np.count_nonzero(records["flags"] & int(flag))
+    return result
+
+
+def merge(first: Summary, second: Summary) -> Summary:
+    """Summary of both (Chan, Golub and LeVeque 1983, doi:10.1080/00031305.1983.10483115)."""
+    count = first.count + second.count
+    share = second.count / np.maximum(count, 1)
+    apart = second.mean - first.mean
+    return Summary(
+        count,
+        first.mean + apart * share,
+        first.squares + second.squares + np.square(apart) * first.count * share,
+        np.minimum(first.minimum, second.minimum),
+        np.maximum(first.maximum, second.maximum),
+        first.histogram + second.histogram,
+        first.status + second.status,
+        first.flags + second.flags,
+    )
+
+
+class Accumulator:
+    """Takes the samples of a design as they finish, in any order, and keeps their statistics.
+
+    Parameters
+    ----------
+    total : int
+        Samples of the design, at least 1.
+    block, bins : int
+        Samples a block, bins of each histogram.
+    on_block : callable, optional
+        Gets number and records (in index order) of every block that is complete; it may keep raw samples.
+    """
+
+    def __init__(
+        self,
+        total: int,
+        *,
+        block: int = BLOCK,
+        bins: int = BINS,
+        on_block: Callable[[int, np.ndarray], object] | None = None,
+    ) -> None:
+        if total < 1 or block < 1 or bins < 1:
+            raise ValueError("samples, length of a block and bins must be positive")
+        self.total, self.block, self.bins = total, block, bins
+        self.blocks = -(-total // block)
+        self.edges: Array | None = (
+            None  # chosen from block 0, so that they are the same in every run
+        )
+        self._on_block = on_block
+        self._open: dict[int, np.ndarray] = {}  # records by block; sample -1: not here yet
+        self._missing: dict[int, int] = {}
+        self._ready: dict[int, Summary] = {}  # complete, waiting for an earlier block
+        self._merged = empty(bins)
+        self._next = 0  # first block that is not merged
+
+    @property
+    def complete(self) -> bool:
+        """Whether every sample was taken."""
+        return self._next == self.blocks
+
+    @property
+    def held(self) -> int:
+        """Blocks held in memory because they, or block 0, are incomplete."""
+        return len(self._open)
+
+    def _length(self, number: int) -> int:
+        return min(self.block, self.total - number * self.block)
+
+    def add(self, records: np.ndarray) -> None:
+        """Take finished samples, records of `OUTCOME` (m,).
+
+        Raises
+        ------
+        ValueError
+            If a sample is not of this design, or was taken before.
+        """
+        sample = records["sample"]
+        if sample.size and not (sample.min() >= 0 and sample.max() < self.total):
+            raise ValueError(f"a sample lies outside 0..{self.total - 1}")
+        numbers = sample // self.block
+        for number in np.unique(numbers).tolist():
+            self._put(number, records[numbers == number])
+        self._reduce()
+
+    def _put(self, number: int, records: np.ndarray) -> None:
+        if number < self._next or number in self._ready:
+            raise ValueError(f"samples of block {number} were taken before")
+        if number not in self._open:
+            self._open[number] = np.zeros(self._length(number), OUTCOME)
+            self._open[number]["sample"] = -1
+            self._missing[number] = self._length(number)
+        slots = records["sample"] - number * self.block
+        if np.unique(slots).size != slots.size or (self._open[number]["sample"][slots] >= 0).any():
+            raise ValueError(f"a sample of block {number} was taken before")
+        self._open[number][slots] = records
+        self._missing[number] -= slots.size
+
+    def _reduce(self) -> None:
+        """Summarise complete blocks and merge those whose turn it is."""
+        if self.edges is None:
+            if self._missing.get(0) != 0:
+                return
+            self.edges = histogram_edges(self._open[0], self.bins)
+        for number in sorted(n for n, missing in self._missing.items() if missing == 0):
+            if self._on_block is not None:
+                self._on_block(number, self._open[number])
+            self._ready[number] = summarise(self._open.pop(number), self.edges)
+            del self._missing[number]
+        while self._next in self._ready:
+            self._merged = merge(self._merged, self._ready.pop(self._next))
+            self._next += 1
+
+    def result(self) -> Summary:
+        """Statistics of the whole design.
+
+        Raises
+        ------
+        RuntimeError
+            If samples are missing.
+        """
+        if not self.complete:
+            raise RuntimeError("statistics are asked for before every sample has finished")
+        return self._merged
+
+    def remaining(self) -> "Remaining":
+        """The samples that were not taken yet."""
+        done = np.zeros(self.blocks, bool)
+        done[: self._next] = True
+        done[list(self._ready)] = True
+        done[list(self._open)] = True
+        loose = [
+            np.flatnonzero(held["sample"] < 0) + number * self.block
+            for number, held in sorted(self._open.items())
+        ]
+        scattered = np.concatenate(loose) if loose else np.empty(0, np.int64)
+        return Remaining(scattered, np.flatnonzero(~done), self.block, self.total)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All of it as plain arrays, for a checkpoint; see `restore`."""
+        ready = sorted(self._ready)
+        held = [part[part["sample"] >= 0] for _, part in sorted(self._open.items())]
+        records = np.concatenate(held) if held else np.empty(0, OUTCOME)
+        data = {"layout": np.array([self.total, self.block, self.bins, self._next])}
+        data["ready"] = np.array(ready, np.int64)
+        if self.edges is not None:
+            data["edges"] = self.edges
+        for field in fields(Summary):
+            rows = [self._merged, *(self._ready[number] for number in ready)]
+            data[f"summary_{field.name}"] = np.stack([getattr(row, field.name) for row in rows])
+        return {**data, **{f"record_{name}": records[name] for name in OUTCOME.names or ()}}
+
+    def restore(self, data: Mapping[str, ArrayLike]) -> None:
+        """Go on from a `state` of an accumulator of the same layout; this one is new.
+
+        Raises
+        ------
+        ValueError
+            If the layout differs.
+        """
+        arrays = {name: np.asarray(values) for name, values in data.items()}
+        if arrays["layout"][:3].tolist() != [self.total, self.block, self.bins]:
+            raise ValueError("the state is of other statistics")
+        self.edges = arrays.get("edges")
+        rows = [
+            Summary(*(arrays[f"summary_{field.name}"][k] for field in fields(Summary)))
+            for k in range(len(arrays["ready"]) + 1)
+        ]
+        self._merged, self._next = rows[0], int(arrays["layout"][3])
+        self._ready = dict(zip(arrays["ready"].tolist(), rows[1:], strict=True))
+        records = np.empty(len(arrays["record_sample"]), OUTCOME)
+        for name in OUTCOME.names or ():
+            records[name] = arrays[f"record_{name}"]
+        self.add(records)
+
+
+class Remaining:
+    """Numbers of the samples still to be made, without a list of them all.
+
+    Position k of this sequence is the k-th sample to be handed out: first what is missing of blocks begun, then
+    whole blocks in order.
+    """
+
+    def __init__(
+        self, scattered: NDArray[np.int64], whole: NDArray[np.int64], block: int, total: int
+    ) -> None:
+        self._scattered, self._whole = scattered.astype(np.int64), whole.astype(np.int64)
+        self._block = block
+        size = self._whole.size * block
+        if self._whole.size and self._whole[-1] == (total - 1) // block:
+            size -= (self._whole[-1] + 1) * block - total  # the last block may be short
+        self._size = int(self._scattered.size + size)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def samples(self, position: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Sample numbers at some positions, shape (m,)."""
+        place = np.asarray(position, np.int64) - self._scattered.size
+        found = np.empty(place.shape, np.int64)
+        loose = place < 0
+        found[loose] = self._scattered[place[loose] + self._scattered.size]
+        found[~loose] = self._whole[place[~loose] // self._block] * self._block
+        found[~loose] += place[~loose] % self._block
+        return found

@@ -1,0 +1,231 @@
+"""Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
+
+import sys
+import time
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from . import __version__, dataset, storage
+from .checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from .errors import InputError
+from .lock import Lock
+from .progress import Progress, Style
+from .ranks import Ranks
+from .sampling import monte_carlo
+from .scene import Scene
+from .scene.paths import flatten
+from .scene.points import Points
+from .statistics import BINS, BLOCK, ROWS, Accumulator, Remaining, Summary
+from .status import JOINTS, OUTCOME, Flag, Status
+from .work import KIND, payload_of
+
+STAGE = "statistics"
+
+_PAGE = BLOCK  # points made at a time: a page is a block of samples
+_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
+
+
+class MonteCarloPoints:
+    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    total : int
+        Number of points.
+    """
+
+    def __init__(self, scene: Scene, total: int) -> None:
+        self._scene, self._total = scene, total
+        self._pages: OrderedDict[int, Points] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._total
+
+    def page(self, number: int) -> Points:
+        """Points `number` * 4096 and on, at most 4096 of them."""
+        if number not in self._pages:
+            first = number * _PAGE
+            count = min(_PAGE, self._total - first)
+            self._pages[number] = monte_carlo(self._scene, count, first=first)
+            if len(self._pages) > _PAGES:
+                self._pages.popitem(last=False)
+        self._pages.move_to_end(number)
+        return self._pages[number]
+
+    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        index = np.asarray(index, np.int64)
+        values = np.empty((index.size, len(self.page(0).names)))
+        numbers = index // _PAGE
+        for number in np.unique(numbers).tolist():
+            here = numbers == number
+            values[here] = self.page(number).values[index[here] - number * _PAGE]
+        return values
+
+
+class _Left:
+    """The points that are left, in the order they are handed out."""
+
+    def __init__(self, points: MonteCarloPoints, remaining: Remaining) -> None:
+        self._points, self._remaining = points, remaining
+
+    def __len__(self) -> int:
+        return len(self._remaining)
+
+    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        return self._points[self._remaining.samples(index)]
+
+
+def run_statistics(
+    scene: Scene,
+    output: Path,
+    ranks: Ranks,
+    *,
+    samples: int | None = None,
+    raw: Path | None = None,
+    fresh: bool = False,
+    style: Style = "auto",
+) -> xr.Dataset:
+    """Simulate Monte Carlo samples on all ranks and write their statistics; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study that samples by Monte Carlo.
+    output : Path
+        NetCDF file of kind ``statistics``; what is unfinished goes into a hidden directory beside it.
+    ranks : Ranks
+        Made with `hpcclear.work.MAKERS`.
+    samples : int, optional
+        Number of samples, the study's by default.
+    raw : Path, optional
+        Directory for the samples themselves, a file of kind ``samples`` for every 4096.
+    fresh : bool
+        Start anew beside an earlier result.
+    style : str
+        How progress is shown.
+
+    Raises
+    ------
+    InputError, StorageError, Stopped, RankFailed
+    """
+    if scene.study is None or scene.study.method == "lhs":
+        method = None if scene.study is None else scene.study.method
+        raise InputError(
+            "study.method",
+            method,
+            "statistics are streamed for Monte Carlo samples only",
+            'Set method = "monte-carlo" in [study]',
+        )
+    storage.probe(output)
+    output = fresh_sibling(output) if fresh else output
+    points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
+    entries = {name: repr(value) for name, value in flatten(scene.resolved())}
+    layout = f"{len(points)} in blocks of {BLOCK}, {BINS} bins"
+    key = {**entries, "hpcclear version": __version__, "statistics": layout}
+    with Lock(output.parent, f".{output.name}.lock"):
+        if output.exists():
+            content = dataset.read(output, "statistics")
+            check_key(content, key, output)
+            return content
+        return _accumulate(scene, points, output, key, ranks, raw, style)
+
+
+def _accumulate(
+    scene: Scene,
+    points: MonteCarloPoints,
+    output: Path,
+    key: dict[str, str],
+    ranks: Ranks,
+    raw: Path | None,
+    style: Style,
+) -> xr.Dataset:
+    """Simulate what is left, with the statistics so far on disk every few seconds."""
+    attributes = {
+        **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+        **key_attribute(key),
+    }
+    checkpoint = Checkpoint(output.parent / f".{output.name}.parts", key, attributes=attributes)
+    if raw is not None:
+        storage.make_directory(raw)
+
+    def keep_raw(number: int, records: np.ndarray) -> None:
+        if raw is not None:
+            page = points.page(number)
+            units = dict(zip(page.names, page.units, strict=True))
+            content = dataset.samples_dataset(page.names, page.values, units, records, attributes)
+            dataset.write(content, raw / f"samples-{number:08d}.nc")
+
+    sums = Accumulator(len(points), on_block=keep_raw)
+    earlier = checkpoint.load_stage(STAGE)
+    for problem in checkpoint.problems:
+        sys.stderr.write(f"{problem}\n")
+    if earlier is not None:
+        sums.restore(earlier)
+    left = sums.remaining()
+    saved = time.monotonic()
+
+    def take(records: np.ndarray) -> None:
+        nonlocal saved
+        numbered = records.astype(OUTCOME)
+        numbered["sample"] = left.samples(records["sample"])
+        sums.add(numbered)
+        if time.monotonic() - saved > checkpoint.interval:
+            checkpoint.save_stage(STAGE, sums.state())
+            saved = time.monotonic()
+
+    progress = Progress("samples", style)
+    try:
+        ranks.run_points(
+            KIND, payload_of(scene, points.page(0)), _Left(points, left),
+            stage=STAGE, on_records=take, progress=progress, keep=False,
+        )  # fmt: skip
+    finally:
+        with ranks.writing():
+            checkpoint.save_stage(STAGE, sums.state())
+    content = statistics_dataset(sums, attributes)
+    with ranks.writing():
+        dataset.write(content, output)
+        checkpoint.finish()
+    return content
+
+
+def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = None) -> xr.Dataset:
+    """A complete accumulator as a dataset of kind ``statistics``."""
+    summary, edges = sums.result(), sums.edges
+    assert edges is not None  # it is complete
+    coords = {
+        "joint": np.array(JOINTS),
+        "bin": np.arange(sums.bins + 2),
+        "edge": np.arange(sums.bins + 1),
+        "outcome": np.array([int(status) for status in Status]),
+        "flags": np.array([int(flag) for flag in Flag]),
+    }
+    data: dict[str, np.ndarray] = {
+        "samples_by_status": summary.status,
+        "samples_by_flag": summary.flags,
+    }
+    for name in dict(ROWS):
+        data |= _of_quantity(name, summary, edges)
+    return dataset.dataset("statistics", coords, data, attributes)
+
+
+def _of_quantity(name: str, summary: Summary, edges: NDArray[np.float64]) -> dict[str, np.ndarray]:
+    """Variables of one quantity; scalars lose the axis of joints."""
+    rows = [k for k, (quantity, _) in enumerate(ROWS) if quantity == name]
+    chosen = rows if len(rows) > 1 else rows[0]
+    known = summary.count > 0
+    return {
+        f"{name}_count": summary.count[chosen],
+        f"{name}_mean": np.where(known, summary.mean, np.nan)[chosen],
+        f"{name}_deviation": summary.deviation[chosen],
+        f"{name}_minimum": np.where(known, summary.minimum, np.nan)[chosen],
+        f"{name}_maximum": np.where(known, summary.maximum, np.nan)[chosen],
+        f"{name}_histogram": summary.histogram[chosen],
+        f"{name}_edges": edges[chosen],
+    }

@@ -1,0 +1,76 @@
+"""Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT]."""
+
+import resource
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from hpcclear import comm
+from hpcclear.scene import load_scene
+from hpcclear.status import OUTCOME, Flag, Status
+from hpcclear.stopping import StopSwitch
+from hpcclear.streaming import run_statistics
+from hpcclear.work import KIND
+
+SCENE = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
+
+
+class MadeUp:
+    """Outcomes that follow from index and point alone, 100 000 a second: far more than a kernel makes."""
+
+    lanes = 32
+
+    def __init__(self) -> None:
+        self._queue: list[np.ndarray] = []
+
+    @property
+    def pending(self) -> int:
+        return sum(records.size for records in self._queue)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        records = np.zeros(index.size, OUTCOME)
+        records["sample"] = index
+        records["objective"] = points[:, 0] + 10.0 * points[:, -1]
+        records["objective_spread"] = np.nan
+        records["mean_gap"] = points[:, :2]
+        records["peak_contact_force"] = 1e3 * points[:, 1:3]
+        records["rhs_evaluations"] = 1000.0 + 1e3 * points[:, 0]
+        broken = points[:, 0] > 0.4
+        records["status"][broken] = Status.NOT_FINITE
+        records["objective_uncertainty"] = np.nan
+        for name in ("objective", "mean_gap", "peak_contact_force"):
+            records[name][broken] = np.nan
+        records["flags"][points[:, 1] > 0.2] = Flag.LATCHED
+        self._queue.append(records)
+
+    def advance(self, seconds: float) -> np.ndarray:
+        if not self._queue:
+            return np.zeros(0, OUTCOME)
+        records = self._queue.pop(0)
+        if records.size > 1000:
+            records, rest = np.split(records, [1000])
+            self._queue.insert(0, rest.copy())
+        time.sleep(1e-5 * records.size)
+        return records.copy()
+
+
+def scene_of(samples: int):
+    """The first job, sampled at random."""
+    return load_scene(SCENE, ['study.method="monte-carlo"', f"study.samples={samples}"])
+
+
+def main(output: str, samples: str, limit: str = "") -> int:
+    def program(ranks: comm.Ranks) -> None:
+        run_statistics(scene_of(int(samples)), Path(output), ranks, style="quiet")
+        print("peak MB", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+
+    with StopSwitch(ends_process=True) as stop:
+        if limit:
+            stop.limit_time(float(limit))
+        return comm.run_on_ranks(program, {KIND: lambda payload, ranks: MadeUp()}, stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,264 @@
+"""Streamed statistics: against plain numpy, in any order of arrival, over stops and numbers of ranks."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcclear import comm, dataset
+from hpcclear.errors import InputError
+from hpcclear.sampling import monte_carlo
+from hpcclear.statistics import ROWS, Accumulator, Summary, columns, merge, summarise
+from hpcclear.status import OUTCOME, Flag, Status
+from hpcclear.streaming import MonteCarloPoints, run_statistics, statistics_dataset
+from hpcclear.work import KIND
+
+PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
+sys.path.insert(0, str(PROGRAM.parent))
+
+from streaming_run import MadeUp, scene_of  # noqa: E402
+
+
+def outcomes(samples: int, seed: int = 3) -> np.ndarray:
+    """Records with everything that happens: failures, NaN, flags, a far outlier."""
+    rng = np.random.default_rng(seed)
+    records = np.zeros(samples, OUTCOME)
+    records["sample"] = np.arange(samples)
+    records["objective"] = 3e-4 + 1e-6 * rng.standard_normal(samples)
+    records["objective"][samples // 2] = 1.0
+    records["objective_spread"] = np.where(rng.random(samples) < 0.1, np.nan, rng.random(samples))
+    records["mean_gap"] = rng.random((samples, 2)) * [1e-4, 1e-3]
+    records["mean_gap"][:, 1] = np.nan  # an ideal joint
+    records["peak_contact_force"] = rng.gamma(2.0, 1e3, (samples, 2))
+    records["rhs_evaluations"] = rng.integers(10**4, 10**6, samples)
+    records["status"] = np.where(rng.random(samples) < 0.05, Status.STEP_CAP, Status.OK)
+    records["flags"] = rng.integers(0, 4, samples)
+    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
+        records[name][records["status"] != 0] = np.nan
+    return records
+
+
+def fill(sums: Accumulator, records: np.ndarray, seed: int) -> Accumulator:
+    """Feed records in random order, in pieces of random length."""
+    rng = np.random.default_rng(seed)
+    shuffled = records[rng.permutation(records.size)]
+    cuts = np.sort(rng.integers(0, records.size, 40))
+    for piece in np.split(shuffled, cuts):
+        sums.add(piece)
+    return sums
+
+
+def same(first: Summary, second: Summary) -> bool:
+    """Equal in every bit."""
+    return all(
+        np.asarray(getattr(first, name)).tobytes() == np.asarray(getattr(second, name)).tobytes()
+        for name in vars(first)
+    )
+
+
+def test_statistics_equal_numpy_on_all_samples():
+    records = outcomes(5000)
+    sums = fill(Accumulator(5000, block=256, bins=20), records, 1)
+    found = sums.result()
+    assert sums.complete
+    assert sums.held == 0
+    for row, values in enumerate(columns(records)):
+        known = values[np.isfinite(values)]
+        assert found.count[row] == known.size
+        assert found.histogram[row].sum() == known.size
+        if known.size == 0:
+            assert ROWS[row] == ("mean_gap", 1)
+            assert np.isnan(found.deviation[row])
+            continue
+        np.testing.assert_allclose(found.mean[row], np.mean(known), rtol=1e-13)
+        np.testing.assert_allclose(found.deviation[row], np.std(known, ddof=1), rtol=1e-11)
+        assert (found.minimum[row], found.maximum[row]) == (known.min(), known.max())
+        inner, _ = np.histogram(known, sums.edges[row])
+        at_last_edge = np.count_nonzero(known == sums.edges[row][-1])
+        np.testing.assert_array_equal(found.histogram[row][1:-2], inner[:-1])
+        assert found.histogram[row][-2] == inner[-1] - at_last_edge
+    np.testing.assert_array_equal(
+        found.status, np.bincount(records["status"], minlength=len(Status))
+    )
+    assert found.flags[0] == np.count_nonzero(records["flags"] & Flag.LATCHED)
+
+
+def test_order_of_arrival_changes_no_bit():
+    records = outcomes(3000)
+    one, other = (fill(Accumulator(3000, block=128), records, seed).result() for seed in (1, 2))
+    assert same(one, other)
+    changed = records.copy()
+    changed["objective"][np.flatnonzero(records["status"] == 0)[0]] *= 1.0 + 1e-12
+    assert not same(one, fill(Accumulator(3000, block=128), changed, 1).result())
+
+
+def test_going_on_from_a_state_changes_no_bit():
+    records = outcomes(3000)
+    whole = fill(Accumulator(3000, block=128), records, 1).result()
+    rng = np.random.default_rng(0)
+    for taken in (0, 50, 1500, 2999):
+        chosen = rng.permutation(3000)[:taken]
+        first = Accumulator(3000, block=128)
+        first.add(records[chosen])
+        second = Accumulator(3000, block=128)
+        second.restore(first.state())
+        left = second.remaining()
+        numbers = left.samples(np.arange(len(left)))
+        np.testing.assert_array_equal(np.sort(numbers), np.setdiff1d(np.arange(3000), chosen))
+        second.add(records[numbers])
+        assert same(second.result(), whole)
+
+
+def test_deviation_survives_a_large_mean():
+    # A sum of squares minus a squared sum loses all digits here.
+    records = outcomes(4096)
+    records["status"] = Status.OK
+    noise = np.random.default_rng(1).standard_normal(4096)
+    records["objective"] = 1e8 + noise
+    found = fill(Accumulator(4096, block=100), records, 1).result()
+    np.testing.assert_allclose(found.deviation[0], np.std(records["objective"], ddof=1), rtol=1e-9)
+
+
+def test_merge_with_nothing_is_exact():
+    records = outcomes(500)
+    sums = Accumulator(500, block=500)
+    sums.add(records)
+    part = summarise(records, sums.edges)
+    nothing = summarise(records[:0], sums.edges)
+    assert same(merge(nothing, part), part)
+    assert same(merge(part, nothing), part)
+
+
+def test_quantiles_lie_within_a_bin_of_the_true_ones():
+    records = outcomes(20000)
+    sums = fill(Accumulator(20000), records, 1)
+    for probability in (0.05, 0.5, 0.9):
+        found = sums.result().quantile(probability, sums.edges)
+        for row, name in ((4, 0), (5, 1)):
+            forces = records["peak_contact_force"][:, name]
+            true = np.nanquantile(forces, probability)
+            assert abs(found[row] - true) <= np.diff(sums.edges[row])[0]
+
+
+def test_all_samples_failed_leaves_nan_not_zero():
+    records = outcomes(300)
+    records["status"] = Status.NOT_FINITE
+    sums = fill(Accumulator(300, block=100), records, 1)
+    content = statistics_dataset(sums)
+    assert np.isnan(content["objective_mean"])
+    assert np.isnan(content["objective_minimum"])
+    failed = content["samples_by_status"].sel(outcome=int(Status.NOT_FINITE))
+    assert failed == content["samples_by_status"].sum() == 300
+
+
+def test_a_sample_counts_once():
+    records = outcomes(300)
+    sums = Accumulator(300, block=100)
+    sums.add(records[:150])
+    for again in (records[10:11], records[120:121], np.concatenate([records[200:201]] * 2)):
+        with pytest.raises(ValueError, match="before"):
+            sums.add(again)
+    with pytest.raises(ValueError, match="outside"):
+        sums.add(outcomes(301)[300:])
+    with pytest.raises(RuntimeError, match="before every sample"):
+        sums.result()
+
+
+def test_only_incomplete_blocks_are_held():
+    records = outcomes(10000)
+    sums = Accumulator(10000, block=100)
+    for first in range(0, 10000, 50):
+        sums.add(records[first : first + 50])
+        assert sums.held <= 1
+    late = Accumulator(10000, block=100)
+    late.add(records[100:])
+    assert late.held == 99  # they wait for block 0, which decides the edges
+    late.add(records[:100])
+    assert late.held == 0
+    assert same(late.result(), sums.result())
+
+
+def test_points_on_demand_are_the_points():
+    scene = scene_of(10000)
+    every = monte_carlo(scene).values
+    points = MonteCarloPoints(scene, 10000)
+    assert len(points) == 10000
+    for index in (np.arange(3), np.array([9999, 0, 4096, 4095]), np.arange(4000, 9000)):
+        np.testing.assert_array_equal(points[index], every[index])
+
+
+def test_dataset_round_trip_and_raw_samples(tmp_path):
+    ranks = comm.alone({KIND: lambda payload, ranks: MadeUp()})
+    scene = scene_of(9000)
+    output, raw = tmp_path / "statistics.nc", tmp_path / "raw"
+    content = run_statistics(scene, output, ranks, raw=raw, style="quiet")
+    assert dataset.read(output, "statistics").identical(content)
+    kept = [dataset.read(path, "samples") for path in sorted(raw.iterdir())]
+    objective = np.concatenate([part["objective"].values for part in kept])
+    assert objective.size == 9000
+    points = monte_carlo(scene).values
+    expected = points[:, 0] + 10.0 * points[:, -1]
+    np.testing.assert_array_equal(objective[np.isfinite(objective)], expected[points[:, 0] <= 0.4])
+    np.testing.assert_allclose(content["objective_mean"], np.nanmean(objective), rtol=1e-13)
+    again = run_statistics(scene, output, ranks, style="quiet")  # done already: only read
+    assert again.identical(content)
+    with pytest.raises(InputError, match="another run"):
+        run_statistics(scene, output, ranks, samples=8000, style="quiet")
+
+
+def test_latin_hypercubes_are_refused(tmp_path):
+    scene = scene_of(100)
+    hypercube = type(scene).model_validate(
+        {**scene.resolved(), "study": {**scene.resolved()["study"], "method": "lhs"}}
+    )
+    with pytest.raises(InputError, match=r"study\.method"):
+        run_statistics(hypercube, tmp_path / "out.nc", comm.alone({}))
+
+
+def launch(ranks: int, *arguments: object) -> subprocess.CompletedProcess:
+    """The streaming program on so many ranks."""
+    mpiexec = Path(sys.executable).parent / "mpiexec"
+    command = [str(mpiexec), "-n", str(ranks)] if ranks else []
+    return subprocess.run(
+        [*command, sys.executable, str(PROGRAM), *map(str, arguments)],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[2])},
+        check=False,
+    )
+
+
+@pytest.mark.mpi
+def test_bytes_do_not_depend_on_ranks_or_stops(tmp_path):
+    files = [tmp_path / name for name in ("one.nc", "three.nc", "stopped.nc")]
+    assert launch(0, files[0], 60000).returncode == 0
+    assert launch(3, files[1], 60000).returncode == 0
+    assert launch(2, files[2], 60000, 0.3).returncode == 3
+    assert not files[2].exists()
+    assert launch(0, files[2], 60000).returncode == 0
+    assert files[0].read_bytes() == files[1].read_bytes() == files[2].read_bytes()
+    left = {path.name for path in tmp_path.iterdir() if path.suffix != ".lock"}
+    assert left == {path.name for path in files}
+
+
+def peak(output: Path, samples: int) -> float:
+    """Greatest memory of root in MB."""
+    job = launch(0, output, samples)
+    assert job.returncode == 0, job.stderr
+    return float(job.stdout.split()[-1])
+
+
+def test_memory_does_not_grow_with_the_samples(tmp_path):
+    growth = peak(tmp_path / "many.nc", 200_000) - peak(tmp_path / "few.nc", 10_000)
+    assert growth < 50.0
+
+
+@pytest.mark.full
+def test_memory_is_flat_up_to_a_million_samples(tmp_path):
+    growth = peak(tmp_path / "many.nc", 1_000_000) - peak(tmp_path / "few.nc", 10_000)
+    assert growth < 50.0
