@@ -1,0 +1,293 @@
+"""Robust optimisation of each case: fronts of mean and deviation, alpha and beta (eqs. 19 to 23)."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import dataset
+from ..distributions import Distribution, Normal, TruncatedNormal, Uniform
+from ..errors import InputError
+from ..mopso import SwarmSettings, minimise
+from ..pareto import cut, hypervolume
+from ..random_inputs import Derived, RandomInput
+from ..robust import RobustObjective
+from ..sampling import generator, unit_lhs
+from ..scene import Scene
+from ..scene import variables as scene_variables
+from ..scene.domain import Box, box, study_of, to_physical
+from ..surrogate.subintervals import PiecewiseKriging
+from .run import Result, Run
+from .surrogates import coordinate
+
+Array = NDArray[np.float64]
+PROBES = 64
+"""Designs, beside the corners, at which the rules of derived random inputs are chosen."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What the swarm minimises in one case.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Design variables Z.
+    region : Box
+        Their bounds in sampling coordinates.
+    objective : RobustObjective
+        Mean and deviation of designs in SI.
+    scene : Scene
+    """
+
+    names: tuple[str, ...]
+    region: Box
+    objective: RobustObjective
+    scene: Scene
+
+    def physical(self, coordinates: Array) -> Array:
+        """Designs in SI, shape (n, d)."""
+        return to_physical(self.scene, self.names, coordinates)
+
+    def moments(self, designs: Array) -> Array:
+        """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
+        found = np.full((len(designs), 2), np.nan)
+        for row, design in enumerate(designs):
+            try:
+                found[row] = self.objective(design[None])[0]
+            except InputError:  # the design's random inputs leave the surrogate's domain
+                continue
+        return found
+
+
+def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
+    """The problem of one case on a surrogate of its objective.
+
+    A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
+    the model knows its ratio; such a case is averaged by Monte Carlo.
+    """
+    study = study_of(scene)
+    names = study.design_variables(case)
+    region = box(scene, names)
+    derived = [
+        _ratio(scene, study.variable(name).paths[0])
+        for name in study.optimisation
+        if study.variable(name).ratio is not None
+    ]
+    random = study.case(case).random
+    rng = generator(study.seed, "moments", case)
+    unit = unit_lhs(PROBES, len(names), rng)
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(names))))
+    probes = region.lower + np.concatenate([unit, corners]) * (region.upper - region.lower)
+    askew = len(model.leaves) > 1 and any(set(one.of) & set(random) for one in derived)
+    objective = RobustObjective(
+        model,
+        names,
+        [_random_input(study.random_input(name)) for name in random],
+        derived=derived,
+        probes=to_physical(scene, names, probes),
+        method="monte-carlo" if askew else study.swarm.statistics,
+        samples=study.swarm.monte_carlo_samples,
+        rng=rng,
+    )
+    return Problem(names, region, objective, scene)
+
+
+def _random_input(row: scene_variables.RandomInput) -> RandomInput:
+    middle = 0.0 if row.centre is None else row.centre
+    distribution: Distribution
+    if row.distribution == "uniform":
+        distribution = Uniform(middle - row.reach, middle + row.reach)
+    else:
+        assert row.deviation is not None  # by validation
+        distribution = Normal(middle, row.deviation)
+        if row.distribution == "truncated-normal":
+            ends = middle - row.reach, middle + row.reach
+            distribution = TruncatedNormal(middle, row.deviation, *ends)
+    return RandomInput(row.name, distribution, about_design=not row.absolute)
+
+
+def _ratio(scene: Scene, inertia: str) -> Derived:
+    """The ratio I / (m L^2 / 12) of a link from the inertia, and from its mass and length."""
+    study, link = study_of(scene), inertia.rpartition(".")[0]
+    variable = {path: name for name in study.optimisation for path in study.variable(name).paths}
+    of = [variable[inertia]]
+    places: dict[str, int] = {}
+    for part in ("mass", "length"):
+        if f"{link}.{part}" in variable:
+            places[part] = len(of)
+            of.append(variable[f"{link}.{part}"])
+    numbers = {part: scene.number(f"{link}.{part}") for part in ("mass", "length")}
+
+    def function(*values: Array) -> Array:
+        mass, length = (
+            values[places[part]] if part in places else numbers[part] for part in ("mass", "length")
+        )
+        return np.asarray(values[0] / (mass * length**2 / 12))
+
+    return Derived(coordinate(study.variable(variable[inertia])), tuple(of), function)
+
+
+def optimise(run: Run, model: PiecewiseKriging) -> Result:
+    """All runs of the swarm on all cases.
+
+    Returns
+    -------
+    dict of arrays
+        For case number k ``front_k`` (runs, solutions, d + 2): design coordinates, mean, deviation,
+        NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
+    """
+    result: Result = {}
+    for index, case in enumerate(run.study.cases):
+        fronts, gains = [], []
+        problem = problem_of(run.scene, case.name, model)
+        for number in range(run.study.swarm.runs):
+            front = _search(run, problem, run.rng("swarm", case.name, str(number)))
+            fronts.append(np.column_stack([front.points, front.values]))
+            gains.append(front.gain)
+        size = max(len(front) for front in fronts)
+        padded = np.full((len(fronts), size, fronts[0].shape[1]), np.nan)
+        for k, front in enumerate(fronts):
+            padded[k, : len(front)] = front
+        values = padded[..., -2:]
+        reference = np.nanmax(values, axis=(0, 1)) * 1.1
+        result[f"front_{index}"] = padded
+        result[f"gain_{index}"] = np.array(gains)
+        result[f"hypervolume_{index}"] = np.array(
+            [hypervolume(front[:, -2:], reference) for front in fronts]
+        )
+    return result
+
+
+def _search(run: Run, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+    settings = run.study.swarm
+
+    def function(coordinates: Array) -> Array:
+        run.ranks.raise_if_stopped()
+        return problem.objective(problem.physical(coordinates))
+
+    return minimise(
+        function,
+        np.column_stack([problem.region.lower, problem.region.upper]),
+        iterations=settings.iterations,
+        rng=rng,
+        size=settings.archive,
+        settings=SwarmSettings(
+            particles=settings.particles,
+            c1=settings.c1,
+            c2=settings.c2,
+            inertia_first=settings.inertia[0],
+            inertia_last=settings.inertia[1],
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A design chosen for direct simulation.
+
+    Attributes
+    ----------
+    name, case : str
+    design : dict of str to float
+        SI.
+    place : (int, int) or None
+        Run and solution, for one that stands on a front.
+    printed : (float, float) or None
+        Mean and deviation printed in the paper.
+    """
+
+    name: str
+    case: str
+    design: Mapping[str, float]
+    place: tuple[int, int] | None = None
+    printed: tuple[float, float] | None = None
+
+
+def extremes(run: Run, fronts: Result) -> list[Choice]:
+    """Alpha (least mean) and beta (least deviation) of each case.
+
+    Averaged over the runs, as the paper does it, in sampling coordinates, so that the average keeps
+    the bounds; and the best single ones.
+    """
+    chosen = []
+    for index, case in enumerate(run.study.cases):
+        padded = fronts[f"front_{index}"]
+        for column, letter in ((-2, "alpha"), (-1, "beta")):
+            best = np.nanargmin(padded[..., column], axis=1)
+            own = padded[np.arange(len(padded)), best]
+            average = own[:, :-2].mean(axis=0)
+            chosen.append(
+                Choice(f"{case.name} {letter}", case.name, _design(run, case.name, average))
+            )
+            winner = int(own[:, column].argmin())
+            place = winner, int(best[winner])
+            design = _design(run, case.name, own[winner, :-2])
+            chosen.append(Choice(f"{case.name} best {letter}", case.name, design, place))
+    return chosen
+
+
+def spread(run: Run, fronts: Result) -> list[Choice]:
+    """Points spread along the joint front of each case's runs, without its two ends."""
+    chosen = []
+    for index, case in enumerate(run.study.cases):
+        padded = fronts[f"front_{index}"]
+        places = np.argwhere(np.isfinite(padded[..., -1]))
+        points = padded[places[:, 0], places[:, 1]]
+        kept = _nondominated(points[:, -2:])
+        points, places = points[kept], places[kept]
+        points_wanted = cut(points[:, -2:], run.study.verification.designs + 2)
+        inner = points_wanted[np.argsort(points[points_wanted, -2], kind="stable")][1:-1]
+        for number, row in enumerate(inner):
+            run_, solution = (int(index) for index in places[row])
+            design = _design(run, case.name, points[row, :-2])
+            name = f"{case.name} front {number + 1}"
+            chosen.append(Choice(name, case.name, design, (run_, solution)))
+    return chosen
+
+
+def _nondominated(values: Array) -> NDArray[np.intp]:
+    """Rows that no other row dominates; of equal rows the first."""
+    order = np.lexsort((values[:, 1], values[:, 0]))
+    lowest = np.minimum.accumulate(np.append(np.inf, values[order, 1]))[:-1]
+    return np.sort(order[values[order, 1] < lowest])
+
+
+def _design(run: Run, case: str, coordinates: Array) -> dict[str, float]:
+    names = run.study.design_variables(case)
+    values = to_physical(run.scene, names, coordinates[None])[0]
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+def write(run: Run, fronts: Result, verified: Sequence[Choice]) -> None:
+    """Write front.nc: every run's front of every case, and which solutions were simulated."""
+    cases = [case.name for case in run.study.cases]
+    names = run.study.optimisation
+    solutions = max(fronts[f"front_{k}"].shape[1] for k in range(len(cases)))
+    shape = (len(cases), run.study.swarm.runs, solutions)
+    used = [n for n in names if any(n in run.study.design_variables(case) for case in cases)]
+    data: dict[str, np.ndarray] = {
+        name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)
+    }
+    data["verified"] = np.zeros(shape, np.int8)
+    data["hypervolume"] = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])
+    for k, case in enumerate(cases):
+        padded = fronts[f"front_{k}"]
+        place = np.s_[k, :, : padded.shape[1]]
+        data["mean"][place], data["deviation"][place] = padded[..., -2], padded[..., -1]
+        own = run.study.design_variables(case)
+        flat = to_physical(run.scene, own, padded[..., :-2].reshape(-1, len(own)))
+        for column, name in enumerate(own):
+            data[name][place] = flat[:, column].reshape(padded.shape[:2])
+    for choice in verified:
+        if choice.place is not None:
+            data["verified"][(cases.index(choice.case), *choice.place)] = 1
+    coords = {
+        "case": np.array(cases),
+        "run": np.arange(shape[1]),
+        "solution": np.arange(solutions),
+    }
+    units = {name: run.study.variable(name).unit or "1" for name in used}
+    run.write(dataset.dataset("front", coords, data, units=units), "front.nc")

@@ -1,0 +1,98 @@
+"""Responses of the original and the optimised designs at one clearance (the paper's Fig. 10)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..dataset import variable_name
+from ..errors import InputError
+from ..response import simulate
+from ..scene import Scene
+from .optimisation import Choice
+from .run import Result, Run
+
+Array = NDArray[np.float64]
+
+QUANTITIES = ("contact force 1", "contact force 2", "crank moment", "slider acceleration")
+"""O12, O23, the reaction moment on the crank, and the slider."""
+
+STATISTICS = ("mean", "fluctuation", "peak")
+"""Mean of the magnitude, standard deviation, largest magnitude."""
+
+
+def compared(run: Run, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
+    """Names and designs whose responses are compared: the original, alpha and beta of each case."""
+    known = {choice.name: choice for choice in designs}
+    cases = [case.name for case in run.study.cases]
+    names = [f"{case} {letter}" for case in cases for letter in ("alpha", "beta")]
+    return [("original", known[f"{cases[0]} original"]), *((name, known[name]) for name in names)]
+
+
+def scene_of(run: Run, choice: Choice, revolutions: int) -> Scene:
+    """The scene of one design, at the clearance of the comparison, without a study."""
+    settings = run.study.verification
+    changes: dict[str, object] = {"study": None, "numerics.averaged_revolutions": revolutions}
+    for name, value in choice.design.items():
+        changes |= dict.fromkeys(run.study.variable(name).paths, value)
+    for joint in run.scene.clearance_joints():
+        changes[f"joints.{joint}.clearance"] = settings.response_clearance
+    return run.scene.with_(changes)
+
+
+def simulate_all(run: Run, designs: Sequence[Choice]) -> Result:
+    """Statistics of each design's steady response, stretch by stretch.
+
+    Returns
+    -------
+    dict of arrays
+        ``names`` (designs,) and ``statistics`` (designs, windows, `STATISTICS`, `QUANTITIES`), SI.
+
+    Raises
+    ------
+    InputError
+        A response failed.
+    """
+    settings = run.study.verification
+    chosen = compared(run, designs)
+    table = []
+    for name, choice in chosen:
+        run.ranks.raise_if_stopped()
+        scene = scene_of(run, choice, settings.response_revolutions * settings.response_windows)
+        table.append(_statistics(_steady(scene, simulate(scene), name), settings.response_windows))
+    return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
+
+
+def write(run: Run, designs: Sequence[Choice]) -> None:
+    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10."""
+    folder = run.directory / "responses"
+    folder.mkdir(exist_ok=True)
+    for name, choice in compared(run, designs):
+        scene = scene_of(run, choice, run.study.verification.response_revolutions)
+        content = _steady(scene, simulate(scene), name)
+        content.attrs["design"] = name
+        run.write(content, f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc")
+
+
+def _steady(scene: Scene, response: xr.Dataset, name: str) -> xr.Dataset:
+    """The response after its transient."""
+    if int(response["status"]) != 0:
+        raise InputError("responses", name, "its simulation failed", "Look at it with simulate")
+    turn = 2.0 * np.pi * scene.numerics.transient_revolutions
+    return response.isel(time=np.flatnonzero(response["crank_angle"].to_numpy() >= turn - 1e-9))
+
+
+def _statistics(response: xr.Dataset, windows: int) -> Array:
+    """Statistics of each stretch of a response, (windows, statistics, quantities)."""
+    series = np.column_stack(
+        [
+            response["contact_force"].to_numpy(),
+            response["crank_moment"].to_numpy(),
+            response["slider_acceleration"].to_numpy(),
+        ]
+    )
+    parts = np.array_split(series, windows)
+    return np.array(
+        [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
+    )

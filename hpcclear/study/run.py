@@ -1,0 +1,86 @@
+"""One run of a study: what its stages share, and how each is done once and kept."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from .. import dataset
+from ..checkpoint import Checkpoint
+from ..ranks import Ranks
+from ..sampling import generator
+from ..scene import Scene
+from ..scene.domain import study_of
+from ..scene.study import Study
+from .simulations import Simulations, objective_of
+
+Result = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What every stage needs.
+
+    Attributes
+    ----------
+    scene : Scene
+    directory : Path
+        Where results go.
+    ranks : Ranks
+    checkpoint : Checkpoint
+    simulations : Simulations
+    tell : callable
+        Gets what the user should know, a sentence at a time.
+    """
+
+    scene: Scene
+    directory: Path
+    ranks: Ranks
+    checkpoint: Checkpoint
+    simulations: Simulations
+    tell: Callable[[str], object]
+
+    @property
+    def study(self) -> Study:
+        """The study of the scene."""
+        return study_of(self.scene)
+
+    def rng(self, *labels: str) -> np.random.Generator:
+        """A stream of random numbers for one purpose."""
+        return generator(self.study.seed, *labels)
+
+    def stage(
+        self, name: str, work: Callable[..., Mapping[str, ArrayLike]], *arguments: object
+    ) -> Result:
+        """What `work` returns for the run and further arguments; from disk when done before.
+
+        Either way the samples that follow are numbered alike, so that a run that was interrupted
+        ends like one that was not.
+        """
+        found = self.checkpoint.load_stage(name)
+        if found is None:
+            with self.ranks.stage(name):
+                self.ranks.raise_if_stopped()
+                result = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
+                result["next_sample"] = np.asarray(self.simulations.next)
+                with self.ranks.writing():
+                    self.checkpoint.flush()
+                    self.checkpoint.save_stage(name, result)
+            found = result
+        found = dict(found)
+        self.simulations.next = int(found.pop("next_sample"))
+        return found
+
+    def write(self, content: xr.Dataset, name: str) -> None:
+        """Write a result file, with what made it."""
+        content.attrs.update(self.checkpoint.attributes)
+        unit = objective_of(self.scene)[0]
+        if unit != "m":
+            for variable in content.data_vars.values():
+                if variable.attrs.get("units") == "m" and "scene_path" not in variable.attrs:
+                    variable.attrs["units"] = unit
+        with self.ranks.writing():
+            dataset.write(content, self.directory / name)

@@ -1,0 +1,273 @@
+"""Response surfaces, first-order sensitivities against clearance, and global indices."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .. import dataset
+from ..scene.domain import box
+from ..sensitivity import (
+    IntervalDesign,
+    IntervalSettings,
+    analyse_intervals,
+    analyse_sobol,
+    best_estimates,
+    convergence_intervals,
+    design_intervals,
+    select_influential,
+    sobol_design,
+)
+from ..surrogate.metrics import Accuracy, accuracy
+from ..surrogate.response_surface import fit_response_surface, n_terms
+from ..surrogate.search import fit_until_accepted
+from .run import Result, Run
+
+Array = NDArray[np.float64]
+STAGE = "sensitivity"
+_NORMAL_95 = 1.959963984540054
+
+
+def surfaces(run: Run) -> tuple[tuple[str, ...], ...]:
+    """Inputs of each surface: the groups, and all of them together if they are more than one."""
+    groups = run.study.groups
+    together = {name for group in groups for name in group}
+    everything = tuple(name for name in run.study.names if name in together)
+    return groups if len(groups) < 2 else (*groups, everything)
+
+
+def analyse(run: Run) -> Result:
+    """Simulate all surfaces' points as one batch, then fit, differentiate and rank.
+
+    Returns
+    -------
+    dict of arrays
+        The data variables of sensitivity.nc, its coordinates but for the names of parameters, and
+        ``order_stable``.
+    """
+    designs = _designs(run)
+    inputs = surfaces(run)
+    parameter = run.study.sensitivity.parameter
+    batches = [
+        run.simulations.designs((*names, parameter), design.points).values
+        for names, design in zip(inputs, designs, strict=True)
+    ]
+    sobol = _sobol_points(run)
+    if len(sobol):
+        batches.append(run.simulations.designs(run.study.names, sobol).values)
+    points = run.simulations.filled(run.study.names, np.concatenate(batches))
+    values = run.simulations.objective(run.simulations.records(points, STAGE))
+    parts = np.split(values, np.cumsum([len(batch) for batch in batches])[:-1])
+    result = _first_order(run, inputs, designs, parts)
+    result |= _accepted(run, inputs, designs, parts)
+    result |= _global(run, parts[-1] if len(sobol) else None)
+    result["failed"] = np.asarray(np.count_nonzero(np.isnan(values)))
+    return result
+
+
+def write(run: Run, result: Result) -> None:
+    """Write sensitivity.nc."""
+    data = {k: v for k, v in result.items() if k not in ("interval", "clearance", "failed")}
+    order_stable = bool(data.pop("order_stable"))
+    coords = {
+        "surface": np.array([" ".join(names) for names in surfaces(run)]),
+        "interval": result["interval"],
+        "clearance": result["clearance"],
+        "parameter": np.array(run.study.names),
+    }
+    content: xr.Dataset = dataset.dataset("sensitivity", coords, data)
+    content.attrs["failed_simulations"] = int(result["failed"])
+    content.attrs["order_changes_with_clearance"] = "no" if order_stable else "yes"
+    content.attrs["inertias"] = "varied as the ratio to m L^2/12 where the study gives a ratio"
+    run.write(content, "sensitivity.nc")
+
+
+def _designs(run: Run) -> list[IntervalDesign]:
+    settings, inputs = run.study.sensitivity, surfaces(run)
+    lower, upper = run.study.variable(settings.parameter).bounds
+    clearances = np.linspace(lower, upper, settings.levels)
+    found = []
+    for k, names in enumerate(inputs):
+        together = k == len(run.study.groups)
+        laid_out = IntervalSettings(
+            steps=settings.rounds,
+            shrink=settings.shrink,
+            n_points=settings.together_samples if together else settings.samples,
+            n_test=max(settings.test_samples, 20) if together else settings.test_samples,
+            order=settings.together_order if together else settings.order,
+        )
+        rng = run.rng("sensitivity", " ".join(names))
+        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
+    return found
+
+
+def _bounds(run: Run, names: Sequence[str]) -> Array:
+    region = box(run.scene, names)
+    return np.column_stack([region.lower, region.upper])
+
+
+def _columns(run: Run, names: Sequence[str]) -> list[int]:
+    return [run.study.names.index(name) for name in names]
+
+
+def _first_order(
+    run: Run,
+    inputs: Sequence[Sequence[str]],
+    designs: Sequence[IntervalDesign],
+    values: Sequence[Array],
+) -> Result:
+    settings = run.study.sensitivity
+    shape = (len(inputs), settings.rounds, settings.levels)
+    every = (*shape, len(run.study.names))
+    of_clearance = (every[0], *every[2:])
+    result = {name: np.full(every, np.nan) for name in ("sensitivity", "standard_error")}
+    result |= {name: np.full(shape, np.nan) for name in ("r2", "rmae", "leave_one_out_r2")}
+    result["converged"] = np.zeros(of_clearance, np.int8)
+    for name in ("convergence_interval", "plateau_interval", "best_sensitivity", "uncertainty"):
+        result[name] = np.full(of_clearance, np.nan)
+    fractions = (1.0 - settings.shrink) ** np.arange(settings.rounds)
+    for k, names in enumerate(inputs):
+        history = analyse_intervals(designs[k], values[k])
+        found = convergence_intervals(history)
+        slope, uncertainty = best_estimates(history, found)
+        at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
+        result["sensitivity"][k][..., at] = history.sensitivity * span
+        result["standard_error"][k][..., at] = history.standard_error * span
+        for name in ("r2", "rmae", "leave_one_out_r2"):
+            result[name][k] = getattr(history, name)
+        result["converged"][k][:, at] = found.found
+        for name, index in (
+            ("convergence_interval", found.interval),
+            ("plateau_interval", found.plateau),
+        ):
+            result[name][k][:, at] = np.where(index >= 0, fractions[index], np.nan)
+        result["best_sensitivity"][k][:, at] = slope * span
+        result["uncertainty"][k][:, at] = uncertainty * span
+    result |= _ranked(run, inputs, result) | _levels(designs[-1], values[len(designs) - 1])
+    return result | {"interval": fractions, "clearance": designs[0].clearances}
+
+
+def _levels(design: IntervalDesign, values: Array) -> Result:
+    """Mean objective over the box of the last surface at each clearance, and its standard error."""
+    whole = values.reshape(len(design.intervals), len(design.clearances), -1)[0]
+    known = np.isfinite(whole)
+    count = np.where(known.sum(axis=1) > 1, known.sum(axis=1), np.nan)
+    mean = np.where(known, whole, 0.0).sum(axis=1) / count
+    variance = np.where(known, whole - mean[:, None], 0.0) ** 2
+    error = np.sqrt(variance.sum(axis=1) / (count - 1.0) / count)
+    return {"mean_objective": mean, "mean_objective_error": error}
+
+
+def _ranked(run: Run, inputs: Sequence[Sequence[str]], result: Result) -> Result:
+    """Ranking and X_G-I; each variable in each surface is a column of its own."""
+    where = [(k, name) for k, names in enumerate(inputs) for name in names]
+    names = [name for _, name in where]
+    at = _columns(run, names)
+    slope = np.stack(
+        [result["best_sensitivity"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
+    )
+    error = np.stack(
+        [result["uncertainty"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
+    )
+    chosen = select_influential(
+        names, slope, error, np.ones(len(names)), fraction=run.study.sensitivity.influence
+    )
+    influence = np.full(len(run.study.names), np.nan)
+    for column, place in enumerate(at):
+        known = chosen.effect[:, column]
+        if np.isfinite(known).any():
+            influence[place] = np.fmax(influence[place], np.nanmean(known))
+    selected = np.array([name in chosen.selected for name in run.study.names], np.int8)
+    return {
+        "influence": influence,
+        "selected": selected,
+        "order_stable": np.asarray(chosen.order_stable),
+    }
+
+
+def _accepted(
+    run: Run,
+    inputs: Sequence[Sequence[str]],
+    designs: Sequence[IntervalDesign],
+    values: Sequence[Array],
+) -> Result:
+    """The surface over each global interval; a refused one gets more points or another order."""
+    shape = (len(inputs), run.study.sensitivity.levels)
+    result: Result = {
+        name: np.full(shape, np.nan)
+        for name in ("surface_r2", "surface_rmae", "surface_r2_explained", "surface_rmae_mean")
+    }
+    result |= {name: np.zeros(shape, np.int64) for name in ("surface_order", "surface_points")}
+    result["surface_accepted"] = np.zeros(shape, np.int8)
+    for k, c in np.ndindex(*shape):
+        reached, order, count, accepted = _surface(run, inputs[k], designs[k], values[k], c)
+        if reached is not None:
+            result["surface_r2"][k, c], result["surface_rmae"][k, c] = reached.r2, reached.rmae
+            result["surface_r2_explained"][k, c] = reached.r2_explained
+            result["surface_rmae_mean"][k, c] = reached.rmae_mean
+        result["surface_order"][k, c], result["surface_points"][k, c] = order, count
+        result["surface_accepted"][k, c] = accepted
+    return result
+
+
+def _surface(
+    run: Run, names: Sequence[str], design: IntervalDesign, values: Array, level: int
+) -> tuple[Accuracy | None, int, int, bool]:
+    """Accuracy, order and points of a surface, and whether it was accepted."""
+    settings, laid_out = run.study.sensitivity, design.settings
+    size = laid_out.n_points + laid_out.n_test
+    rows = slice(level * size, (level + 1) * size)
+    points, outcomes = design.points[rows, :-1], values[rows]
+    bounds, cut = design.intervals[0], laid_out.n_points
+    finite = np.isfinite(outcomes)
+    reached, count = None, int(finite[:cut].sum())
+    if count >= n_terms(len(names), laid_out.order) and finite[cut:].sum() >= 2:
+        surface = fit_response_surface(points[:cut], outcomes[:cut], bounds, laid_out.order)
+        reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
+        if reached.meets(settings.r2, settings.rmae):
+            return reached, laid_out.order, count, True
+    if settings.resamplings == 0:
+        return reached, laid_out.order, count, False
+    clearance = design.clearances[level]
+
+    def evaluate(at: Array) -> Array:
+        column = np.full(len(at), clearance)
+        where = np.column_stack([at, column])
+        return run.simulations.values((*names, settings.parameter), where, STAGE)
+
+    search = fit_until_accepted(
+        evaluate,
+        bounds,
+        run.rng("surface", " ".join(names), str(level)),
+        orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
+        n_points=2 * cut,
+        n_test=max(laid_out.n_test, 20),
+        max_points=cut * 2**settings.resamplings,
+        r2_min=settings.r2,
+        rmae_max=settings.rmae,
+    )
+    return search.accuracy, search.surface.order, search.surface.n_points, search.accepted
+
+
+def _sobol_points(run: Run) -> Array:
+    rows = run.study.sensitivity.sobol_samples
+    if rows < 2:
+        return np.empty((0, len(run.study.names)))
+    return sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
+
+
+def _global(run: Run, values: Array | None) -> Result:
+    """Sobol indices over the whole box, the clearance among the inputs."""
+    count = len(run.study.names)
+    if values is None:
+        nothing = np.full(count, np.nan)
+        names = ("sobol_first", "sobol_total", "sobol_first_error", "sobol_total_error")
+        return dict.fromkeys(names, nothing)
+    found = analyse_sobol(values, count, run.rng("sobol bootstrap"))
+    return {
+        "sobol_first": found.first,
+        "sobol_total": found.total,
+        "sobol_first_error": np.ptp(found.first_limits, axis=1) / (2 * _NORMAL_95),
+        "sobol_total_error": np.ptp(found.total_limits, axis=1) / (2 * _NORMAL_95),
+    }

@@ -1,0 +1,158 @@
+"""The true function of a study: designs to objectives, through the dynamics, on all ranks."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checkpoint import Checkpoint
+from ..errors import InputError
+from ..progress import Progress, Style
+from ..ranks import Ranks
+from ..sampling import check_points
+from ..scene import Scene
+from ..scene.domain import study_of, to_physical
+from ..scene.points import Points
+from ..status import Status
+from ..work import sample_points
+
+Array = NDArray[np.float64]
+
+OBJECTIVES: dict[str, tuple[str, Callable[[np.ndarray], Array]]] = {
+    "mean-gap": ("m", lambda records: records["objective"]),
+    "peak-contact-force": ("N", lambda records: records["peak_contact_force"].max(axis=1)),
+}
+"""Unit of each objective, and what it is of a sample's record."""
+
+
+def objective_of(scene: Scene) -> tuple[str, Callable[[np.ndarray], Array]]:
+    """Unit of the study's objective and the function of the records.
+
+    Raises
+    ------
+    InputError
+        If no sample records what it takes.
+    """
+    name = study_of(scene).objective
+    if name not in OBJECTIVES:
+        known = ", ".join(OBJECTIVES)
+        raise InputError("study.objective", name, "no sample records it", f"Use {known}")
+    return OBJECTIVES[name]
+
+
+class Simulations:
+    """Simulates batches of designs, numbered one after the other through the whole study.
+
+    What an earlier run of the same command finished is taken from the checkpoint.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    ranks : Ranks
+    checkpoint : Checkpoint
+        Its names are the study variables.
+    style : str
+        How progress is shown.
+
+    Attributes
+    ----------
+    next : int
+        Number of the next sample. A stage that is not done again sets it to where it had ended.
+    """
+
+    def __init__(
+        self, scene: Scene, ranks: Ranks, checkpoint: Checkpoint, style: Style = "auto"
+    ) -> None:
+        self.scene = scene
+        self.next = 0
+        self._ranks = ranks
+        self._checkpoint = checkpoint
+        self._style = style
+        self._unit, self._objective = objective_of(scene)
+        self._variables = study_of(scene).variables
+
+    def designs(self, names: Sequence[str], coordinates: Array) -> Points:
+        """Designs in all study variables; those not named stay as in the scene.
+
+        Parameters
+        ----------
+        names : sequence of str, length d
+        coordinates : array, shape (n, d)
+            In sampling coordinates: an inertia may be a ratio (`hpcclear.scene.domain`).
+
+        Raises
+        ------
+        InputError
+            If a design makes no mechanism, or a variable that is not named drives entries that
+            differ in the scene.
+        """
+        return self.filled(names, to_physical(self.scene, names, coordinates))
+
+    def filled(self, names: Sequence[str], values: Array) -> Points:
+        """The same from values in SI, shape (n, d)."""
+        columns = []
+        for variable in self._variables:
+            if variable.name in names:
+                columns.append(values[:, list(names).index(variable.name)])
+                continue
+            numbers = {self.scene.number(path) for path in variable.paths}
+            if len(numbers) > 1:
+                raise InputError(
+                    f"study.variables.{variable.name}",
+                    sorted(numbers),
+                    "a model leaves it out, and what it drives differs in the scene",
+                    "Make these entries equal, or give each a variable of its own",
+                )
+            columns.append(np.full(len(values), numbers.pop()))
+        points = Points(
+            tuple(variable.name for variable in self._variables),
+            np.column_stack(columns),
+            tuple(variable.paths for variable in self._variables),
+        )
+        check_points(self.scene, points)
+        return points
+
+    def records(self, points: Points, stage: str) -> np.ndarray:
+        """Outcome records of designs in all study variables, in their order.
+
+        Raises
+        ------
+        InputError
+            If every single simulation failed.
+        """
+        style = self._style if len(points) >= 1000 else "quiet"
+        progress = Progress(stage, style=style)
+        records = sample_points(
+            self.scene,
+            points,
+            self._ranks,
+            self._checkpoint,
+            progress,
+            stage=f"{stage}: simulations",
+            first=self.next,
+        )
+        self.next += len(points)
+        _refuse_if_all_failed(records, stage)
+        return records
+
+    def objective(self, records: np.ndarray) -> Array:
+        """The study's objective in records, NaN where the simulation failed."""
+        return np.where(records["status"] == Status.OK, self._objective(records), np.nan)
+
+    def values(self, names: Sequence[str], coordinates: Array, stage: str) -> Array:
+        """Objectives of designs in sampling coordinates, shape (n,), NaN where failed."""
+        return self.objective(self.records(self.designs(names, coordinates), stage))
+
+
+def _refuse_if_all_failed(records: np.ndarray, stage: str) -> None:
+    if len(records) == 0 or (records["status"] == Status.OK).any():
+        return
+    codes, counts = np.unique(records["status"], return_counts=True)
+    worst = Status(int(codes[counts.argmax()]))
+    raise InputError(
+        stage,
+        len(records),
+        f"all of these simulations failed, most often because {worst.message}",
+        worst.remedy.capitalize(),
+    )

@@ -1,0 +1,236 @@
+"""Kriging models of the objective: fitted, checked on fresh points, grown, written and read back."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import dataset
+from ..errors import InputError
+from ..sampling import unit_lhs
+from ..scene.domain import Box, box
+from ..scene.variables import Variable
+from ..surrogate.kriging import Kriging, fit_kriging
+from ..surrogate.metrics import accuracy
+from ..surrogate.subintervals import PIECEWISE_FIELDS, PiecewiseKriging, fit_subintervals
+from .run import Result, Run
+
+Array = NDArray[np.float64]
+STAGE = "kriging"
+_CHECKS = ("r2", "rmae", "r2_explained", "rmae_mean", "rmse")
+
+
+def coordinate(variable: Variable) -> str:
+    """Name of what is sampled for a variable: r2 for an inertia I2 that is given as a ratio."""
+    if variable.ratio is None:
+        return variable.name
+    return {"I1": "r1", "I2": "r2"}.get(variable.name, f"{variable.name}_ratio")
+
+
+def domain(run: Run, names: Sequence[str]) -> Box:
+    """Where a model holds; the optimisation's is widened so that no random input leaves it."""
+    widen = {name for case in run.study.cases for name in case.random}
+    return box(run.scene, names, sorted(widen) if tuple(names) == run.study.optimisation else ())
+
+
+def fit_all(run: Run) -> Result:
+    """Fit every model of the study (method: `hpcclear.surrogate.subintervals`), and check each.
+
+    Returns
+    -------
+    dict of arrays
+        For `models_of` and `write`.
+    """
+    result: Result = {}
+    for k, names in enumerate(run.study.models):
+        region, settings = domain(run, names), run.study.surrogate
+        model = fit_subintervals(
+            lambda points, names=names: run.simulations.values(names, points, STAGE),  # type: ignore[misc]
+            np.column_stack([region.lower, region.upper]),
+            rng=run.rng("kriging", " ".join(names)),
+            names=[coordinate(run.study.variable(name)) for name in names],
+            samples=run.study.samples,
+            test_samples=max(run.study.test_samples, 2),
+            r2_min=settings.r2,
+            rmae_max=settings.rmae,
+            max_resamples=settings.resamplings,
+            max_depth=settings.cuts,
+            restarts=settings.restarts,
+        )
+        result |= _packed(k, model) | _checked(run, k, model)
+    return result
+
+
+def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
+    """The models in a result of `fit_all` or `grow`, in the order of the study's."""
+    found: list[PiecewiseKriging] = []
+    while f"model{len(found)}_names" in result:
+        start = f"model{len(found)}_"
+        found.append(
+            PiecewiseKriging.from_arrays({name: result[start + name] for name in PIECEWISE_FIELDS})
+        )
+    return found
+
+
+def grow(run: Run, before: Result, coordinates: Array, stage: str) -> Result:
+    """The last model, the optimisation's, with further training points (adaptive infill).
+
+    Parameters
+    ----------
+    before : dict
+        Result of `fit_all` or of an earlier call.
+    coordinates : array, shape (n, d)
+        Where to simulate, inside the model's domain.
+    stage : str
+        Name of the stage, for reports.
+    """
+    models = models_of(before)
+    names, model = run.study.optimisation, models[-1]
+    values = run.simulations.values(names, coordinates, stage)
+    rng = run.rng(stage)
+    leaves = []
+    for leaf in model.leaves:
+        here = ((coordinates >= leaf.lower) & (coordinates <= leaf.upper)).all(axis=1)
+        leaves.append(_refitted(run, leaf, coordinates[here], values[here], rng))
+    k = len(models) - 1
+    grown = PiecewiseKriging(tuple(leaves), model.r2, model.rmae, model.accepted)
+    return {**before, **_packed(k, grown), **_checked(run, k, grown)}
+
+
+def _refitted(
+    run: Run, leaf: Kriging, points: Array, values: Array, rng: np.random.Generator
+) -> Kriging:
+    if len(points) == 0:
+        return leaf
+    return fit_kriging(
+        np.concatenate([leaf.inputs, points]),
+        np.concatenate([leaf.values, values]),
+        np.column_stack([leaf.lower, leaf.upper]),
+        rng=rng,
+        names=leaf.names,
+        restarts=run.study.surrogate.restarts,
+    )
+
+
+def _packed(k: int, model: PiecewiseKriging) -> Result:
+    return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
+
+
+def _checked(run: Run, k: int, model: PiecewiseKriging) -> Result:
+    """Accuracy over the whole domain on fresh points, which decided nothing."""
+    names = run.study.models[k]
+    rng = run.rng("kriging check", " ".join(names))
+    unit = unit_lhs(max(run.study.test_samples, 2), len(names), rng)
+    points = model.lower + unit * (model.upper - model.lower)
+    truth = run.simulations.values(names, points, f"{STAGE} check")
+    reached = accuracy(truth, model.predict(points))
+    return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
+
+
+def write(run: Run, result: Result) -> None:
+    """Write kriging.nc: a row for each subinterval's model."""
+    models = models_of(result)
+    leaves = [(k, leaf) for k, model in enumerate(models) for leaf in model.leaves]
+    parameters = list(dict.fromkeys(name for _, leaf in leaves for name in leaf.names))
+    points = max(len(leaf.values) for _, leaf in leaves)
+    families = [" ".join(model.names) for model in models]
+    shape = (len(leaves), points)
+    data: dict[str, np.ndarray] = {
+        name: np.full(shape, np.nan) for name in ("training_output", "weight", *parameters)
+    }
+    data["length_scale"] = np.full((len(leaves), len(parameters)), np.nan)
+    data["used"] = np.zeros((len(leaves), len(parameters)), np.int8)
+    for name in parameters:
+        data |= {f"{name}_{end}": np.full(len(leaves), np.nan) for end in ("lower", "upper")}
+    for row, (_, leaf) in enumerate(leaves):
+        data["training_output"][row, : len(leaf.values)] = leaf.values
+        data["weight"][row, : len(leaf.values)] = leaf.alpha
+        for column, name in enumerate(leaf.names):
+            place = parameters.index(name)
+            data["length_scale"][row, place] = leaf.length_scales[column]
+            data["used"][row, place] = 1
+            data[name][row, : len(leaf.values)] = leaf.inputs[:, column]
+            data[f"{name}_lower"][row] = leaf.lower[column]
+            data[f"{name}_upper"][row] = leaf.upper[column]
+    for name, field in _SCALARS.items():
+        data[name] = np.array([getattr(leaf, field) for _, leaf in leaves])
+    data["points"] = np.array([len(leaf.values) for _, leaf in leaves])
+    data["accepted"] = np.concatenate([model.accepted for model in models]).astype(np.int8)
+    checks = np.array([result[f"model{k}_check"] for k, _ in leaves])
+    data |= {name: checks[:, column] for column, name in enumerate(_CHECKS)}
+    data["family"] = np.array([families[k] for k, _ in leaves])
+    names = [_label(models[k], families[k], leaf) for k, leaf in leaves]
+    coords = {
+        "model": np.array(names),
+        "point": np.arange(points),
+        "parameter": np.array(parameters),
+    }
+    run.write(dataset.dataset("kriging", coords, data, units=_units(run)), "kriging.nc")
+
+
+_SCALARS = {
+    "signal_variance": "signal_variance",
+    "noise_variance": "noise_variance",
+    "output_mean": "mean",
+    "output_scale": "scale",
+    "dropped": "dropped",
+}
+"""Variables of kriging.nc and the attributes of `Kriging` they hold."""
+
+
+def _label(model: PiecewiseKriging, family: str, leaf: Kriging) -> str:
+    return family if len(model.leaves) == 1 else f"{family} {model.leaves.index(leaf) + 1}"
+
+
+def _units(run: Run) -> dict[str, str]:
+    """Units of sampling coordinates, "1" for ratios."""
+    return {
+        coordinate(variable): "1"
+        if variable.ratio is not None or not variable.unit
+        else variable.unit
+        for variable in run.study.variables
+    }
+
+
+def read_kriging(path: str | Path) -> dict[str, PiecewiseKriging]:
+    """The models in a kriging.nc, by their inputs ("m2 m3 u2 r2 C"), ready to predict.
+
+    Raises
+    ------
+    InputError
+        The file is not one, or is damaged.
+    """
+    content = dataset.read(path, "kriging")
+    found: dict[str, list[int]] = {}
+    for row, family in enumerate(content["family"].to_numpy()):
+        found.setdefault(str(family), []).append(row)
+    return {family: _read_family(content, family, rows) for family, rows in found.items()}
+
+
+def _read_family(content, family: str, rows: Sequence[int]) -> PiecewiseKriging:  # type: ignore[no-untyped-def]
+    names = family.split(" ")
+    leaves = []
+    for row in rows:
+        one = content.isel(model=row)
+        size = int(one["points"])
+        if not set(names) <= set(one["parameter"].to_numpy().tolist()):
+            raise InputError("file", family, "the models do not fit together", "Use it as written")
+        arrays = {
+            "names": np.array(names),
+            "lower": np.array([float(one[f"{name}_lower"]) for name in names]),
+            "upper": np.array([float(one[f"{name}_upper"]) for name in names]),
+            "length_scales": one["length_scale"].sel(parameter=names).to_numpy(),
+            "inputs": np.column_stack([one[name].to_numpy()[:size] for name in names]),
+            "values": one["training_output"].to_numpy()[:size],
+            "alpha": one["weight"].to_numpy()[:size],
+        }
+        arrays |= {field: one[name].to_numpy() for name, field in _SCALARS.items()}
+        leaves.append(Kriging.from_arrays(arrays))
+    part = content.isel(model=list(rows))
+    return PiecewiseKriging(
+        tuple(leaves),
+        part["r2"].to_numpy(),
+        part["rmae"].to_numpy(),
+        part["accepted"].to_numpy().astype(bool),
+    )

@@ -1,0 +1,153 @@
+"""Chosen designs back through the true dynamics: direct Monte Carlo, and what the surrogate missed."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from .. import dataset
+from ..robust import sample_moments
+from ..sampling import monte_carlo
+from ..scene.domain import to_coordinates
+from ..scene.points import Points
+from ..surrogate.subintervals import PiecewiseKriging
+from . import surrogates
+from .optimisation import Choice, problem_of
+from .run import Result, Run
+
+Array = NDArray[np.float64]
+_COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
+
+
+def original(run: Run) -> list[Choice]:
+    """The design in the scene file, in each case."""
+    found = []
+    for case in run.study.cases:
+        names = run.study.design_variables(case.name)
+        design = {n: run.scene.number(run.study.variable(n).paths[0]) for n in names}
+        found.append(Choice(f"{case.name} original", case.name, design))
+    return found
+
+
+def samples_of(run: Run, choice: Choice, count: int, purpose: str = "verification") -> Points:
+    """Monte Carlo samples of a design in all study variables.
+
+    Every design of a case meets the same scatter, so that differences between designs are not
+    noise.
+    """
+    random = run.study.case(choice.case).random
+    points = monte_carlo(
+        run.scene, count, random=random, design=dict(choice.design), purpose=purpose
+    )
+    return run.simulations.filled(points.names, points.values)
+
+
+def simulate(run: Run, choices: Sequence[Choice], stage: str) -> Result:
+    """True mean and deviation of designs with standard errors, arrays over the designs.
+
+    Raises
+    ------
+    InputError
+        If all simulations fail.
+    """
+    count = run.study.verification.samples
+    batches = [samples_of(run, choice, count) for choice in choices]
+    points = Points(
+        batches[0].names, np.concatenate([batch.values for batch in batches]), batches[0].paths
+    )
+    values = run.simulations.objective(run.simulations.records(points, stage))
+    table = np.array([moments(one) for one in values.reshape(len(choices), count)])
+    return {name: table[:, k] for k, name in enumerate(_COLUMNS)}
+
+
+def moments(values: Array) -> tuple[float, float, float, float, int]:
+    """Mean, deviation (each followed by its standard error) and number of failed samples (NaN).
+
+    All NaN when fewer than four are left.
+    """
+    finite = values[np.isfinite(values)]
+    failed = len(values) - len(finite)
+    if len(finite) < 4:
+        return np.nan, np.nan, np.nan, np.nan, failed
+    found = sample_moments(finite[None])
+    mean, mean_error = float(found.mean[0]), float(found.mean_error[0])
+    return mean, mean_error, float(found.deviation[0]), float(found.deviation_error[0]), failed
+
+
+def predicted(run: Run, choices: Sequence[Choice], model: PiecewiseKriging) -> Array:
+    """Mean and deviation by the surrogate, (n, 2); NaN outside its domain."""
+    problems = {case.name: problem_of(run.scene, case.name, model) for case in run.study.cases}
+    found = [
+        problems[choice.case].moments(
+            np.array([[choice.design[name] for name in problems[choice.case].names]])
+        )[0]
+        for choice in choices
+    ]
+    return np.array(found).reshape(-1, 2)
+
+
+def misses(
+    run: Run, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
+) -> tuple[list[Choice], list[str]]:
+    """Designs whose surrogate mean is further from the true one than the study allows; in words."""
+    missed, texts = [], []
+    errors = predicted(run, choices, model)[:, 0] / true["mean"] - 1.0
+    for choice, error in zip(choices, errors, strict=True):
+        if not abs(error) <= run.study.verification.tolerance:  # true for NaN
+            missed.append(choice)
+            texts.append(
+                f"At {choice.name} the surrogate's mean is {100 * error:+.1f} % off the true one."
+            )
+    return missed, texts
+
+
+def infill_points(run: Run, choices: Sequence[Choice], label: str) -> Array:
+    """Where the surrogate needs more points: over the scatter of the designs it missed, (n, d).
+
+    In sampling coordinates of the optimisation's model.
+    """
+    names = run.study.optimisation
+    count = -(-run.study.verification.infill_samples // len(choices))
+    found = []
+    for choice in choices:
+        points = samples_of(run, choice, count, f"infill {label} {choice.name}")
+        values = np.column_stack([points.column(name) for name in names])
+        region = surrogates.domain(run, names)
+        coordinates = to_coordinates(run.scene, names, values)
+        found.append(np.clip(coordinates, region.lower, region.upper))  # round-off at the border
+    return np.concatenate(found)
+
+
+def write(
+    run: Run,
+    choices: Sequence[Choice],
+    true: Result,
+    model: PiecewiseKriging,
+    remarks: Sequence[str],
+) -> None:
+    """Write verification.nc."""
+    study, surrogate = run.study, predicted(run, choices, model)
+    z = float(ndtri(0.5 + study.verification.confidence / 2.0))
+    used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]
+    data: dict[str, np.ndarray] = {
+        name: np.array([choice.design.get(name, np.nan) for choice in choices]) for name in used
+    }
+    data["case"] = np.array([choice.case for choice in choices])
+    for column, name in enumerate(("mean", "deviation")):
+        data[f"{name}_true"] = true[name]
+        data[f"{name}_lower"] = true[name] - z * true[f"{name}_error"]
+        data[f"{name}_upper"] = true[name] + z * true[f"{name}_error"]
+        data[f"{name}_surrogate"] = surrogate[:, column]
+        data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
+        data[f"{name}_paper"] = np.array(
+            [np.nan if choice.printed is None else choice.printed[column] for choice in choices]
+        )
+    data["failed"] = true["failed"].astype(np.int64)
+    data["samples"] = np.full(len(choices), study.verification.samples)
+    units = {name: study.variable(name).unit or "1" for name in used}
+    coords = {"design": np.array([choice.name for choice in choices])}
+    content = dataset.dataset("verification", coords, data, units=units)
+    content.attrs["confidence"] = study.verification.confidence
+    content.attrs["remarks"] = " ".join(remarks) if remarks else "none"
+    run.write(content, "verification.nc")
