@@ -1,0 +1,204 @@
+"""What is compiled: an effect that is off leaves no trace in the code, and the bare scene is as lean as by hand.
+
+With W = 1 every row of the kernel's buffers stands at a constant offset from its base, so the emitted LLVM shows which
+parameters and state rows the code touches. The coefficient of an effect has a row of its own, and its offset is the
+marker: code that never reads the gravity row does not compute gravity. Tabulated curves have a constant of their own,
+1/(2 pi).
+"""
+
+import math
+import re
+import struct
+
+import numpy as np
+import pytest
+from numba import njit, typeof, types
+
+from hpcclear.jit import FASTMATH, lane_function
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.rhs import accelerations
+from hpcclear.physics.angles import sincos
+
+FLAT = types.float64[::1]
+BARE = {"crank_rod", "rod_slider"}
+PER_TURN = f"0x{struct.unpack('>Q', struct.pack('>d', 0.5 / math.pi))[0]:016X}"
+
+
+def compiled(function, *argument_types):
+    """Emitted LLVM and assembly of one specialisation, compiled here and now."""
+    dispatcher = njit(
+        error_model="numpy", fastmath=FASTMATH, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
+    dispatcher.compile(argument_types)
+    return dispatcher.inspect_llvm(argument_types), dispatcher.inspect_asm(argument_types)
+
+
+def compiled_motion(effects, W=1):
+    """The kernel's right-hand side with these effects on."""
+
+    def motion(effects, work, par, torque_table, load_table):
+        accelerations(effects, work, par, torque_table, load_table, W)
+
+    flags = at.Effects(**dict.fromkeys(effects, 1))
+    return compiled(motion, typeof(flags), FLAT, FLAT, FLAT, FLAT)
+
+
+def par(row):
+    return ("par", row)
+
+
+def work(row):
+    return ("work", row)
+
+
+# effect: what is on besides it and the bare scene, and the markers of its law
+MARKERS = {
+    "crank_rod": (
+        set(),
+        {par(at.JOINT_12 + at.CLEARANCE), par(at.JOINT_12 + at.CONTACT_STIFFNESS)},
+    ),
+    "rod_slider": (
+        set(),
+        {par(at.JOINT_23 + at.CLEARANCE), par(at.JOINT_23 + at.CONTACT_STIFFNESS)},
+    ),
+    "fixed": (set(), {par(at.JOINT_12 + at.DAMPING)}),
+    "latched": (set(), {work(at.INVERSE_IMPACT_12), work(at.ACTIVE_23)}),
+    "coulomb": (set(), {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)}),
+    "ambrosio": (set(), {par(at.JOINT_12 + at.DEAD_SPEED), par(at.JOINT_23 + at.DEAD_SPEED)}),
+    "torque": (set(), {par(at.TORQUE), par(at.CRANK_INERTIA)}),
+    "torque_table": ({"torque"}, {("constant", PER_TURN)}),
+    "gravity": (set(), {par(at.GRAVITY)}),
+    "load": (set(), {par(at.LOAD)}),
+    "load_table": (set(), {par(at.LOAD), ("constant", PER_TURN)}),
+    "guide": (set(), {par(at.GUIDE_COEFFICIENT), par(at.GUIDE_INVERSE_RAMP)}),
+    "baumgarte": (set(), {par(at.BAUMGARTE_ALPHA2), par(at.BAUMGARTE_BETA2)}),
+    "ledger": (set(), {work(at.RATE_NOW + at.DRIVE_POWER), work(at.RATE_NOW + at.DISSIPATION)}),
+    "series": (set(), {work(at.RATE_NOW + at.FRICTION_12), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
+}
+# rows that an effect shares with another: not its own marker
+SHARED = {
+    "latched": {par(at.JOINT_12 + at.DAMPING)},
+    "ambrosio": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
+    "series": set(),
+    "baumgarte": set(),
+}
+
+
+def traces(llvm):
+    """Rows of the buffers that the code touches, and its floating constants."""
+    found = {("constant", constant) for constant in re.findall(r"0x[0-9A-F]{16}", llvm)}
+    pattern = r"getelementptr (?:inbounds |nuw )*(i8|double), ptr %arg\.(par|work)\.4, i64 (\d+)"
+    for element, name, offset in re.findall(pattern, llvm):
+        found.add((name, int(offset) // (8 if element == "i8" else 1)))
+    return found
+
+
+@pytest.fixture(scope="module")
+def bare():
+    return traces(compiled_motion(BARE)[0])
+
+
+@pytest.mark.parametrize("effect", MARKERS)
+def test_a_law_is_in_the_code_when_on_and_not_when_off(effect, bare):
+    with_, markers = MARKERS[effect]
+    on = BARE | with_ | {effect}
+    seen = traces(compiled_motion(on)[0])
+    assert markers <= seen
+    if effect in BARE:
+        without = traces(compiled_motion(BARE - {effect})[0])
+    else:
+        without = traces(compiled_motion(BARE | with_)[0]) if with_ else bare
+    assert not markers & without
+    for other, (_, others) in MARKERS.items():
+        if other not in on:
+            assert not (others - markers - SHARED.get(effect, set())) & seen, other
+
+
+def hertz_by_hand(work, par, W):
+    """Two clearances, Hertz's law, nothing else: written for this test alone, straight down."""
+    for i in range(W):
+        phi = par[at.SPEED * W + i] * work[at.STAGE_TIME * W + i]
+        s, c = sincos(phi)
+        st, ct = sincos(work[(at.QS + 2) * W + i])
+        crank, near, far = (
+            par[at.CRANK_LENGTH * W + i],
+            par[at.ROD_NEAR * W + i],
+            par[at.ROD_FAR * W + i],
+        )
+        omega, spin = par[at.SPEED * W + i], work[(at.VS + 2) * W + i]
+        x, y = work[at.QS * W + i], work[(at.QS + 1) * W + i]
+        vx, vy = work[at.VS * W + i], work[(at.VS + 1) * W + i]
+        ex, ey = crank * c - (x - near * ct), crank * s - (y - near * st)
+        ux, uy = (
+            -crank * omega * s - (vx + near * spin * st),
+            crank * omega * c - (vy - near * spin * ct),
+        )
+        inverse = 1.0 / math.sqrt(ex * ex + ey * ey + 1e-300)
+        nx, ny = ex * inverse, ey * inverse
+        gap = (ex * ex + ey * ey + 1e-300) * inverse - par[(at.JOINT_12 + at.CLEARANCE) * W + i]
+        depth = 0.5 * (gap + abs(gap))
+        force = par[(at.JOINT_12 + at.CONTACT_STIFFNESS) * W + i] * (depth * math.sqrt(depth))
+        fx, fy = force * nx, force * ny
+        work[(at.RATE_NOW + at.GAP_12) * W + i] = gap
+        work[(at.RATE_NOW + at.FORCE_12) * W + i] = force
+        work[(at.RATE_NOW + at.RATE_12) * W + i] = ux * nx + uy * ny
+        ex, ey = work[(at.QS + 3) * W + i] - (x + far * ct), -(y + far * st)
+        ux, uy = work[(at.VS + 3) * W + i] - (vx - far * spin * st), -(vy + far * spin * ct)
+        inverse = 1.0 / math.sqrt(ex * ex + ey * ey + 1e-300)
+        nx, ny = ex * inverse, ey * inverse
+        gap = (ex * ex + ey * ey + 1e-300) * inverse - par[(at.JOINT_23 + at.CLEARANCE) * W + i]
+        depth = 0.5 * (gap + abs(gap))
+        force = par[(at.JOINT_23 + at.CONTACT_STIFFNESS) * W + i] * (depth * math.sqrt(depth))
+        gx, gy = force * nx, force * ny
+        work[(at.RATE_NOW + at.GAP_23) * W + i] = gap
+        work[(at.RATE_NOW + at.FORCE_23) * W + i] = force
+        work[(at.RATE_NOW + at.RATE_23) * W + i] = ux * nx + uy * ny
+        moment = near * (st * fx - ct * fy) + far * (ct * gy - st * gx)
+        work[at.ACC * W + i] = (fx + gx) * par[at.INV_ROD_MASS * W + i]
+        work[(at.ACC + 1) * W + i] = (fy + gy) * par[at.INV_ROD_MASS * W + i]
+        work[(at.ACC + 2) * W + i] = moment * par[at.INV_ROD_INERTIA * W + i]
+        work[(at.ACC + 3) * W + i] = -gx * par[at.INV_SLIDER_MASS * W + i]
+
+
+def vector_loops(assembly):
+    """Instructions of every loop that is one block and takes square roots of vectors."""
+    loops, label, body = [], None, []
+    for line in assembly.splitlines():
+        text = line.split("#")[0].strip()
+        if match := re.fullmatch(r"(\.?L\w+):", text):
+            label, body = match[1], []
+        elif text and not text.startswith("."):
+            body.append(text)
+            if re.match(rf"(j\w+|b\.\w+|cbnz\s+\w+,)\s+{re.escape(label or '-')}$", text):
+                loops.append(body)
+    packed = re.compile(r"v?sqrtpd|fsqrt\s+v")
+    return [loop for loop in loops if any(packed.match(text) for text in loop)]
+
+
+def test_the_bare_scene_costs_what_a_kernel_by_hand_costs():
+    """Instructions of the vectorised loop over lanes; both programs have the same arithmetic to do."""
+    W = 32
+    by_hand_motion = lane_function(hertz_by_hand)
+
+    def by_hand(work, par):
+        by_hand_motion(work, par, W)
+
+    (hand,) = vector_loops(compiled(by_hand, FLAT, FLAT)[1])
+    (ours,) = vector_loops(compiled_motion(BARE, W)[1])
+    assert len(ours) <= 1.03 * len(hand)
+
+
+def test_the_kernel_by_hand_computes_the_same():
+    """Without this the comparison above would mean nothing."""
+    rng = np.random.default_rng(2)
+    W = 4
+    mine, hers = np.zeros((2, at.WORK * W))
+    values = np.abs(rng.normal(size=at.PARAMETERS * W)) + 0.1
+    mine[:] = hers[:] = rng.normal(size=at.WORK * W)
+    table = np.zeros(4)
+    njit(hertz_by_hand)(mine, values, W)
+    run = njit(lambda *arguments: accelerations(*arguments, W))
+    run(at.Effects(crank_rod=1, rod_slider=1), hers, values, table, table)
+    written = slice(at.ACC * W, (at.RATE_NOW + at.RATE_23 + 1) * W)
+    np.testing.assert_allclose(mine[written], hers[written], rtol=1e-11, atol=1e-11)
+    np.testing.assert_array_equal(mine[: at.ACC * W], hers[: at.ACC * W])
