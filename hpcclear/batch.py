@@ -1,6 +1,7 @@
 """The `sample` command: points -> ranks -> one dataset, checkpointed on the way."""
 
 import hashlib
+import os
 import shlex
 import sys
 import time
@@ -10,17 +11,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from . import __version__, dataset, storage
-from .checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from . import dataset, storage
+from .checkpoint import INTERVAL, Checkpoint, check_key, fresh_sibling, key_attribute, parts_of
 from .errors import InputError
 from .lock import Lock
 from .progress import Progress, Style
 from .ranks import COLUMNS, Ranks
 from .sampling import latin_hypercube, monte_carlo, read_points
 from .scene import Scene
-from .scene.paths import flatten
 from .scene.points import Points
-from .work import sample_points
+from .work import run_key, sample_points
 
 
 def design(scene: Scene, table: Path | None) -> Points:
@@ -43,11 +43,10 @@ def design(scene: Scene, table: Path | None) -> Points:
     return latin_hypercube(scene) if scene.study.method == "lhs" else monte_carlo(scene)
 
 
-def run_key(scene: Scene, points: Points) -> dict[str, str]:
-    """What makes a run what it is: every scene entry, the version, and the points themselves."""
+def sample_key(scene: Scene, points: Points) -> dict[str, str]:
+    """What makes a run what it is: see `hpcclear.work.run_key`; and the points themselves."""
     digest = hashlib.sha256(points.values.tobytes() + repr((points.names, points.paths)).encode())
-    entries = {name: repr(value) for name, value in flatten(scene.resolved())}
-    return {**entries, "hpcclear version": __version__, "points": digest.hexdigest()[:16]}
+    return {**run_key(scene, "sample"), "points": digest.hexdigest()[:16]}
 
 
 def finished(path: Path, key: dict[str, str]) -> xr.Dataset | None:
@@ -66,6 +65,7 @@ def run_sample(
     *,
     table: Path | None = None,
     fresh: bool = False,
+    interval: float = INTERVAL,
     style: Style = "auto",
 ) -> int:
     """Simulate a design on all ranks and write it; on root.
@@ -80,6 +80,8 @@ def run_sample(
         CSV of designs.
     fresh : bool
         Start anew beside an earlier result.
+    interval : float
+        Seconds between two checkpoints.
     style : str
         How progress is shown.
 
@@ -96,14 +98,14 @@ def run_sample(
 
     start = time.perf_counter()
     storage.probe(output)
-    if fresh:
+    if fresh and (os.path.lexists(output) or os.path.lexists(parts_of(output))):
         output = fresh_sibling(output)
     points = design(scene, table)
-    key = run_key(scene, points)
+    key = sample_key(scene, points)
     with Lock(output.parent, f".{output.name}.lock"):
         samples = finished(output, key)
         if samples is None:
-            samples = _simulate(scene, points, output, key, ranks, style)
+            samples = _simulate(scene, points, output, key, ranks, interval, style)
     timing = output.parent / "timing.nc"
     dataset.write(timing_of(ranks), timing)
     describe_samples(
@@ -113,25 +115,33 @@ def run_sample(
 
 
 def _simulate(
-    scene: Scene, points: Points, output: Path, key: dict[str, str], ranks: Ranks, style: Style
+    scene: Scene,
+    points: Points,
+    output: Path,
+    key: dict[str, str],
+    ranks: Ranks,
+    interval: float,
+    style: Style,
 ) -> xr.Dataset:
     """Simulate what is not finished yet, write the dataset, drop the checkpoint."""
     units = dict(zip(points.names, points.units, strict=True))
     attributes: dict[str, Any] = dataset.provenance(scene.text or scene.to_toml(), scene.hash)
-    checkpoint = Checkpoint(
-        output.parent / f".{output.name}.parts",
-        key,
-        names=points.names,
-        units=units,
-        attributes=attributes,
-    )
+    with ranks.stage("files"), ranks.writing():
+        checkpoint = Checkpoint(
+            parts_of(output),
+            key,
+            interval=interval,
+            names=points.names,
+            units=units,
+            attributes=attributes,
+        )
     for problem in checkpoint.problems:
         sys.stderr.write(f"{problem}\n")
     records = sample_points(scene, points, ranks, checkpoint, Progress("samples", style))
     samples = dataset.samples_dataset(
         points.names, points.values, units, records, {**attributes, **key_attribute(key)}
     )
-    with ranks.writing():
+    with ranks.stage("files"), ranks.writing():
         dataset.write(samples, output)
         checkpoint.finish()
     return samples

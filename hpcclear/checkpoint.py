@@ -7,6 +7,7 @@ files of plain arrays. Every file carries the key of its run, and only the same 
 """
 
 import json
+import os
 import re
 import time
 from collections import Counter
@@ -85,6 +86,11 @@ def _short(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
+def parts_of(output: Path) -> Path:
+    """Where the finished samples of a single result file are kept until it is written."""
+    return output.with_name(f".{output.name}.parts")
+
+
 def fresh_sibling(path: Path) -> Path:
     """The first free name beside `path`: DIR-2, DIR-3, ... or OUT-2.nc, OUT-3.nc, ...
 
@@ -104,7 +110,7 @@ def fresh_sibling(path: Path) -> Path:
                 pass
             except OSError as error:
                 raise storage.refused(sibling, error) from None
-        elif not sibling.exists() and not sibling.is_symlink():
+        elif not any(os.path.lexists(place) for place in (sibling, parts_of(sibling))):
             return sibling
         number += 1
 

@@ -36,6 +36,15 @@ _LIMIT = click.option(
     metavar="SECONDS",
     help="Stop early, resumable, after this time.",
 )
+_INTERVAL = click.option(
+    "--checkpoint-interval",
+    "interval",
+    type=click.FloatRange(min=0.0),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Save finished samples this often: what a crash costs at most.",
+)
 _PROGRESS = click.option(
     "--progress",
     type=click.Choice(["auto", "bar", "log", "quiet"]),
@@ -133,6 +142,7 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 )
 @_FRESH
 @_LIMIT
+@_INTERVAL
 @_PROGRESS
 def sample(
     file: Path,
@@ -141,6 +151,7 @@ def sample(
     points: Path | None,
     fresh: bool,
     time_limit: float | None,
+    interval: float,
     progress: Any,
 ) -> int:
     """Send the study's points, or a table of yours, through the dynamics.
@@ -152,7 +163,13 @@ def sample(
         from .batch import run_sample
 
         return run_sample(
-            _scene(file, overrides), output, ranks, table=points, fresh=fresh, style=progress
+            _scene(file, overrides),
+            output,
+            ranks,
+            table=points,
+            fresh=fresh,
+            interval=interval,
+            style=progress,
         )
 
     return _on_ranks(program, time_limit)

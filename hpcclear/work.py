@@ -133,7 +133,7 @@ def sample_points(
         )
     except BaseException:
         if checkpoint is not None:
-            with ranks.writing():
+            with ranks.stage(stage), ranks.writing():
                 checkpoint.flush()
         raise
     return records
