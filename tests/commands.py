@@ -1,0 +1,129 @@
+"""The real commands under mpiexec, for tests of what ends them: started, killed, resumed, read meanwhile."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from hpcclear import storage
+from hpcclear.errors import InputError
+
+ROOT = Path(__file__).parent.parent
+MPIEXEC = Path(sys.executable).parent / "mpiexec"
+PROGRAM = Path(__file__).parent / "mpi_programs" / "command.py"
+SCENE = ROOT / "jobs" / "quickstart.toml"
+# A sample that goes wild ends soon; the kernel is the shipped scene's, compiled once for all tests.
+CHEAP = ("numerics.max_steps=20000", "numerics.transient_revolutions=2")
+
+
+def overrides(*settings: str) -> list[str]:
+    """``--set`` options."""
+    return [word for setting in settings for word in ("--set", setting)]
+
+
+def sample(output: Path, samples: int, *options: str) -> list[str]:
+    """Words of a `sample` command of the quickstart."""
+    study = overrides(*CHEAP, f"study.samples={samples}")
+    return ["sample", str(SCENE), "-o", str(output), *study, *options]
+
+
+def start(
+    words: Sequence[str], ranks: int = 2, program: Sequence[str] = (str(PROGRAM),), **settings: str
+) -> subprocess.Popen:
+    """Start a command on so many ranks (0: without mpiexec), in a process group of its own."""
+    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    return subprocess.Popen(
+        [*launch, sys.executable, *program, *words],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | settings,
+        start_new_session=True,
+    )
+
+
+def finish(job: subprocess.Popen, seconds: float = 120.0) -> tuple[int, str]:
+    """Exit code and output; a job that does not end in time is killed and fails the test."""
+    try:
+        output, _ = job.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        for process in ranks_of(job).values():
+            kill(process)
+        os.killpg(job.pid, signal.SIGKILL)
+        output, _ = job.communicate()
+        pytest.fail(f"the job did not end within {seconds} s:\n{output}")
+    return job.returncode, output
+
+
+def run(words: Sequence[str], ranks: int = 2, **settings: str) -> tuple[int, str]:
+    """Exit code and output of a whole command."""
+    return finish(start(words, ranks, **settings))
+
+
+def kill(process: int, number: int = signal.SIGKILL) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, number)
+
+
+def ranks_of(job: subprocess.Popen) -> dict[int, int]:
+    """Process numbers of a job's ranks, by rank: those in its tree that a launcher gave a rank."""
+    parents, found = {}, {}
+    for place in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parents[int(place.name)] = int(
+                (place / "stat").read_text().rpartition(")")[2].split()[1]
+            )
+    for process in parents:
+        above = process
+        while above in parents and above != job.pid:
+            above = parents[above]
+        if above != job.pid:
+            continue
+        with contextlib.suppress(OSError):
+            for entry in Path(f"/proc/{process}/environ").read_bytes().split(b"\0"):
+                name, _, value = entry.partition(b"=")
+                if name == b"PMI_RANK":
+                    found[int(value)] = process
+    return found
+
+
+def result_files(folder: Path) -> list[Path]:
+    """Every NetCDF file in a results folder, checkpoints included."""
+    return sorted(path for path in folder.rglob("*.nc"))
+
+
+def check_readable(folder: Path) -> int:
+    """Read every file there is; a file that a merge has just removed does not count. Number read."""
+    count = 0
+    for path in result_files(folder):
+        try:
+            storage.load(path)
+        except InputError:
+            assert not path.exists(), f"{path} cannot be read"
+        else:
+            count += 1
+    return count
+
+
+def wait_until(
+    job: subprocess.Popen, moment: float, folder: Path, *, writing: bool = False
+) -> None:
+    """Read all files again and again until a moment (`time.time`), or the job's end.
+
+    With `writing`, go on until a file is being written.
+    """
+    while job.poll() is None and time.time() < moment:
+        check_readable(folder)
+        time.sleep(0.02)
+    patience = time.time() + 3.0
+    while writing and job.poll() is None and time.time() < patience:
+        if any(folder.rglob(".hpcclear-*.tmp")):
+            return
