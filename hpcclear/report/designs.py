@@ -1,4 +1,4 @@
-"""Figures of the optimised designs: fronts, responses side by side, and where the ranks' time went."""
+"""Figures of the optimised designs: fronts, and responses side by side."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,13 @@ _QUANTITIES = (
     ("slider_acceleration", "", "slider acceleration\n"),
 )
 
+_MARKS = (
+    ("paper", "the paper's, directly", "D"),
+    ("original", "the original, directly", "s"),
+    ("", "ours, directly simulated", "o"),
+)
+"""Words in a design's name, what such a design is called, and its mark."""
+
 
 @style.drawn
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
@@ -38,7 +45,7 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
     cases = [str(case) for case in front["case"].to_numpy()]
     figure, axes = style.grid(len(cases), 1, 14.0 + 56.0 * len(cases), sharex=True)
     x = labels.of(front["mean"])
-    y = labels.scale("m", front["deviation"].to_numpy())
+    y = labels.of(front["deviation"])
     for panel, case in zip(axes[:, 0], cases, strict=True):
         one = front.sel(case=case)
         for k, run in enumerate(front["run"].to_numpy()):
@@ -52,7 +59,8 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
         panel.set_ylabel(y.label(r"deviation $\sigma_f$"))
     axes[-1, 0].set_xlabel(x.label(r"mean $\mu_f$"))
     handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside lower center", ncols=3, columnspacing=1.0)
+    once = dict(zip(words, handles, strict=True))
+    figure.legend(list(once.values()), list(once), loc="outside lower center", ncols=2)
     style.settle(axes)
     return figure
 
@@ -61,51 +69,47 @@ def _verified(
     panel: Any, verification: xr.Dataset, case: str, x: labels.Scale, y: labels.Scale
 ) -> None:
     """True mean and deviation of the designs of a case, each joined to the surrogate's."""
-    if "case" in verification:
-        verification = verification.isel(
-            design=np.flatnonzero(verification["case"].to_numpy() == case)
-        )
-    mean, deviation = (
-        verification["mean_true"].to_numpy(),
-        verification["deviation_true"].to_numpy(),
+    names = [str(name) for name in verification["design"].to_numpy()]
+    cases = (
+        [str(c) for c in verification["case"].to_numpy()]
+        if "case" in verification
+        else [case] * len(names)
     )
-    bars = []
-    for name, true, unit in (("mean", mean, x), ("deviation", deviation, y)):
-        sides = [f"{name}_lower", f"{name}_upper"]
-        known = all(side in verification for side in sides)
-        bars.append(
-            np.abs([verification[side].to_numpy() - true for side in sides]) * unit.factor
-            if known
-            else None
+    for k, name in enumerate(names):
+        if cases[k] != case:
+            continue
+        one = verification.isel(design=k)
+        label, marker = next(row[1:] for row in _MARKS if row[0] in name)
+        at = float(one["mean_true"]) * x.factor, float(one["deviation_true"]) * y.factor
+        options: dict[str, Any] = {
+            "fmt": marker,
+            "ms": 3.4,
+            "mfc": "white",
+            "mew": 0.7,
+            "zorder": 4,
+        }
+        bars = _limits(one, "mean", x), _limits(one, "deviation", y)
+        panel.errorbar(
+            *at, xerr=bars[0], yerr=bars[1], color="black", elinewidth=0.6, label=label, **options
         )
-    options: dict[str, Any] = {"fmt": "o", "mfc": "white", "mec": "black", "ecolor": "black"}
-    options |= {
-        "ms": 3.6,
-        "mew": 0.8,
-        "elinewidth": 0.7,
-        "zorder": 4,
-        "label": "by direct simulation",
-    }
-    panel.errorbar(mean * x.factor, deviation * y.factor, xerr=bars[0], yerr=bars[1], **options)
-    if "mean_surrogate" in verification and "deviation_surrogate" in verification:
-        guess = (
-            verification["mean_surrogate"].to_numpy(),
-            verification["deviation_surrogate"].to_numpy(),
-        )
-        for k in range(len(mean)):
-            line = [(guess[0][k], mean[k]), (guess[1][k], deviation[k])]
-            panel.plot(
-                np.array(line[0]) * x.factor, np.array(line[1]) * y.factor, "k-", lw=0.5, zorder=3
+        if "mean_surrogate" in one and "deviation_surrogate" in one:
+            guess = (
+                float(one["mean_surrogate"]) * x.factor,
+                float(one["deviation_surrogate"]) * y.factor,
             )
-    for k, name in enumerate(verification["design"].to_numpy()):
-        greek = next(
-            (mark for word, mark in (("alpha", "α"), ("beta", "β")) if word in str(name)), None
-        )
+            panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
+        greek = {f"{case} alpha": "α", f"{case} beta": "β"}.get(name)
         if greek is not None:
-            at = (mean[k] * x.factor, deviation[k] * y.factor)
-            panel.annotate(
-                greek, at, xytext=(4, 3), textcoords="offset points", fontsize=style.NORMAL
-            )
+            options = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": style.SMALL}
+            panel.annotate(greek, at, **options)
+
+
+def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
+    """Distances to the confidence limits as `errorbar` wants them, (2, 1); None if there are none."""
+    if f"{name}_lower" not in one or f"{name}_upper" not in one:
+        return None
+    sides = [float(one[f"{name}_{side}"]) for side in ("lower", "upper")]
+    return np.abs(np.array(sides)[:, None] - float(one[f"{name}_true"])) * unit.factor
 
 
 @style.drawn
@@ -159,14 +163,13 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
     for panel, title in zip(axes[0], columns, strict=True):
         panel.set_title(title)
     for panel in axes[-1]:
-        panel.set_xlabel("crank angle (revolutions)")
+        panel.set_xlabel("crank angle (rev.)")
     entries: dict[str, Any] = {}
     for panel in axes[0]:
         entries |= {w: h for h, w in zip(*panel.get_legend_handles_labels(), strict=True)}
-    words = [labels.literal(word) for word in entries]
-    figure.legend(
-        list(entries.values()), words, loc="outside lower center", ncols=3, columnspacing=1.0
-    )
+    texts = [labels.literal(text) for text in entries]
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "columnspacing": 1.0}
+    figure.legend(list(entries.values()), texts, **where)
     style.settle(axes, 4)
     figure.align_ylabels(axes[:, 0])
     return figure
@@ -187,52 +190,3 @@ def _kind(name: str) -> str:
     """A design's name without α or β: what has the same colour in both columns."""
     bare = name.replace("alpha", "").replace("beta", "").strip(" _-.,")
     return bare or name
-
-
-@style.drawn
-def timing_figure(timing: xr.Dataset) -> "Figure":
-    """How every rank spent its time, and how much of it each stage took.
-
-    Parameters
-    ----------
-    timing : xarray.Dataset
-        Kind ``timing``.
-
-    Returns
-    -------
-    matplotlib Figure
-    """
-    sizes = [min(timing.sizes["rank"], 64), timing.sizes["stage"]]
-    figure, axes = style.grid(
-        2, 1, 40.0 + 5.0 * max(3, sum(sizes)), height_ratios=[max(2, s) for s in sizes]
-    )
-    parts = (
-        ("busy", "computing", "blue"),
-        ("compile", "compiling", "orange"),
-        ("write", "writing", "green"),
-    )
-    parts += (("idle", "waiting", "grey"),)
-    for panel, along, over in zip(axes[:, 0], ("rank", "stage"), ("stage", "rank"), strict=True):
-        names = [labels.literal(str(name)) for name in timing[along].to_numpy()]
-        left = np.zeros(len(names))
-        for name, label, colour in parts:
-            spent = timing[name].sum(over).to_numpy()
-            panel.barh(
-                np.arange(len(names)),
-                spent,
-                0.7,
-                left=left,
-                color=style.PALETTE[colour],
-                label=label,
-            )
-            left += spent
-        if len(names) <= 64:
-            panel.set_yticks(np.arange(len(names)), names)
-        panel.invert_yaxis()
-        panel.grid(axis="y", visible=False)
-        panel.set_ylabel(f"{along} ({'number' if along == 'rank' else 'name'})")
-        panel.set_xlabel("time (s)" if along == "rank" else "time of all ranks (s)")
-    handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside lower center", ncols=4, columnspacing=1.0)
-    style.settle(axes)
-    return figure

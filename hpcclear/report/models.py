@@ -28,6 +28,7 @@ class Model:
     scale: float
     points: Array  # (n, d), user's units
     values: Array  # (n,)
+    weights: Array  # (n,)
 
     def _features(self, points: Array) -> Array:
         return (points - self.lower) / (self.upper - self.lower) / self.lengths
@@ -37,15 +38,9 @@ class Model:
         steps = self._features(first)[:, None, :] - self._features(second)[None, :, :]
         return self.signal * np.exp(-0.5 * np.einsum("ijk,ijk->ij", steps, steps))
 
-    def _inverse(self) -> tuple[Array, Array]:
-        matrix = self._covariance(self.points, self.points) + self.noise * np.eye(len(self.values))
-        inverse: Array = np.linalg.inv(matrix)
-        return inverse, inverse @ ((self.values - self.mean) / self.scale)
-
     def predict(self, points: Array) -> Array:
         """The Kriging mean at points (m, d)."""
-        weights = self._inverse()[1]
-        return self.mean + self.scale * (self._covariance(points, self.points) @ weights)
+        return self.mean + self.scale * (self._covariance(points, self.points) @ self.weights)
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).
@@ -53,8 +48,9 @@ class Model:
         Closed form: the error is weight over the diagonal of the inverse covariance (Rasmussen and Williams,
         Gaussian Processes for Machine Learning, 2006, eq. 5.12).
         """
-        inverse, weights = self._inverse()
-        return self.values - self.scale * weights / np.diag(inverse)
+        matrix = self._covariance(self.points, self.points)
+        inverse = np.linalg.inv(matrix + self.noise * np.eye(len(self.values)))
+        return self.values - self.scale * self.weights / np.diag(inverse)
 
 
 def families(kriging: xr.Dataset) -> dict[str, list[Model]]:
@@ -86,9 +82,9 @@ def _model(row: xr.Dataset) -> Model:
     numbers = ("signal_variance", "noise_variance", "output_mean", "output_scale")
     signal, noise, mean, scale = (float(row[name]) for name in numbers)
     lengths = row["length_scale"].to_numpy()[used]
-    return Model(
-        inputs, lower, upper, lengths, signal, noise, mean, scale, points[good], values[good]
-    )
+    fit = lengths, signal, noise, mean, scale
+    weights = row["weight"].to_numpy()[good]
+    return Model(inputs, lower, upper, *fit, points[good], values[good], weights)
 
 
 def predict(models: list[Model], points: Array) -> Array:

@@ -16,6 +16,18 @@ def turns(response: xr.Dataset) -> Array:
     return response["crank_angle"].to_numpy() / TURN
 
 
+def whole_turns(response: xr.Dataset) -> int:
+    """How many whole revolutions, from one passage of crank angle 0 to the last, a response holds."""
+    angle = turns(response)
+    return int(np.floor(angle[-1] + 1e-6)) - int(np.ceil(angle[0] - 1e-6))
+
+
+def latest(response: xr.Dataset, revolutions: int) -> xr.Dataset:
+    """The last whole revolutions; all there is of a response that ended in the first."""
+    whole = whole_turns(response)
+    return steady(response, min(revolutions, whole)) if whole > 0 else response
+
+
 def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
     """The last whole revolutions of a response.
 
@@ -37,12 +49,13 @@ def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
         The response holds fewer revolutions.
     """
     angle = turns(response)
-    whole = int(np.floor(angle[-1] + 1e-6))
-    count = max(1, whole // 2) if revolutions is None else revolutions
+    last = int(np.floor(angle[-1] + 1e-6))
+    whole = whole_turns(response)
+    count = max(1, (whole + 1) // 2) if revolutions is None else revolutions
     if count < 1 or count > whole:
         reason = f"the response has {whole} whole revolutions"
         raise InputError("revolutions", count, reason, "Simulate more revolutions, or draw fewer")
-    inside = (angle >= whole - count - 1e-6) & (angle <= whole + 1e-6)
+    inside = (angle >= last - count - 1e-6) & (angle <= last + 1e-6)
     return response.isel(time=np.flatnonzero(inside))
 
 

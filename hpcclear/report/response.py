@@ -41,7 +41,7 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     -------
     matplotlib Figure
     """
-    shown = _last(response, revolutions)
+    shown = motion.latest(response, revolutions)
     names = (
         "slider_position",
         "slider_velocity",
@@ -79,7 +79,7 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 @style.drawn
 def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     """Penetration of both joints over the last revolutions; parameters as for `response_figure`."""
-    shown = _last(response, revolutions)
+    shown = motion.latest(response, revolutions)
     figure, axes = style.grid(2, 1, 80.0, sharex=True, sharey=True)
     unit = labels.of(shown["penetration"])
     for panel, (joint, colour, _) in zip(axes[:, 0], _JOINT_STYLES, strict=True):
@@ -134,6 +134,9 @@ def spectrum_figure(
     axes[1, 0].set_ylabel(unit.label("contact force"))
     axes[1, 0].set_xlabel("order (multiples of the crank frequency)")
     axes[0, 0].set_title("amplitudes")
+    for panel in axes[:, 0]:
+        highest = max(float(np.max(line.get_ydata())) for line in panel.lines)
+        panel.set_ylim(1e-6 * highest, 3.0 * highest)  # what is below is the window's own
     style.settle(axes)
     return figure
 
@@ -223,21 +226,10 @@ def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None 
     for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
         unit = labels.scale(units, np.concatenate(values))
         x = np.repeat(clearances, [len(v) for v in values]) * across.factor
-        panel.plot(
-            x,
-            np.concatenate(values) * unit.factor,
-            ".",
-            color=style.PALETTE["blue"],
-            ms=1.6,
-            mew=0.0,
-        )
+        size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
+        y = np.concatenate(values) * unit.factor
+        panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"])
         panel.set_ylabel(unit.label(words))
     axes[1, 0].set_xlabel(across.label("clearance $C$"))
     style.settle(axes)
     return figure
-
-
-def _last(response: xr.Dataset, revolutions: int) -> xr.Dataset:
-    """The last whole revolutions, or all there is of a response that ended early."""
-    whole = int(np.floor(motion.turns(response)[-1] + 1e-6))
-    return motion.steady(response, min(revolutions, whole)) if whole else response

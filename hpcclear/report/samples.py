@@ -113,7 +113,8 @@ def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.Data
     below.set_ylabel(labels.of(samples["objective_spread"]).label("spread of $f$"))
     if bool((samples["objective_spread"] > 0).any()):
         below.set_yscale("log")
-    style.settle([first, side, below])
+    style.settle([first, below])
+    style.settle([side], 3)
     corner = figure.add_subplot(cells[1, 1])
     corner.set_axis_off()
     corner.legend(handles=_marks(samples), loc="lower center", handletextpad=0.4, borderpad=0.0)

@@ -31,7 +31,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
     """
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     rows = (len(surfaces) + 1) // 2
-    figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True)
+    figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True, sharey=True)
     unit = labels.of(sensitivity["sensitivity"])
     across = labels.of(sensitivity["clearance"])
     for panel, surface in zip(axes.flat, surfaces, strict=False):
@@ -40,7 +40,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("slope × range"))
     _finish_grid(axes, len(surfaces), across.label("clearance $C$"))
-    style.settle(axes, 4)
+    style.settle(figure.axes, 4)
     return figure
 
 
@@ -252,7 +252,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     """
     found = models.families(kriging)
     rows = (len(found) + 1) // 2
-    figure, axes = style.grid(rows, 2, 14.0 + 44.0 * rows)
+    figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
     unit = labels.of(kriging["training_output"])
     family = kriging["family"].to_numpy() if "family" in kriging else kriging["model"].to_numpy()
     for panel, (name, parts) in zip(axes.flat, found.items(), strict=False):
@@ -260,18 +260,17 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
             true, guess = model.values * unit.factor, model.leave_one_out() * unit.factor
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
-        ends = [
-            min(panel.get_xlim()[0], panel.get_ylim()[0]),
-            max(panel.get_xlim()[1], panel.get_ylim()[1]),
-        ]
-        panel.plot(ends, ends, "k-", lw=0.5, zorder=0)
         worst = float(kriging["r2"].to_numpy()[family == name].min())
-        panel.set_title(f"{', '.join(map(symbol, parts[0].inputs))}: $R^2$ = {worst:.3f}")
+        panel.set_title(f"{', '.join(map(symbol, parts[0].inputs))}\n$R^2$ = {worst:.3f}")
+    limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
+    ends = (min(limits)[0], max(high for _, high in limits))
+    for panel in axes.flat:
+        panel.plot(ends, ends, "k-", lw=0.5, zorder=0)
         panel.set(xlim=ends, ylim=ends, aspect="equal")
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("$f$ by the surrogate"))
     _finish_grid(axes, len(found), unit.label("$f$ by the dynamics"))
-    style.settle(axes, 4)
+    style.settle(figure.axes, 4)
     return figure
 
 

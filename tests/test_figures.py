@@ -1,0 +1,253 @@
+"""Every figure is readable in print: axes labelled with units, 7 pt and more, nothing cut off or overlapping."""
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from itertools import combinations
+
+import numpy as np
+import pytest
+import report_data as data
+import xarray as xr
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+from hpcclear import report
+from hpcclear.errors import InputError
+from hpcclear.report import labels, models, motion, style
+from hpcclear.surrogate.kriging import fit_kriging
+
+DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
+
+
+def _odd_samples() -> xr.Dataset:
+    """Design variables that are scene paths, one sample of two failed, no clearance."""
+    made = data.samples(4, failed=2).rename(m2="effects_friction_coefficient", C="joints_gap")
+    made = made.drop_vars(["m3", "u2", "I2"])
+    made["effects_friction_coefficient"].attrs.update(
+        scene_path="effects.friction.a_very_long_name_with_$igns_$.coefficient", units="1"
+    )
+    made["joints_gap"].attrs["scene_path"] = "mechanism.rod.length"
+    return made
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "samples": lambda: report.samples_figure(data.samples()),
+    "samples, two variables": lambda: report.samples_figure(_odd_samples()),
+    "samples, one variable": lambda: report.samples_figure(
+        data.samples(failed=1).drop_vars(["m2", "m3", "u2", "I2"])
+    ),
+    "sensitivity": lambda: report.sensitivity_figure(data.sensitivity()),
+    "fit": lambda: report.fit_figure(data.sensitivity()),
+    "sobol": lambda: report.sobol_figure(data.sensitivity()),
+    "surfaces": lambda: report.surfaces_figure(data.kriging()),
+    "parity": lambda: report.parity_figure(data.kriging()),
+    "front": lambda: report.front_figure(data.front()),
+    "front, verified": lambda: report.front_figure(data.front(), data.verification()),
+    "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
+    "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
+    "response": lambda: report.response_figure(data.response()),
+    "penetration": lambda: report.penetration_figure(data.response()),
+    "energy": lambda: report.energy_figure(data.response()),
+    "spectrum": lambda: report.spectrum_figure(data.response()),
+    "orbit": lambda: report.orbit_figure(data.response()),
+    "force polar": lambda: report.force_polar_figure(data.response()),
+    "phase": lambda: report.phase_figure(data.response()),
+    "poincare": lambda: report.poincare_figure(data.response()),
+    "bifurcation": lambda: report.bifurcation_figure(
+        [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
+    ),
+    "timing": lambda: report.timing_figure(data.timing()),
+    "timing, one rank": lambda: report.timing_figure(data.timing(1)),
+}
+
+
+@pytest.fixture(scope="module", params=FIGURES)
+def figure(request: pytest.FixtureRequest) -> Figure:
+    made = FIGURES[request.param]()
+    FigureCanvasAgg(made).draw()
+    return made
+
+
+def _drawn_ticks(axis: Axis) -> Iterator[Text]:
+    """Tick labels that are on the page: inside the limits and switched on."""
+    low, high = sorted(axis.get_view_interval())
+    slack = 1e-9 * (high - low)
+    for tick in axis.get_major_ticks():
+        if low - slack <= tick.get_loc() <= high + slack:
+            yield from (label for label in (tick.label1, tick.label2) if label.get_visible())
+
+
+def texts(figure: Figure) -> list[Text]:
+    """Every piece of text that is drawn."""
+    found = [*figure.texts, *([figure._suptitle] if figure._suptitle else [])]
+    legends: list[Legend] = list(figure.legends)
+    for axes in figure.axes:
+        if axes.axison:
+            found += [axes.title, axes._left_title, axes._right_title]
+            found += axes.texts
+            for axis in (axes.xaxis, axes.yaxis):
+                found += [axis.label, axis.get_offset_text(), *_drawn_ticks(axis)]
+        legends += [axes.get_legend()] if axes.get_legend() else []
+    for legend in legends:
+        found += [*legend.get_texts(), legend.get_title()]
+    return [text for text in dict.fromkeys(found) if text.get_visible() and text.get_text().strip()]
+
+
+def test_type_is_at_least_7_pt_at_one_column(figure: Figure) -> None:
+    width = figure.get_figwidth() * 25.4
+    sizes = {text.get_text(): text.get_fontsize() * 85.0 / width for text in texts(figure)}
+    assert len(sizes) > 3
+    assert min(sizes.values()) >= 7.0, min(sizes, key=sizes.__getitem__)
+
+
+def test_text_lies_inside_the_page(figure: Figure) -> None:
+    page = figure.bbox.padded(0.5)
+    for text in texts(figure):
+        box = text.get_window_extent()
+        assert page.x0 <= box.x0 <= box.x1 <= page.x1, text
+        assert page.y0 <= box.y0 <= box.y1 <= page.y1, text
+
+
+def test_texts_do_not_overlap(figure: Figure) -> None:
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts(figure)]
+    for (first, a), (second, b) in combinations(boxes, 2):
+        common = Bbox.intersection(a, b)
+        if common is not None:
+            assert min(common.width, common.height) < 2.0, (first, second)
+
+
+def test_every_axis_has_a_label_with_its_unit(figure: Figure) -> None:
+    checked = 0
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axes.axison and any(text.get_text() for text in _drawn_ticks(axis)):
+                assert re.search(r"\(.+\)$", axis.get_label_text()), axis.get_label_text()
+                checked += 1
+    assert checked >= 2
+
+
+def test_no_panel_is_empty(figure: Figure) -> None:
+    for axes in figure.axes:
+        assert not axes.axison or axes.has_data() or axes.get_label() == "<colorbar>"
+
+
+def test_figures_are_bytewise_reproducible() -> None:
+    for kind in ("png", "svg", "pdf"):
+        first, second = (
+            style.render(report.timing_figure(data.timing()), kind, 60) for _ in range(2)
+        )
+        assert first == second, kind
+
+
+def test_the_users_settings_are_left_alone() -> None:
+    import matplotlib
+
+    with matplotlib.rc_context({"font.size": 3.0, "axes.facecolor": "red"}):
+        made = report.timing_figure(data.timing())
+        assert matplotlib.rcParams["font.size"] == 3.0
+        assert made.axes[0].get_facecolor()[:3] == (1.0, 1.0, 1.0)
+
+
+def test_saved_under_the_name_given(tmp_path) -> None:
+    path = report.save(report.timing_figure(data.timing()), tmp_path / "timing.svg")
+    assert path.read_text().startswith("<?xml")
+    with pytest.raises(InputError, match="png, svg or pdf"):
+        report.save(report.timing_figure(data.timing()), tmp_path / "timing.docx")
+    with pytest.raises(InputError, match="No such"):
+        report.save(report.timing_figure(data.timing()), tmp_path / "nowhere" / "timing.png")
+
+
+def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r"hpcclear\[analysis\]"):
+        report.timing_figure(data.timing())
+
+
+def test_refusals_name_what_is_missing() -> None:
+    with pytest.raises(InputError, match="no design variable"):
+        report.samples_figure(data.samples().drop_vars(list(data.NAMES)))
+    with pytest.raises(InputError, match="Sobol"):
+        report.sobol_figure(data.sensitivity().drop_vars("sobol_total"))
+    with pytest.raises(InputError, match="two design variables"):
+        report.surfaces_figure(data.kriging().isel(model=[2]))
+    with pytest.raises(InputError, match="4 whole revolutions"):
+        report.orbit_figure(data.response(4), revolutions=5)
+    with pytest.raises(InputError, match="nothing to draw"):
+        report.bifurcation_figure([])
+
+
+@pytest.mark.parametrize(
+    ("units", "value", "factor", "shown"),
+    [
+        ("m", 0.17, 1e3, "mm"),
+        ("m", 2.0e-4, 1e3, "mm"),
+        ("m", 3.2e-5, 1e6, "µm"),
+        ("m", 1.5, 1.0, "m"),
+        ("m", np.nan, 1.0, "m"),
+        ("kg", 0.2, 1.0, "kg"),
+        ("kg*m**2", 2.5e-4, 1e6, "kg mm²"),
+        ("N", 8_000.0, 1e-3, "kN"),
+        ("m/s^2", 2e4, 1e-3, "km/s²"),
+        ("m/s", 30.0, 1.0, "m/s"),
+        ("N m", 200.0, 1.0, "N m"),
+        ("J", 2e-3, 1e3, "mJ"),
+        ("1", 5.0, 1.0, "–"),
+        ("rad", 5.0, 1.0, "rad"),
+    ],
+)
+def test_units_of_a_readable_size(units: str, value: float, factor: float, shown: str) -> None:
+    found = labels.scale(units, value)
+    assert found.unit == shown
+    assert found.factor == pytest.approx(factor)
+
+
+def test_objective_of_each_turn_is_the_time_mean() -> None:
+    response = data.response(5, clearance=2e-4, instants=1000)
+    # |e| - c is half a clearance for a tenth of the turn and a fifth for the rest, in both joints
+    expected = np.sqrt(2.0) * 2e-4 * (0.1 * 0.5 + 0.9 * 0.2)
+    np.testing.assert_allclose(motion.objective_by_turn(response)[:4], expected, rtol=1e-3)
+    np.testing.assert_allclose(motion.clearances(response), 2e-4, rtol=1e-12)
+
+
+def test_a_steady_response_that_starts_late_keeps_its_revolutions() -> None:
+    late = motion.steady(data.response(6), 2)
+    assert motion.whole_turns(late) == 2
+    assert motion.whole_turns(motion.latest(late, 5)) == 2
+    np.testing.assert_allclose(motion.section(late, "slider_position"), 0.17)
+
+
+def test_spectrum_finds_amplitude_and_order() -> None:
+    response = data.response(8, instants=500)
+    order, amplitude = motion.spectrum(
+        response, 3.0 * np.cos(5.0 * response["crank_angle"].to_numpy()) + 7.0
+    )
+    peak = int(np.argmax(amplitude))
+    assert order[peak] == pytest.approx(5.0)
+    assert amplitude[peak] == pytest.approx(3.0, rel=1e-6)
+
+
+def test_models_of_a_file_predict_as_the_surrogate_does() -> None:
+    points, bounds = data.design(40, 2), np.column_stack([data.LOWER, data.UPPER])
+    oracle = fit_kriging(points, data.noisy(points, 2), bounds, rng=np.random.default_rng(2))
+    model = models.families(data.kriging())["m2 m3 u2 I2 C"][0]
+    fresh = data.design(20, 9)
+    np.testing.assert_allclose(models.predict([model], fresh), oracle.predict(fresh), rtol=1e-7)
+    assert np.isnan(models.predict([model], fresh * 10.0)).all()
+
+
+def test_leave_one_out_is_what_a_model_without_the_point_predicts() -> None:
+    model = models.families(data.kriging())["u2 I2 C"][0]
+    keep = np.arange(len(model.values)) != 7
+    matrix = model._covariance(model.points[keep], model.points[keep]) + model.noise * np.eye(
+        keep.sum()
+    )
+    weights = np.linalg.solve(matrix, (model.values[keep] - model.mean) / model.scale)
+    across = model._covariance(model.points[7:8], model.points[keep])
+    expected = model.mean + model.scale * float((across @ weights)[0])
+    error = abs(expected - model.values[7])
+    assert model.leave_one_out()[7] == pytest.approx(expected, abs=1e-6 * error)
