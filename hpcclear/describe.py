@@ -195,7 +195,8 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
         )
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
     rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
-    busy = sum(t[:, 0] for t in ranks.stage_seconds.values())
+    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
+    busy = spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
         rows.append(
@@ -206,7 +207,7 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
             )
         )
     rows.append(("wall time", f"{wall:.1f} s"))
-    for rank, row in enumerate(sum(ranks.stage_seconds.values())):
+    for rank, row in enumerate(spent):
         rows.append(
             (
                 f"rank {rank}",

@@ -1,0 +1,118 @@
+"""The commands as a person types them: output, exit codes, messages."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from hpcclear import dataset
+
+ROOT = Path(__file__).resolve().parent.parent
+SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.averaged_revolutions=1"]
+
+
+def hpcclear(*words, timeout=300, module=False, **more):
+    """Run a command in a process of its own."""
+    program = [sys.executable, "-m", "hpcclear"] if module else [str(Path(sys.executable).parent / "hpcclear")]
+    return subprocess.run(
+        [*program, *map(str, words)], capture_output=True, text=True, timeout=timeout, cwd=ROOT, check=False, **more
+    )
+
+
+def test_check_says_what_would_be_simulated():
+    done = hpcclear("check", "jobs/slider_crank.toml", *SHORT)
+    assert done.returncode == 0, done.stderr
+    for word in ("effect 1", "lankarani-nikravesh", "8 (positions", "force evaluations", "ms on one core"):
+        assert word in done.stdout
+    assert "Warning" in done.stdout  # the paper's own rod
+    assert "\x1b" not in done.stdout  # no colours in a pipe
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+
+
+def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
+    out = tmp_path / "response.nc"
+    done = hpcclear("simulate", "jobs/slider_crank.toml", "-o", out, *SHORT)
+    assert done.returncode == 0, done.stderr
+    assert "objective f" in done.stdout
+    response = xr.open_dataset(out)
+    assert response["slider_position"].attrs["units"] == "m"
+    assert response.sizes["time"] == 721
+    assert dataset.read(out, "response")["status"] == 0
+
+
+def test_both_entry_points_give_version_and_help():
+    for module in (False, True):
+        assert "0.1.0" in hpcclear("--version", module=module).stdout
+    for command in ("check", "simulate", "sample", "run", "report"):
+        done = hpcclear(command, "--help")
+        assert done.returncode == 0
+        assert "Example" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "fragment"),
+    [
+        (["check", "no_such_file.toml"], "no_such_file.toml"),
+        (["check", "jobs/slider_crank.toml", "--set", "drive.spead=1"], "speed"),
+        (["check", "jobs/slider_crank.toml", "--set", "mechanism.rod.length=0.01"], "longer than the crank"),
+        (["simulate", "jobs/slider_crank.toml"], "--output"),
+        (["simulate", "jobs/slider_crank.toml", "-o", "/no/such/directory/x.nc"], "/no/such/directory"),
+        (["sample", "jobs/slider_crank.toml", "-o", "results/x.nc"], "study"),
+        (["frobnicate"], "No such command"),
+        (["sample", "jobs/quickstart.toml", "-o", "results/x.nc", "--points", "README.md"], "README.md"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_code_2(words, fragment):
+    done = hpcclear(*words)
+    assert done.returncode == 2
+    assert fragment in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_table_of_designs(tmp_path):
+    table = tmp_path / "designs.csv"
+    table.write_text("m2,C [mm]\n0.2,0.3\n0.3,0.5\n")
+    out = tmp_path / "designs.nc"
+    done = hpcclear("sample", "jobs/slider_crank.toml", "-o", out, "--points", table, *SHORT)
+    assert done.returncode == 0, done.stderr
+    samples = dataset.read(out, "samples")
+    assert samples["C"].to_numpy().tolist() == [3e-4, 5e-4]
+    assert (tmp_path / "timing.nc").exists()
+
+
+@pytest.mark.mpi
+def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
+    mpiexec = Path(sys.executable).parent / "mpiexec"
+    program = Path(sys.executable).parent / "hpcclear"
+    files = []
+    for ranks in (0, 1, 2, 3):
+        out = tmp_path / str(ranks) / "samples.nc"
+        out.parent.mkdir()
+        launcher = [str(mpiexec), "-n", str(ranks)] if ranks else []
+        command = [*launcher, str(program), "sample", "jobs/quickstart.toml", "-o", str(out)]
+        done = subprocess.run(
+            [*command, "--set", "study.samples=150"], capture_output=True, text=True, timeout=300, cwd=ROOT, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        files.append(out.read_bytes())
+    assert all(content == files[0] for content in files[1:])
+
+
+def test_repeating_a_finished_command_does_nothing_and_another_scene_is_refused(tmp_path):
+    out = tmp_path / "samples.nc"
+    words = ["sample", "jobs/quickstart.toml", "-o", out, "--set", "study.samples=40", "--progress", "quiet"]
+    assert hpcclear(*words).returncode == 0
+    before = (out.read_bytes(), os.stat(out).st_mtime_ns)
+    assert hpcclear(*words).returncode == 0
+    assert (out.read_bytes(), os.stat(out).st_mtime_ns) == before
+    other = hpcclear(*words, "--set", "drive.speed=500.0")
+    assert other.returncode == 2
+    assert "drive.speed" in other.stderr
+    assert out.read_bytes() == before[0]
+    fresh = hpcclear(*words, "--set", "drive.speed=500.0", "--fresh")
+    assert fresh.returncode == 0
+    assert out.read_bytes() == before[0]
+    assert len(list(tmp_path.glob("samples*.nc"))) == 2

@@ -1,0 +1,77 @@
+"""How far a result says it can be trusted: uncertainty, automatic averages, flags."""
+
+import numpy as np
+import pytest
+
+from hpcclear.evaluator import evaluate_records
+from hpcclear.sampling import latin_hypercube
+from hpcclear.scene import load_scene
+from hpcclear.status import Flag, Status
+
+SCENE = "jobs/quickstart.toml"
+
+
+@pytest.fixture(scope="module")
+def box():
+    """200 random scenes of Table 3's box, C from 0.3 to 1 mm, each with its uncertainty at two tolerances."""
+    scene = load_scene(SCENE, ["numerics.uncertainty=true", "study.seed=2"])
+    points = latin_hypercube(scene, 200)
+    return [evaluate_records(scene.with_({"numerics.rtol": rtol}), points) for rtol in (1e-6, 3e-7)]
+
+
+def test_runs_at_two_tolerances_overlap_within_their_stated_uncertainties(box):
+    one, other = box
+    apart = np.abs(one["objective"] - other["objective"])
+    stated = one["objective_uncertainty"] + other["objective_uncertainty"]
+    assert np.mean(apart <= stated) >= 0.95
+
+
+def test_the_stated_uncertainty_is_no_excuse(box):
+    one, other = box
+    apart = np.median(np.abs(one["objective"] - other["objective"]))
+    for records in box:
+        assert np.median(records["objective_uncertainty"]) <= 3.0 * apart
+
+
+def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box):
+    scene = load_scene(SCENE, ["study.seed=2"])
+    points = latin_hypercube(scene, 200).take(slice(0, 40))
+    plain = evaluate_records(scene, points)
+    np.testing.assert_array_equal(plain["objective"], box[0]["objective"][:40])
+    assert np.isnan(plain["objective_uncertainty"]).all()
+
+
+def test_well_posed_scenes_state_a_small_uncertainty():
+    scene = load_scene(
+        SCENE, ["numerics.uncertainty=true", 'effects.contact={law="hunt-crossley", damping=0.5}']
+    )
+    records = evaluate_records(scene, latin_hypercube(scene, 24))
+    assert np.median(records["objective_uncertainty"] / records["objective"]) < 1e-5
+    assert (records["flags"] & Flag.LATCHED == 0).all()
+
+
+def test_automatic_average_meets_its_target_or_says_that_it_did_not():
+    scene = load_scene(SCENE, ["numerics.averaged_revolutions=auto", "numerics.objective_tolerance=2e-3"])
+    points = latin_hypercube(scene, 32)
+    loose = evaluate_records(scene, points)
+    assert set(loose["status"]) <= {Status.OK, Status.AVERAGE_CAP}
+    assert np.isfinite(loose["objective"]).all()
+    tight = {"numerics.objective_tolerance": 1e-9, "numerics.max_averaged_revolutions": 12}
+    capped = evaluate_records(scene.with_(tight), points)
+    assert (capped["status"] == Status.AVERAGE_CAP).sum() > 24
+    assert np.isfinite(capped["objective"]).all()
+    # against a long average, few leave four times the standard error that was asked for
+    long = evaluate_records(scene.with_({"numerics.averaged_revolutions": 400}), points)
+    error = np.abs(loose["objective"] / long["objective"] - 1.0)
+    assert np.mean(error[loose["status"] == Status.OK] < 4 * 2e-3) > 0.9
+
+
+def test_penetration_beyond_hertz_is_flagged():
+    scene = load_scene("jobs/slider_crank.toml")
+    record = evaluate_records(scene, latin_hypercube(load_scene(SCENE), 1))[0]
+    assert record["flags"] & Flag.BEYOND_HERTZ
+    # a wide clearance at a low speed hardly deforms
+    gentle = load_scene(SCENE, ['drive.speed="60 rpm"', "study.variables.C.range=[1e-3, 1.1e-3]"])
+    record = evaluate_records(gentle, latin_hypercube(gentle, 1))[0]
+    assert record["status"] == Status.OK
+    assert not record["flags"] & Flag.BEYOND_HERTZ
