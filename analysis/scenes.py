@@ -1,0 +1,70 @@
+"""The scenes that the benchmarks share: the paper's mechanism, its contact laws, and designs from Table 3's box."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.lanes import Problem
+from hpcclear.lowering import Array, parameters, problem_of, start_states
+from hpcclear.sampling import latin_hypercube
+from hpcclear.scene import Scene, load_scene
+
+JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
+
+LAWS = {
+    "hunt-crossley": [
+        "effects.contact={law='hunt-crossley', damping=0.5}",
+        "effects.friction={law='coulomb', coefficient=0.01, ramp_speed=0.01}",
+    ],
+    "frictionless": [
+        "effects.contact={law='hunt-crossley', damping=0.5}",
+        "effects.friction={law='none'}",
+    ],
+    "lankarani-nikravesh": [
+        "effects.contact={law='lankarani-nikravesh', restitution=0.9}",
+        "effects.friction={law='coulomb', coefficient=0.01, ramp_speed=0.01}",
+    ],
+}
+
+
+class Setup(NamedTuple):
+    """What the kernel and the yardstick read."""
+
+    problem: Problem
+    par: Array  # (m, PARAMETERS)
+    state: Array  # (m, STATE)
+
+
+def scene(
+    law: str, rtol: float, transient: int, averaged: int, *, clearance: float | None = None
+) -> Scene:
+    """The paper's slider-crank with one of `LAWS`; clearance in m at both joints."""
+    overrides = [
+        *LAWS[law],
+        f"numerics.rtol={rtol!r}",
+        f"numerics.transient_revolutions={transient}",
+        f"numerics.averaged_revolutions={averaged}",
+    ]
+    if clearance is not None:
+        overrides += [
+            f"joints.{joint}.clearance={clearance!r}" for joint in ("crank_rod", "rod_slider")
+        ]
+    return load_scene(JOB, overrides)
+
+
+def setup(chosen: Scene, par: Array) -> Setup:
+    """Problem, parameters and start states; without friction its coefficient is 0 for codes that always ask."""
+    if chosen.effects.friction.law == "none":
+        for joint in (at.JOINT_12, at.JOINT_23):
+            par[:, joint + at.FRICTION] = 0.0
+    return Setup(problem_of(chosen), par, start_states(chosen, par))
+
+
+def single(chosen: Scene) -> Setup:
+    """One sample: the scene itself."""
+    return setup(chosen, parameters(chosen))
+
+
+def ensemble(chosen: Scene, samples: int) -> Setup:
+    """A Latin hypercube of Table 3's box."""
+    return setup(chosen, parameters(chosen, latin_hypercube(chosen, samples)))
