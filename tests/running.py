@@ -1,0 +1,158 @@
+"""One sample through the kernel with W = 1, every step kept, and what its state says about the bodies."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
+
+from hpcclear.kernel import layout as at
+from hpcclear.kernel import record as rec
+from hpcclear.kernel.lanes import Lanes
+from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.scene import Scene, load_scene
+
+SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
+HUNT_CROSSLEY = {"law": "hunt-crossley", "damping": 0.5}
+LATCHED = {"law": "lankarani-nikravesh", "restitution": 0.9}
+KERNEL_ORDER = [X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI]
+
+
+@dataclass
+class Run:
+    """Outcome row, parameters, and every accepted step."""
+
+    out: np.ndarray
+    par: np.ndarray
+    start: np.ndarray  # (2 n,)
+    time: np.ndarray
+    q: np.ndarray  # (steps, n)
+    v: np.ndarray
+    contacts: np.ndarray  # (steps, 2) active
+
+    @property
+    def evaluations(self) -> float:
+        return self.out[at.OUT_EVALUATIONS]
+
+
+def scene_with(changes=None, revolutions=1, rtol=1e-8) -> Scene:
+    """The paper's scene without transient."""
+    numerics = {
+        "numerics.transient_revolutions": 0,
+        "numerics.averaged_revolutions": revolutions,
+        "numerics.rtol": rtol,
+    }
+    return load_scene(SCENE).with_(numerics | (changes or {}))
+
+
+def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> Run:
+    """Simulate; `effects` forces kernel flags, `par_changes` rows of parameters, `shift` adds to the start (2, n)."""
+    problem = problem_of(scene, **options)
+    if effects:
+        problem = replace(problem, effects=problem.effects._replace(**effects))
+    par = parameters(scene)
+    for row, value in (par_changes or {}).items():
+        par[:, row] = value
+    state = start_states(scene, par)
+    n = problem.coordinates
+    if shift is not None:
+        state[0, :n] += shift[0]
+        state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n] += shift[1]
+    lanes = Lanes(problem, 1, np.zeros((4096, rec.columns(n))))
+    lanes.queue(par, state, np.zeros(1, np.int64))
+    chunks = []
+    while lanes.pending:
+        lanes.advance(1.0)
+        chunks.append(lanes.take_record())
+    rows = np.concatenate(chunks)
+    s = rec.STATE
+    start = np.concatenate([state[0, :n], state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n]])
+    return Run(
+        lanes.collect()[1][0], par[0], start, rows[:, rec.TIME], rows[:, s : s + n],
+        rows[:, s + n : s + 2 * n], rows[:, [rec.ACTIVE_12, rec.ACTIVE_23]],
+    )  # fmt: skip
+
+
+def bodies(scene: Scene, par, q, v):
+    """Nine coordinates and velocities from those of any topology, by the vectors between the joints.
+
+    Prescribed speed: only states at the end of a revolution, where the crank angle is 0.
+    """
+    if scene.numerics.formulation == "baumgarte":
+        nine, rates = np.zeros(9), np.zeros(9)
+        nine[KERNEL_ORDER], rates[KERNEL_ORDER] = q, v
+        return nine, rates
+    free = scene.drive.kind == "torque"
+    phi, omega = (q[-1], v[-1]) if free else (0.0, par[at.SPEED])
+    crank, length = par[at.CRANK_LENGTH], par[at.ROD_LENGTH]
+    pin = crank * np.exp(1j * phi)
+    pin_v = 1j * omega * pin
+    first, second = (name in scene.clearance_joints() for name in ("crank_rod", "rod_slider"))
+    if first and second:
+        theta, spin, slider, slider_v = q[2], v[2], q[3], v[3]
+        centre, centre_v = q[0] + 1j * q[1], v[0] + 1j * v[1]
+    else:
+        if first or second:
+            theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
+        else:
+            theta = np.arcsin(-pin.imag / length)
+            spin = -pin_v.imag / (length * np.cos(theta))
+        along = np.exp(1j * theta)
+        if not (first or second):
+            slider, slider_v = (
+                (pin + length * along).real,
+                (pin_v + 1j * spin * length * along).real,
+            )
+        if first:
+            centre = slider - par[at.ROD_FAR] * along
+            centre_v = slider_v - 1j * spin * par[at.ROD_FAR] * along
+        else:
+            centre = pin + par[at.ROD_NEAR] * along
+            centre_v = pin_v + 1j * spin * par[at.ROD_NEAR] * along
+    nine, rates = np.zeros(9), np.zeros(9)
+    u1 = par[at.CRANK_NEAR] / crank
+    nine[[X1, Y1, PHI]] = (pin * u1).real, (pin * u1).imag, phi
+    rates[[X1, Y1, PHI]] = (pin_v * u1).real, (pin_v * u1).imag, omega
+    nine[[X2, Y2, THETA2, X3]] = centre.real, centre.imag, theta, slider
+    rates[[X2, Y2, THETA2, X3]] = centre_v.real, centre_v.imag, spin, slider_v
+    return nine, rates
+
+
+def energy(scene: Scene, par, q, v, active) -> float:
+    """Kinetic, potential and stored energy, J."""
+    nine, rates = bodies(scene, par, q, v)
+    m1, m2, m3 = par[at.CRANK_MASS], par[at.ROD_MASS], par[at.SLIDER_MASS]
+    masses = np.array([m1, m1, par[at.CRANK_OWN_INERTIA], m2, m2, par[at.ROD_INERTIA], m3, m3, 0])
+    total = 0.5 * (masses * rates**2).sum()
+    total += scene.effects.gravity * (m1 * nine[Y1] + m2 * nine[Y2] + m3 * nine[Y3])
+    near_end = nine[X2] + 1j * nine[Y2] - par[at.ROD_NEAR] * np.exp(1j * nine[THETA2])
+    far_end = nine[X2] + 1j * nine[Y2] + par[at.ROD_FAR] * np.exp(1j * nine[THETA2])
+    pin = (nine[X1] + 1j * nine[Y1]) + (par[at.CRANK_LENGTH] - par[at.CRANK_NEAR]) * np.exp(
+        1j * nine[PHI]
+    )
+    latched = scene.effects.contact is not None and scene.effects.contact.latched
+    for k, (name, base, e) in enumerate(
+        (
+            ("crank_rod", at.JOINT_12, pin - near_end),
+            ("rod_slider", at.JOINT_23, nine[X3] + 1j * nine[Y3] - far_end),
+        )
+    ):
+        if name in scene.clearance_joints():
+            depth = max(abs(e) - par[base + at.CLEARANCE], 0.0)
+            on = active[k] if latched else 1.0
+            total += 0.4 * par[base + at.CONTACT_STIFFNESS] * on * depth**2.5
+    return float(total)
+
+
+def energy_residual(scene: Scene, result: Run) -> tuple[float, float]:
+    """What the energy balance misses over the run, J, and the energy that passed through."""
+    out, n = result.out, len(result.start) // 2
+    touching = np.zeros(2)
+    before = energy(scene, result.par, result.start[:n], result.start[n:], touching)
+    after = energy(scene, result.par, result.q[-1], result.v[-1], result.contacts[-1])
+    drive, passed, lost, load = out[
+        [at.OUT_DRIVE_WORK, at.OUT_ABS_DRIVE_WORK, at.OUT_DISSIPATED, at.OUT_LOAD_WORK]
+    ]
+    return after - before - drive - load + lost, passed + abs(lost) + abs(load) + abs(
+        after - before
+    )

@@ -1,0 +1,245 @@
+"""Effects together: every pair once, on-at-zero equals off, torque drives, joints removed, contradictions."""
+
+import itertools
+
+import numpy as np
+import pytest
+from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
+
+from hpcclear.errors import InputError
+from hpcclear.kernel import layout as at
+from hpcclear.lowering import effects_of
+from hpcclear.scene import load_scene
+
+TORQUE_CURVE = [[0.0, 2.0], [1.0, 9.0], [3.0, 4.0], [5.0, -1.0]]
+LOAD_CURVE = [[0.0, -200.0], [1.5, -30.0], [4.0, 80.0]]
+FREE = {"kind": "torque", "initial_speed": "5000 rpm", "flywheel_inertia": 1e-2}
+CONTACTS = {
+    "hertz": {"law": "hertz"},
+    "hunt-crossley": HUNT_CROSSLEY,
+    "latched": {"law": "flores", "restitution": 0.5},
+}
+FRICTIONS = {
+    "none": {"law": "none"},
+    "coulomb": {"law": "coulomb", "coefficient": 0.05},
+    "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
+}
+IDEAL = {"kind": "ideal"}
+FACTORS = {
+    "open": ["both", "crank_rod", "rod_slider", "none"],
+    "contact": list(CONTACTS),
+    "friction": list(FRICTIONS),
+    "drive": ["speed", "torque", "curve"],
+    "gravity": [0.0, 9.81],
+    "load": [None, -50.0, LOAD_CURVE],
+    "guide": [False, True],
+    "formulation": ["minimal", "baumgarte"],
+    "energy": [True, False],
+}
+
+
+def allowed(row):
+    """Whether a (partial) choice of levels is one simulation by the stepper."""
+    if row.get("open") == "none":
+        # without clearance there is no contact law to choose, and friction is refused
+        if row.get("contact", "hertz") != "hertz" or row.get("friction", "none") != "none":
+            return False
+        # closed-form, not integrated: tests/test_ideal.py
+        if row.get("drive") == "speed" and row.get("formulation") == "minimal":
+            return False
+    return True
+
+
+def pairs_of(row):
+    names = [name for name in FACTORS if name in row]
+    for a, b in itertools.combinations(names, 2):
+        yield a, FACTORS[a].index(row[a]), b, FACTORS[b].index(row[b])
+
+
+def all_pairs():
+    for a, b in itertools.combinations(FACTORS, 2):
+        for x, y in itertools.product(FACTORS[a], FACTORS[b]):
+            if allowed({a: x, b: y}):
+                yield a, FACTORS[a].index(x), b, FACTORS[b].index(y)
+
+
+def pairwise_table():
+    """Rows that hold every allowed pair of levels at least once; greedy, the same at every call."""
+    left = dict.fromkeys(all_pairs())
+    rng = np.random.default_rng(1)
+    rows = []
+    while left:
+        a, i, b, j = next(iter(left))
+        best, most = {}, -1
+        for _ in range(60):
+            row = {a: FACTORS[a][i], b: FACTORS[b][j]}
+            for name in rng.permutation([n for n in FACTORS if n not in row]):
+                levels = [x for x in FACTORS[name] if allowed({**row, name: x})]
+                gains = [sum(p in left for p in pairs_of({**row, name: x})) for x in levels]
+                row[name] = levels[int(np.argmax(gains))]
+            gain = sum(p in left for p in pairs_of(row))
+            if gain > most and allowed(row):
+                best, most = row, gain
+        rows.append({name: best[name] for name in FACTORS})
+        for pair in pairs_of(best):
+            left.pop(pair, None)
+    return rows
+
+
+TABLE = pairwise_table()
+
+
+def scene_of(row, **more):
+    """The scene of a row of the table."""
+    changes = {
+        "effects.contact": CONTACTS[row["contact"]],
+        "effects.friction": FRICTIONS[row["friction"]],
+        "effects.gravity": row["gravity"],
+        "numerics.formulation": row["formulation"],
+        "numerics.energy": row["energy"],
+    }
+    for joint in ("crank_rod", "rod_slider"):
+        if row["open"] not in ("both", joint):
+            changes[f"joints.{joint}"] = IDEAL
+    if row["drive"] != "speed":
+        changes["drive"] = {**FREE, "torque": 5.0 if row["drive"] == "torque" else TORQUE_CURVE}
+    if row["load"] is not None:
+        changes["effects.slider_load"] = row["load"]
+    if row["guide"]:
+        changes["effects.guide_friction"] = {"coefficient": 0.1}
+    return scene_with(changes | more, rtol=1e-7)
+
+
+def test_the_table_holds_every_pair():
+    met = {pair for row in TABLE for pair in pairs_of(row)}
+    assert met == set(all_pairs())
+    assert all(allowed(row) for row in TABLE)
+    assert len(TABLE) <= 20
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: "-".join(str(v)[:9] for v in row.values()))
+def test_every_pair_of_effects_runs(row):
+    """One revolution; where energies are kept, they balance."""
+    scene = scene_of(row)
+    result = run(scene)
+    assert result.out[at.OUT_STATUS] == 0
+    assert np.isfinite(result.q).all()
+    joints = [row["open"] in ("both", name) for name in ("crank_rod", "rod_slider")]
+    gaps = result.out[[at.OUT_GAP_12, at.OUT_GAP_23]]
+    assert ((gaps > 0.0) == joints).all()
+    if row["energy"]:
+        rest, passed = energy_residual(scene, result)
+        assert abs(rest) < 1e-4 * passed
+
+
+ZEROS = {
+    "coulomb": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
+    "ambrosio": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
+    "gravity": {at.GRAVITY: 0.0},
+    "load": {at.LOAD: 0.0},
+    "load_table": {at.LOAD: 0.0},
+    "guide": {at.GUIDE_COEFFICIENT: 0.0},
+}
+
+
+@pytest.fixture(scope="module")
+def without():
+    """Hunt-Crossley 0.5 and nothing else, one revolution."""
+    return run(scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}))
+
+
+def assert_same_motion(one, other):
+    """To 1e-12 of the peak of each coordinate and velocity."""
+    for a, b in ((one.q, other.q), (one.v, other.v)):
+        assert (np.abs(a[-1] - b[-1]) <= 1e-12 * np.abs(b).max(axis=0)).all()
+
+
+@pytest.mark.parametrize("effect", ZEROS)
+def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
+    scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
+    assert_same_motion(run(scene, {effect: 1}, ZEROS[effect]), without)
+
+
+def test_hunt_crossley_without_damping_is_hertz():
+    hertz = scene_with({"effects.contact": {"law": "hertz"}, "effects.friction": {"law": "none"}})
+    zero = {"law": "hunt-crossley", "damping": 0.0}
+    assert_same_motion(run(hertz.with_({"effects.contact": zero})), run(hertz))
+
+
+def test_looking_on_changes_nothing(without):
+    """Energies and forces for time series leave the motion alone."""
+    scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
+    assert_same_motion(run(scene, ledger=True, series=True), without)
+
+
+def torque_scene(flywheel, torque, revolutions=1, rtol=1e-9):
+    drive = {**FREE, "flywheel_inertia": flywheel, "torque": torque}
+    return scene_with({"effects.contact": HUNT_CROSSLEY, "drive": drive}, revolutions, rtol)
+
+
+@pytest.mark.parametrize(("flywheel", "torque"), [(1e-3, 10.0), (1e-2, -20.0)])
+def test_torque_drive_keeps_the_energy_balance(flywheel, torque):
+    scene = torque_scene(flywheel, torque, revolutions=3)
+    result = run(scene, ledger=True)
+    rest, passed = energy_residual(scene, result)
+    assert abs(rest) < 1e-6 * passed
+
+
+def test_a_heavy_flywheel_tends_to_constant_speed_like_its_inverse():
+    """The crank's speed is disturbed by 1/J, and so is the state after one turn: ten times heavier, a tenth."""
+    constant = run(scene_with({"effects.contact": HUNT_CROSSLEY}, rtol=1e-11), ledger=True)
+    differences = []
+    for flywheel in (1e2, 1e3, 1e4):
+        free = run(torque_scene(flywheel, 0.0, rtol=1e-11), ledger=True)
+        change = np.concatenate(
+            [free.q[-1, :4] - constant.q[-1], (free.v[-1, :4] - constant.v[-1]) / 500]
+        )
+        differences.append(np.linalg.norm(change))
+    rates = np.log10(differences[:-1]) - np.log10(differences[1:])
+    np.testing.assert_allclose(rates, 1.0, atol=0.1)
+
+
+def test_one_ideal_joint_needs_fewer_evaluations():
+    """The time itself is in analysis/effect_cost.py: a state half as long and one contact instead of two."""
+    contact = {"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
+    two = run(scene_with(contact, 4, rtol=1e-6))
+    for joint in ("crank_rod", "rod_slider"):
+        one = run(scene_with({**contact, f"joints.{joint}": IDEAL}, 4, rtol=1e-6))
+        assert len(one.start) == len(two.start) // 2
+        assert one.evaluations < 0.9 * two.evaluations
+
+
+CONTRADICTIONS = [
+    ({"joints.crank_rod": IDEAL, "joints.rod_slider": IDEAL}, "effects.friction.law", "ideal"),
+    ({"effects.contact": {"law": "flores"}}, "effects.contact.restitution", "restitution"),
+    (
+        {"effects.contact": {"law": "hertz", "damping": 0.5}},
+        "effects.contact.damping",
+        "no fixed damping",
+    ),
+    ({"drive": {**FREE, "torque": 1.0, "speed": 500.0}}, "drive.speed", "no prescribed speed"),
+    ({"drive.torque": 1.0}, "drive.torque", "contradicts a prescribed"),
+    ({"effects.contact": None}, "effects.contact", "needs a contact law"),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "reason"), CONTRADICTIONS, ids=lambda x: str(x)[:30])
+def test_contradictions_are_refused_with_the_reason(changes, key, reason):
+    with pytest.raises(InputError) as caught:
+        load_scene(SCENE).with_(changes)
+    assert caught.value.key == key
+    assert reason in caught.value.reason
+    assert caught.value.remedy
+
+
+def test_what_a_scene_leaves_out_is_off():
+    """Flags are None, which is what prunes them; ideal joints drop contact and friction laws altogether."""
+    on = {
+        name for name, value in effects_of(load_scene(SCENE))._asdict().items() if value is not None
+    }
+    assert on == {"crank_rod", "rod_slider", "latched", "coulomb"}
+    bare = scene_with(
+        {"joints.crank_rod": IDEAL, "joints.rod_slider": IDEAL, "effects.friction": {"law": "none"}}
+    )
+    assert set(effects_of(bare)) == {None}
+    assert effects_of(bare.with_({"effects.contact": LATCHED})) == effects_of(bare)
