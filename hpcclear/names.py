@@ -43,8 +43,8 @@ DESIGN_VARIABLES = {
     "I2": ("kg m^2", "inertia of the rod about its mass centre"),
     "m3": ("kg", "mass of the slider"),
     "C": ("m", "radial clearance"),
-    "r1": ("1", "inertia of the crank over that of a slender rod, m1 L1^2/12"),
-    "r2": ("1", "inertia of the rod over that of a slender rod, m2 L2^2/12"),
+    "I1_ratio": ("1", "inertia of the crank over that of a slender rod, m1 L1^2/12"),
+    "I2_ratio": ("1", "inertia of the rod over that of a slender rod, m2 L2^2/12"),
 }
 """Units and long names of the design variables of the paper (its Table 3)."""
 
@@ -267,6 +267,46 @@ for _row in (
 ):
     _STATISTICS += _STATISTICS_OF.format(**_row)
 
+_ACCURACY = """
+method           | method                 | text  | way of integrating
+rung             | rung                   | count | rung of the ladder of tolerances
+quantity         | quantity               | text  | what the error is of
+setting*         | method rung            | 1     | relative tolerance, or step over period for fixed steps
+error*           | method rung quantity   | 1     | relative error after one revolution, RMS over designs
+seconds*         | method rung            | s     | wall time of one design over one revolution
+evaluations*     | method rung            | 1     | force evaluations of one design over one revolution
+order*           | method quantity        | 1     | slope of error against evaluations, both logarithmic
+reference_error* | quantity               | 1     | difference of two ways to the reference, relative
+transient        | transient              | count | revolutions waited for
+averaged         | averaged               | count | revolutions averaged
+averaging_error* | transient averaged     | 1     | relative error of f, RMS over copies
+averaging_floor* |                        | 1     | scatter of long averages between copies, relative
+turn_seconds*    |                        | s     | wall time of one revolution of one copy
+surrogate        | surrogate              | text  | kind of surrogate
+training         | training               | count | sample size of the surrogates
+r2*              | surrogate training     | 1     | 1 - SSE/SST on test points
+rmae*            | surrogate training     | 1     | largest test error over their standard deviation
+leave_one_out*   | surrogate training     | 1     | RMS leave-one-out error over the standard deviation
+fit_seconds*     | surrogate training     | s     | wall time of the fit
+sample_seconds*  |                        | s     | core-seconds of one simulation
+estimate         | estimate               | text  | what is drawn from: a surrogate or simulations
+moment           | moment                 | text  | mean or deviation
+draws            | draws                  | count | Monte Carlo sample size
+moment_error*    | estimate moment draws  | 1     | RMS error of Monte Carlo, relative
+moment_lower*    | estimate moment draws  | 1     | its lower 95 % confidence limit
+moment_upper*    | estimate moment draws  | 1     | its upper 95 % confidence limit
+moment_seconds*  | estimate draws         | s     | core-seconds of one Monte Carlo estimate
+moment_bias*     | moment                 | 1     | surrogate by quadrature against simulations, relative
+bias_error*      | moment                 | 1     | standard error of that
+quadrature_seconds* |                     | s     | core-seconds of the quadrature
+closed_form*     | moment                 | 1     | quadrature against closed form, relative
+ranks            | ranks                  | count | number of ranks at work
+strong_seconds*  | ranks                  | s     | wall time of a fixed batch
+weak_seconds*    | ranks                  | s     | wall time of a batch that grows with the ranks
+loss             | loss                   | text  | what time is lost to
+lost_seconds*    | loss                   | s     | core-seconds lost, over all ranks
+"""
+
 _DTYPES = {"count": ("1", "i8"), "flag": ("", "i1"), "text": ("", "text")}
 
 
@@ -308,5 +348,6 @@ KINDS = {
     "readings": _kind("The paper's designs under readings of its text", _READINGS),
     "statistics": _kind("Statistics of many samples, streamed", _STATISTICS),
     "timing": _kind("Where the time went", _TIMING),
+    "accuracy": _kind("What accuracy costs in time", _ACCURACY),
 }
 """Every result file by its kind."""

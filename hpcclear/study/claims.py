@@ -102,15 +102,13 @@ def _hardly_moves(found: Sensitivities) -> Finding:
     names = [name for name in ("m1", "u1", "I1") if found.has(name)]
     if len(names) < 3:
         return OPEN, "m1, u1 and I1 are not all among the study's surfaces"
-    largest = np.nanmax(
-        [np.nanmax(abs(found.of(name)[0]), axis=0) for name in found.names if found.has(name)],
-        axis=0,
-    )
+    known = [abs(found.of(name)[0]) for name in found.names if found.has(name)]
+    largest = np.fmax.reduce(np.concatenate(known))  # NaN only where nothing is known
     upper, lower = [], []
     for name in names:
         effect, error = found.of(name)
-        upper.append(np.nanmin((abs(effect) + SURE * error) / largest, axis=0).max())
-        lower.append(np.nanmax((abs(effect) - SURE * error) / largest))
+        upper.append(np.fmin.reduce((abs(effect) + SURE * error) / largest).max())
+        lower.append(np.fmax.reduce((abs(effect) - SURE * error) / largest).max())
     limit = found.settings.influence
     shares = ", ".join(f"{n} {100 * u:.2g} %" for n, u in zip(names, upper, strict=True))
     text = f"at most {shares} of the largest effect (limit {100 * limit:g} %)"

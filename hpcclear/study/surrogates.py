@@ -22,10 +22,8 @@ _CHECKS = ("r2", "rmae", "r2_explained", "rmae_mean", "rmse")
 
 
 def coordinate(variable: Variable) -> str:
-    """Name of what is sampled for a variable: r2 for an inertia I2 that is given as a ratio."""
-    if variable.ratio is None:
-        return variable.name
-    return {"I1": "r1", "I2": "r2"}.get(variable.name, f"{variable.name}_ratio")
+    """Name of what is sampled for a variable: I2_ratio for an inertia I2 that is given as a ratio."""
+    return variable.name if variable.ratio is None else f"{variable.name}_ratio"
 
 
 def domain(run: Run, names: Sequence[str]) -> Box:
@@ -194,7 +192,7 @@ def _units(run: Run) -> dict[str, str]:
 
 
 def read_kriging(path: str | Path) -> dict[str, PiecewiseKriging]:
-    """The models in a kriging.nc, by their inputs ("m2 m3 u2 r2 C"), ready to predict.
+    """The models in a kriging.nc, by their inputs ("m2 m3 u2 I2_ratio C"), ready to predict.
 
     Raises
     ------

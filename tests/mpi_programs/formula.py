@@ -1,0 +1,204 @@
+"""A mechanism that is a formula: studies with known answers, without compiling a kernel.
+
+f = 1e-4 (4 - 5 m2 + 3 m3 - 10 u2 + 500 I2) + (0.1 + 0.5 m2) C, in SI. Mean and deviation over C
+conflict in m2; m1, u1 and I1 have no influence. Samples with m3 above `FAILS_ABOVE` fail.
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from hpcclear import dataset
+from hpcclear.ranks import Ranks
+from hpcclear.scene import Scene, load_scene
+from hpcclear.status import OUTCOME, Status, failed
+from hpcclear.stopping import Stopped
+from hpcclear.study import audit, responses, run_study
+from hpcclear.study.run import Run
+
+PHYSICS = """
+format_version = 1
+[mechanism]
+kind = "slider-crank"
+crank = { length = 0.05, mass = 0.3, inertia = 1.0e-4, mass_center = 0.025 }
+rod = { length = 0.12, mass = 0.21, inertia = 2.6e-4, mass_center = 0.06 }
+slider = { mass = 0.14 }
+[drive]
+kind = "constant-speed"
+speed = "5000 rpm"
+[joints.crank_rod]
+kind = "clearance"
+clearance = "0.3 mm"
+bearing_radius = "20 mm"
+bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
+journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
+[joints.rod_slider]
+kind = "clearance"
+clearance = "0.3 mm"
+bearing_radius = "20 mm"
+bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
+journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
+[effects]
+contact = { law = "lankarani-nikravesh", restitution = 0.9 }
+"""
+
+STUDY = """
+[study]
+seed = 3
+samples = 30
+test_samples = 12
+[study.variables]
+m1 = { range = [0.15, 0.6] }
+u1 = { range = [0.0, 0.05] }
+I1 = { ratio = [1, 4] }
+m2 = { range = [0.105, 0.42] }
+u2 = { range = [0.0, 0.12] }
+I2 = { ratio = [1, 4] }
+m3 = { range = [0.07, 0.28] }
+C = { range = ["0.3 mm", "1 mm"] }
+[study.random]
+C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+m2 = { distribution = "uniform", half_width = 0.005 }
+m3 = { distribution = "uniform", half_width = 0.005 }
+u2 = { distribution = "uniform", half_width = 0.02 }
+I2 = { distribution = "uniform", half_width = 0.5e-4 }
+[study.cases]
+first = ["C"]
+second = ["C", "m2", "m3", "u2", "I2"]
+[study.sensitivity]
+levels = 3
+rounds = 3
+samples = 24
+order = 2
+together_samples = 60
+sobol_samples = 16
+resamplings = 1
+[study.surrogate]
+models = [["m2", "m3", "C"]]
+r2 = 0.9
+restarts = 0
+cuts = 0
+[study.swarm]
+particles = 20
+iterations = 12
+runs = 2
+archive = 12
+[study.verification]
+samples = 200
+designs = 4
+audit_samples = 20
+response_windows = 3
+infill_rounds = 1
+"""
+
+FAILS_ABOVE = np.inf
+
+
+def objective(column: dict[str, np.ndarray]) -> np.ndarray:
+    """The formula, from values by scene path."""
+    mass = column["mechanism.rod.mass"]
+    constant = 4 - 5 * mass + 3 * column["mechanism.slider.mass"]
+    constant = constant - 10 * column["mechanism.rod.mass_center"]
+    constant = constant + 500 * column["mechanism.rod.inertia"]
+    return 1e-4 * constant + (0.1 + 0.5 * mass) * column["joints.crank_rod.clearance"]
+
+
+class FormulaWorker:
+    """Evaluates a few samples a call, the last ones first."""
+
+    lanes = 4
+
+    def __init__(self, payload: dict[str, Any]) -> None:
+        self._scene = load_scene(payload["scene"])
+        self._paths = payload["paths"]
+        self._queue: list[tuple[int, np.ndarray]] = []
+
+    @property
+    def pending(self) -> int:
+        return len(self._queue)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        self._queue += zip(index.tolist(), points, strict=True)
+
+    def advance(self, seconds: float) -> np.ndarray:
+        taken = [self._queue.pop() for _ in range(min(200, len(self._queue)))]
+        if not taken:
+            return np.zeros(0, OUTCOME)
+        values = np.array([point for _, point in taken])
+        column = {path: np.full(len(taken), x) for path, x in numbers(self._scene).items()}
+        for k, paths in enumerate(self._paths):
+            column |= dict.fromkeys(paths, values[:, k])
+        records = np.concatenate([failed(index, Status.STEP_CAP) for index, _ in taken])
+        fine = column["mechanism.slider.mass"] <= FAILS_ABOVE
+        for name in ("objective", "objective_spread"):
+            records[name][fine] = objective(column)[fine] if name == "objective" else 0.0
+        for name in ("mean_gap", "peak_contact_force"):
+            records[name][fine] = 1.0
+        records["status"][fine] = Status.OK
+        return records
+
+
+def numbers(scene: Scene) -> dict[str, float]:
+    """All physical numbers of a scene."""
+    return {path: scene.number(path) for path in scene.numeric_paths()}
+
+
+def make_formula(payload: dict[str, Any], ranks: Ranks) -> FormulaWorker:
+    """Maker of the ranks' workers."""
+    return FormulaWorker(payload)
+
+
+def respond(scene: Scene):
+    """A response whose forces and accelerations are the objective times a wave."""
+    turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
+    angle = np.linspace(0.0, 2 * np.pi * turns, 40 * turns + 1)
+    column = {path: np.array(x) for path, x in numbers(scene).items()}
+    size = float(objective(column)) * 1e4
+    wave = size * (2.0 + np.cos(angle))
+    series = dict.fromkeys(("crank_moment", "slider_acceleration"), wave)
+    pair = np.column_stack([wave, 2 * wave])
+    data = {**series, "crank_angle": angle, "contact_force": pair}
+    data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
+    scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
+    return dataset.response_dataset(angle / 523.0, {**data, **scalars})
+
+
+def replace_dynamics() -> None:
+    """Responses by formula, too."""
+    responses.simulate = audit.simulate = respond
+
+
+def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
+    """Run a study that is stopped after every stage it completes; how many stages that took."""
+    stages, go_on = 0, Run.stage
+
+    def stop_after(run: Run, name: str, work, *arguments: object):  # type: ignore[no-untyped-def]
+        known = run.checkpoint.load_stage(name) is not None
+        found = go_on(run, name, work, *arguments)
+        if not known:
+            raise Stopped(f"after {name}")
+        return found
+
+    Run.stage = stop_after  # type: ignore[method-assign]
+    try:
+        while True:
+            try:
+                run_study(scene, directory, ranks, progress_style="quiet")
+                return stages
+            except Stopped:
+                stages += 1
+    finally:
+        Run.stage = go_on  # type: ignore[method-assign]
+
+
+if __name__ == "__main__":
+    from hpcclear.comm import run_on_ranks
+
+    replace_dynamics()
+
+    def program(ranks: Ranks) -> None:
+        scene = load_scene(sys.argv[1])
+        run_study(scene, sys.argv[2], ranks, progress_style="quiet")
+
+    sys.exit(run_on_ranks(program, {"points": make_formula}))

@@ -1,0 +1,419 @@
+"""The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tomllib
+
+import moocore
+import numpy as np
+import pytest
+
+from hpcclear import dataset
+from hpcclear.comm import alone
+from hpcclear.errors import InputError
+from hpcclear.scene import load_scene
+from hpcclear.stopping import Stopped
+from hpcclear.study import audit, claims, optimisation, responses, run_study, surrogates
+
+PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
+MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
+
+MAKERS = {"points": formula.make_formula}
+Z = ("m2", "m3", "u2", "I2")
+HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
+
+
+def scene_of(*overrides: str):
+    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), overrides)
+
+
+@pytest.fixture(autouse=True)
+def _dynamics(monkeypatch):
+    monkeypatch.setattr(responses, "simulate", formula.respond)
+    monkeypatch.setattr(audit, "simulate", formula.respond)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """One study, done in one go."""
+    place = tmp_path_factory.mktemp("study") / "whole"
+    patch = pytest.MonkeyPatch()
+    patch.setattr(responses, "simulate", formula.respond)
+    patch.setattr(audit, "simulate", formula.respond)
+    told: list[str] = []
+    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    patch.undo()
+    assert told == []
+    return place
+
+
+def contents(place: pathlib.Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(place)): path.read_bytes()
+        for path in sorted(place.rglob("*.nc"))
+        if path.name != "timing.nc"
+    }
+
+
+def truth(design: dict[str, float], robust: bool) -> tuple[float, float]:
+    """Exact mean and deviation of the formula for a design."""
+    low, high = 3e-4, 1e-3
+    middle, variance = (low + high) / 2, (high - low) ** 2 / 12
+    factor = 0.1 + 0.5 * design["m2"]
+    constant = 4 - 5 * design["m2"] + 3 * design["m3"] - 10 * design["u2"] + 500 * design["I2"]
+    mean = 1e-4 * constant + factor * middle
+    spread = factor**2 * variance
+    if robust:
+        mass = HALF["m2"] ** 2 / 3
+        spread += 0.25 * mass * variance + (0.5 * middle - 5e-4) ** 2 * mass
+        slopes = {"m3": 3e-4, "u2": -1e-3, "I2": 500e-4}
+        spread += sum((slopes[name] * HALF[name]) ** 2 / 3 for name in slopes)
+    return mean, spread**0.5
+
+
+# -- the whole study --------------------------------------------------------------------------------
+
+
+def test_writes_every_result_and_leaves_no_rubbish(results):
+    names = {path.name for path in results.iterdir()}
+    kinds = "samples sensitivity kriging front verification claims readings timing"
+    assert names == {f"{kind}.nc" for kind in kinds.split()} | {"responses"}
+    for kind in kinds.split():
+        found = dataset.read(results / f"{kind}.nc", kind)
+        assert found.attrs["scene_hash"] == scene_of().hash
+    series = {path.stem for path in (results / "responses").iterdir()}
+    assert series == {"original", "first_alpha", "first_beta", "second_alpha", "second_beta"}
+    timing = dataset.read(results / "timing.nc", "timing")
+    assert "kriging: simulations" in timing["stage"].to_numpy()
+
+
+def test_sensitivities_are_the_derivatives(results):
+    found = dataset.read(results / "sensitivity.nc").sel(surface="m2 m3")
+    clearance = found["clearance"].to_numpy()
+    slope = found["best_sensitivity"].sel(parameter="m2").to_numpy()
+    np.testing.assert_allclose(slope, (0.5 * clearance - 5e-4) * 0.315, atol=1e-12)
+    slope = found["best_sensitivity"].sel(parameter="m3").to_numpy()
+    np.testing.assert_allclose(slope, 3e-4 * 0.21, atol=1e-12)
+    assert np.isnan(found["best_sensitivity"].sel(parameter="u1")).all()
+    whole = dataset.read(results / "sensitivity.nc")
+    chosen = whole["parameter"].to_numpy()[whole["selected"].to_numpy() == 1]
+    assert set(chosen) == {"m2", "m3", "u2", "I2"}
+    assert (whole["surface_accepted"] == 1).all()
+    first = whole["sobol_first"].sel(parameter=["m1", "u1", "I1"]).to_numpy()
+    np.testing.assert_allclose(first, 0.0, atol=1e-6)
+
+
+def test_true_moments_and_the_surrogate_meet_the_formula(results):
+    found = dataset.read(results / "verification.nc")
+    z = 4.5  # standard errors: 29 designs with common draws, 2 moments
+    for one in (found.isel(design=k) for k in range(found.sizes["design"])):
+        design = {name: float(one[name]) for name in Z}
+        robust = str(one["case"].values) == "second"
+        mean, deviation = truth(design, robust)
+        error = float(one["mean_upper"] - one["mean_true"]) / 1.96
+        assert abs(float(one["mean_true"]) - mean) < z * error
+        error = float(one["deviation_upper"] - one["deviation_true"]) / 1.96
+        assert abs(float(one["deviation_true"]) - deviation) < z * error
+        if np.isfinite(one["mean_surrogate"]):
+            assert float(one["mean_surrogate"]) == pytest.approx(mean, rel=2e-3)
+            assert float(one["deviation_surrogate"]) == pytest.approx(deviation, rel=2e-2)
+        assert int(one["samples"]) == 200
+        assert int(one["failed"]) == 0
+    names = found["design"].to_numpy().tolist()
+    assert sum("front" in name for name in names) == 8
+    assert sum("paper" in name for name in names) == 4
+    paper = found.sel(design="first paper alpha")
+    assert float(paper["mean_paper"]) == 1.7787e-4
+    assert found.attrs["remarks"] == "none"
+
+
+def test_alpha_and_beta_are_the_ends_of_the_front(results):
+    """The least mean has the largest m2, u2 and the least m3 and I2; the deviation wants m2 small."""
+    found = dataset.read(results / "verification.nc")
+    alpha, beta = found.sel(design="first best alpha"), found.sel(design="first best beta")
+    assert float(alpha["m3"]) == pytest.approx(0.07, abs=0.02)
+    assert float(beta["m2"]) == pytest.approx(0.105, abs=0.02)
+    assert float(alpha["m2"]) > float(beta["m2"]) + 0.1
+    front = dataset.read(results / "front.nc")
+    assert front.sizes == {"case": 2, "run": 2, "solution": 12}
+    verified = front["verified"].to_numpy().sum(axis=(1, 2))
+    assert (verified == 6).all()  # four spread points, alpha, beta
+    least = front["mean"].sel(case="first").min()
+    assert float(least) == pytest.approx(float(alpha["mean_surrogate"]), rel=1e-12)
+
+
+def test_a_user_can_go_on_from_the_models(results):
+    models = surrogates.read_kriging(results / "kriging.nc")
+    assert set(models) == {"m2 m3 C", "m2 m3 u2 I2_ratio C"}
+    model = models["m2 m3 u2 I2_ratio C"]
+    m2, m3, u2, c = 0.3, 0.1, 0.05, 6e-4
+    inertia = 2.5 * m2 * 0.12**2 / 12
+    value = model.predict(np.array([[m2, m3, u2, 2.5, c]]))[0]
+    expected = 1e-4 * (4 - 5 * m2 + 3 * m3 - 10 * u2 + 500 * inertia) + (0.1 + 0.5 * m2) * c
+    assert value == pytest.approx(expected, rel=2e-3)
+    assert model.lower[3] < 0.6  # widened by the scatter of I2 and m2
+    with pytest.raises(InputError, match="extrapolate"):
+        model.predict(np.array([[m2, m3, u2, 9.0, c]]))
+
+
+def test_samples_are_numbered_through_and_tell_their_designs(results):
+    found = dataset.read(results / "samples.nc", "samples")
+    assert (np.diff(found["sample"]) == 1).all()
+    assert set(dataset.designs(found)) == {"m1", "u1", "I1", "m2", "u2", "I2", "m3", "C"}
+    column = {
+        path: dataset.designs(found)[variable.name]
+        for variable in scene_of().study.variables
+        for path in variable.paths
+    }
+    np.testing.assert_allclose(found["objective"], formula.objective(column), rtol=1e-12)
+
+
+def test_claims_are_judged(results):
+    found = dataset.read(results / "claims.nc")
+    verdicts = dict(zip(found["claim"].to_numpy(), found["verdict"].to_numpy(), strict=True))
+    assert verdicts[1] == claims.HOLDS  # df/dC = 0.1 + 0.5 m2
+    assert verdicts[2] == claims.FAILS  # df/dm2 < 0
+    assert verdicts[3] == claims.HOLDS
+    assert verdicts[4] == claims.HOLDS
+    assert verdicts[11] == claims.HOLDS
+    assert all(len(text) > 10 for text in found["figure"].to_numpy())
+
+
+def test_readings_compare_with_the_printed_values(results):
+    found = dataset.read(results / "readings.nc")
+    assert found.sizes == {"reading": 9, "design": 4}
+    assert len(set(found["reading"].to_numpy())) == 9
+    value = found["mean"].isel(reading=0, design=0)
+    expected = np.sqrt(np.mean(np.log(found["mean"][0] / found["mean_paper"]) ** 2))
+    assert float(found["distance"][0]) == pytest.approx(float(expected))
+    design = {"m2": 0.105, "m3": 0.0715, "u2": 0.0451, "I2": 1.2432e-4}
+    assert float(value) == pytest.approx(truth(design, False)[0], rel=0.1)
+
+
+# -- interruptions and ranks ------------------------------------------------------------------------
+
+
+def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_path):
+    place = tmp_path / "pieces"
+    stages = formula.run_in_pieces(scene_of(), place, alone(MAKERS))
+    assert stages == 7
+    assert contents(place) == contents(results)
+
+
+def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
+    place, ranks, calls = tmp_path / "stopped", alone(MAKERS), [0]
+    work = formula.FormulaWorker.advance
+
+    def advance(self, seconds):
+        calls[0] += 1
+        if calls[0] in (3, 20):
+            ranks.stop_switch.request("test")
+        return work(self, seconds)
+
+    monkeypatch.setattr(formula.FormulaWorker, "advance", advance)
+    scene = scene_of()
+    with pytest.raises(Stopped):
+        run_study(scene, place, ranks, progress_style="quiet")
+    assert (place / "checkpoint").is_dir()
+    ranks = alone(MAKERS)
+    with pytest.raises(Stopped):
+        run_study(scene, place, ranks, progress_style="quiet")
+    before = calls[0]
+    run_study(scene, place, alone(MAKERS), progress_style="quiet")
+    assert contents(place) == contents(results)
+    again = calls[0]
+    assert again > before
+    told: list[str] = []
+    run_study(scene, place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    assert calls[0] == again  # nothing is done twice
+    assert "finished" in told[0]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene_of().text)
+    program = [sys.executable, str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")]
+    environment = os.environ | {"PYTHONPATH": str(PROGRAMS.parent.parent)}
+    done = subprocess.run(
+        [str(MPIEXEC), "-n", str(ranks), *program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert contents(tmp_path / "out") == contents(results)
+
+
+# -- failures, infill, refusals ---------------------------------------------------------------------
+
+
+def test_failed_samples_are_left_out_and_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr(formula, "FAILS_ABOVE", 0.26)
+    place = tmp_path / "failing"
+    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+    samples = dataset.read(place / "samples.nc")
+    heavy = samples["m3"].to_numpy() > 0.26
+    assert heavy.any()
+    assert (samples["status"].to_numpy()[heavy] != 0).all()
+    assert np.isnan(samples["objective"].to_numpy()[heavy]).all()
+    found = dataset.read(place / "sensitivity.nc")
+    assert found.attrs["failed_simulations"] > 0
+    models = dataset.read(place / "kriging.nc")
+    assert (models["dropped"] > 0).all()
+    verified = dataset.read(place / "verification.nc")
+    assert float(verified["mean_true"].sel(design="first alpha")) > 0
+
+
+def test_all_failed_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)
+    with pytest.raises(InputError, match=r"all of these simulations failed.*max_steps"):
+        run_study(scene_of(), tmp_path / "out", alone(MAKERS), progress_style="quiet")
+
+
+def test_points_are_added_where_the_surrogate_fails(tmp_path, monkeypatch):
+    """A valley that few points see: the surrogate misses it until it gets points there."""
+    plain = formula.objective
+
+    def valley(column):
+        along = (column["mechanism.rod.mass_center"] - 0.12) / 0.04
+        across = (column["mechanism.slider.mass"] - 0.07) / 0.04
+        return plain(column) + 4e-5 * np.exp(-(along**2) - across**2)
+
+    monkeypatch.setattr(formula, "objective", valley)
+    told: list[str] = []
+    scene = scene_of("study.verification.infill_rounds=4", "study.seed=5")
+    run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet", tell=told.append)
+    assert "% off the true one" in told[0]
+    assert "failed there to the end" not in " ".join(told)
+    found = dataset.read(tmp_path / "out" / "verification.nc")
+    ends = [name for name in found["design"].to_numpy() if "alpha" in name or "beta" in name]
+    ours = found["mean_error"].sel(design=[name for name in ends if "paper" not in name])
+    assert (abs(ours) <= 0.02).all()
+    models = dataset.read(tmp_path / "out" / "kriging.nc").sel(model="m2 m3 u2 I2_ratio C")
+    assert int(models["points"]) > 30
+
+
+def test_a_surrogate_that_never_holds_is_reported(tmp_path):
+    told: list[str] = []
+    scene = scene_of("study.verification.tolerance=1e-9")
+    run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet", tell=told.append)
+    assert "failed there to the end" in told[-1]
+    found = dataset.read(tmp_path / "out" / "verification.nc")
+    assert told[-1] in found.attrs["remarks"]
+
+
+def test_results_of_another_study_are_refused(results):
+    scene = scene_of("study.seed=4")
+    with pytest.raises(InputError, match=r"study\.seed"):
+        run_study(scene, results, alone(MAKERS), progress_style="quiet")
+
+
+def test_fresh_starts_beside(results, tmp_path, monkeypatch):
+    place = tmp_path / "taken"
+    place.mkdir()
+    (place / "note").touch()
+    told: list[str] = []
+    monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)  # ends at once
+    with pytest.raises(InputError, match="failed"):
+        run_study(
+            scene_of(), place, alone(MAKERS), fresh=True, progress_style="quiet", tell=told.append
+        )
+    assert (tmp_path / "taken-2").is_dir()
+    assert str(tmp_path / "taken-2") in told[0]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["study.objective=mean-contact-force"], "no sample records it"),
+        (["study.cases={}"], "nothing to optimise"),
+        (["joints.rod_slider.clearance=0.4 mm"], "a model leaves it out"),
+    ],
+)
+def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message):
+    scene = scene_of(*overrides, "study.surrogate.models=[['m2', 'm3']]")
+    with pytest.raises(InputError, match=message):
+        run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet")
+
+
+def test_peak_contact_force_is_an_objective(tmp_path):
+    scene = scene_of("study.objective=peak-contact-force")
+    unit, function = __import__(
+        "hpcclear.study.simulations", fromlist=["objective_of"]
+    ).objective_of(scene)
+    records = np.zeros(2, [("peak_contact_force", float, 2)])
+    records["peak_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
+    assert unit == "N"
+    assert function(records).tolist() == [3.0, 5.0]
+
+
+# -- parts ------------------------------------------------------------------------------------------
+
+
+def test_nondominated_rows():
+    values = np.random.default_rng(1).integers(0, 12, size=(200, 2)).astype(float)
+    kept = optimisation._nondominated(values)
+    expected = np.flatnonzero(moocore.is_nondominated(values))
+    np.testing.assert_array_equal(
+        np.unique(values[kept], axis=0), np.unique(values[expected], axis=0)
+    )
+    assert len(kept) == len(np.unique(values[kept], axis=0))
+
+
+def test_the_swarm_sees_the_exact_moments():
+    """Mean and deviation on a model of the formula equal the exact ones, I2 entering as a ratio."""
+    scene = scene_of()
+    names = scene.study.optimisation
+    from hpcclear.sampling import latin_hypercube
+    from hpcclear.scene.domain import box, to_coordinates
+    from hpcclear.surrogate.kriging import fit_kriging
+    from hpcclear.surrogate.subintervals import PiecewiseKriging
+
+    widen = ("m2", "m3", "u2", "I2", "C")
+    points = latin_hypercube(scene, 250, names=names, widen=widen)
+    column = {
+        path: points.column(name) for name in names for path in scene.study.variable(name).paths
+    }
+    region = box(scene, names, widen)
+    model = fit_kriging(
+        to_coordinates(scene, names, points.values),
+        formula.objective(column),
+        np.column_stack([region.lower, region.upper]),
+        rng=np.random.default_rng(0),
+        names=("m2", "m3", "u2", "I2_ratio", "C"),
+    )
+    surrogate = PiecewiseKriging((model,), np.ones(1), np.ones(1), np.ones(1, bool))
+    design = {"m2": 0.2, "m3": 0.15, "u2": 0.05, "I2": 4e-4}
+    for case, robust in (("first", False), ("second", True)):
+        problem = optimisation.problem_of(scene, case, surrogate)
+        found = problem.moments(np.array([[design[name] for name in problem.names]]))[0]
+        assert found == pytest.approx(truth(design, robust), rel=2e-4)
+    outside = problem.moments(np.array([[0.5, 0.15, 0.05, 4e-4]]))
+    assert np.isnan(outside).all()
+
+
+def test_verdicts():
+    assert claims.verdict([True, True], [False, False]) == claims.HOLDS
+    assert claims.verdict([True, False], [False, True]) == claims.FAILS
+    assert claims.verdict([True, False], [False, False]) == claims.OPEN
+    assert claims.verdict([], []) == claims.OPEN
+
+
+def test_differences_count_only_beyond_their_scatter():
+    rng = np.random.default_rng(2)
+    series = np.ones((3, 10, 3, 4)) + 0.01 * rng.normal(size=(3, 10, 3, 4))
+    series[1] *= 0.8
+    found = claims.Responses({"names": np.array(["a", "b", "c"]), "statistics": series})
+    quantity = responses.QUANTITIES[0]
+    assert found.judged([("b", "a", "peak", quantity, -1)])[0] == claims.HOLDS
+    assert found.judged([("b", "a", "peak", quantity, 1)])[0] == claims.FAILS
+    assert found.judged([("c", "a", "peak", quantity, 1)])[0] == claims.OPEN
