@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import PrivateAttr, ValidationError, model_validator
+from pydantic import PrivateAttr, ValidationError, field_validator, model_validator
 
 from hpcclear.errors import InputError
 from hpcclear.scene import describing, domain
@@ -35,6 +35,13 @@ class Scene(Table):
     study: Study | None = None
 
     _text: str = PrivateAttr("")
+
+    @field_validator("format_version", mode="before")
+    @classmethod
+    def _version_is_a_number(cls, value: Any) -> Any:
+        if isinstance(value, bool):  # equal to 1 in Python
+            raise problem("true or false is no version", "Write format_version = 1")
+        return value
 
     @model_validator(mode="before")
     @classmethod
