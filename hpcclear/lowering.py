@@ -172,7 +172,9 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
     p = np.ones((get.size, at.PARAMETERS))
-    body = {name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")}
+    body = {
+        name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
+    }
     free = scene.drive.kind == "torque"
     speed = get("drive.initial_speed" if free else "drive.speed")
     p[:, at.SPEED] = speed
@@ -216,12 +218,14 @@ def _joint_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
     """Fill one joint's block of parameters (a view, first column its first entry)."""
     key = f"joints.{joint}"
     clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
-    compliance = [
-        contact.reduced_compliance(get(f"{key}.{part}.youngs_modulus"), get(f"{key}.{part}.poisson_ratio"))
+    h_bearing, h_journal = (
+        contact.reduced_compliance(
+            get(f"{key}.{part}.youngs_modulus"), get(f"{key}.{part}.poisson_ratio")
+        )
         for part in ("bearing", "journal")
-    ]
+    )
     p[:, at.CLEARANCE] = clearance
-    p[:, at.CONTACT_STIFFNESS] = contact.contact_stiffness(*compliance, bearing, clearance)
+    p[:, at.CONTACT_STIFFNESS] = contact.contact_stiffness(h_bearing, h_journal, bearing, clearance)
     p[:, at.BEARING_RADIUS] = bearing
     p[:, at.JOURNAL_RADIUS] = bearing - clearance
     law: Any = scene.effects.contact

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, admissible, assembled
+from running import scene_with
 from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_of_parameters
 
+from hpcclear.ideal import ClosedForm, ideal_series
 from hpcclear.kernel import ideal
 from hpcclear.kernel import layout as at
-from hpcclear.lowering import periodic_cells
+from hpcclear.lowering import parameters, periodic_cells, problem_of, start_states
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
 ZERO = np.zeros(2)
@@ -168,3 +170,42 @@ def test_outcomes_have_no_gap():
     ).all()
     np.testing.assert_allclose(rows[:, at.OUT_TIME], 9 * at.TURN / SPEED)
     assert np.isnan(ideal.ideal_outcomes(par, 5, 1)[:, at.OUT_SPREAD]).all()
+
+
+BARE = {
+    "joints.crank_rod": {"kind": "ideal"},
+    "joints.rod_slider": {"kind": "ideal"},
+    "effects.friction": {"law": "none"},
+}
+
+
+def test_a_queue_of_scenes_without_clearance_is_done_at_once():
+    scene = scene_with(BARE, revolutions=3)
+    par = np.tile(parameters(scene), (4, 1))
+    lanes = ClosedForm(problem_of(scene))
+    lanes.queue(par[:3], start_states(scene, par[:3]), np.array([5, 6, 7]))
+    lanes.queue(par[3:], start_states(scene, par[3:]), np.array([2]))
+    assert lanes.pending == 4
+    lanes.advance(0.1)
+    labels, rows, seen = lanes.collect()
+    assert lanes.pending == 0
+    np.testing.assert_array_equal(labels, [5, 6, 7, 2])
+    np.testing.assert_array_equal(rows[:, at.OUT_OBJECTIVE], 0.0)
+    np.testing.assert_array_equal(seen, par)
+    assert len(lanes.collect()[0]) == 0
+
+
+def test_series_of_a_scene_without_clearance_keep_the_energy_balance():
+    more = {
+        "effects.gravity": 9.81,
+        "effects.slider_load": -40.0,
+        "effects.guide_friction": {"coefficient": 0.1},
+        "output.instants_per_revolution": 360,
+    }
+    times, series = ideal_series(scene_with(BARE | more, revolutions=2))
+    assert times.shape == (721,)
+    assert times[-1] == pytest.approx(2 * 60 / 5000, rel=1e-12)
+    assert all(len(values) == 721 for values in series.values())
+    assert np.abs(series["energy_residual"]).max() < 1e-6 * np.abs(series["driving_work"]).max()
+    speed = np.gradient(series["slider_position"], times, edge_order=2)
+    assert np.abs(speed - series["slider_velocity"]).max() < 1e-3 * np.abs(speed).max()

@@ -405,3 +405,10 @@ def constraint_violation(
     if not rod_slider:
         rows += [q[X3] - (q[X2] + far * ct), q[Y3] - (q[Y2] + far * st)]
     return np.abs(rows).max(axis=0)
+
+
+def minimal_rows(crank_rod: bool, rod_slider: bool) -> list[int]:
+    """Which of the nine coordinates are the minimal ones of a topology, in their order (the crank angle left out)."""
+    if crank_rod and rod_slider:
+        return [X2, Y2, THETA2, X3]
+    return [THETA2, X3] if crank_rod or rod_slider else []
