@@ -78,8 +78,8 @@ def _is_root() -> bool:
 
 def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
     """Run a command that uses every rank."""
+    from .accuracy.resting import MAKERS
     from .comm import run_on_ranks
-    from .work import MAKERS
 
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
@@ -209,6 +209,33 @@ def run(
         )
 
     return _on_ranks(program, time_limit)
+
+
+@cli.command()
+@_FILE
+@_SET
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Directory for accuracy.nc and the figures.",
+)
+@click.option("--quick", is_flag=True, help="A look in about a minute instead of the whole picture.")
+def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) -> int:
+    """Show what accuracy costs in time: integration, averaging, surrogates, Monte Carlo, ranks.
+
+    Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from .accuracy.profile import PROFILES
+        from .accuracy.run import run_accuracy
+
+        profile = PROFILES["quick" if quick else "full"]
+        return run_accuracy(_scene(file, overrides), output, ranks, profile)
+
+    return _on_ranks(program)
 
 
 @cli.command()

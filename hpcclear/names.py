@@ -268,14 +268,14 @@ for _row in (
     _STATISTICS += _STATISTICS_OF.format(**_row)
 
 _ACCURACY = """
-method           | method                 | text  | way of integrating
+integrator       | integrator             | text  | way of integrating
 rung             | rung                   | count | rung of the ladder of tolerances
 quantity         | quantity               | text  | what the error is of
-setting*         | method rung            | 1     | relative tolerance, or step over period for fixed steps
-error*           | method rung quantity   | 1     | relative error after one revolution, RMS over designs
-seconds*         | method rung            | s     | wall time of one design over one revolution
-evaluations*     | method rung            | 1     | force evaluations of one design over one revolution
-order*           | method quantity        | 1     | slope of error against evaluations, both logarithmic
+setting*         | integrator rung            | 1     | relative tolerance, or step over period for fixed steps
+error*           | integrator rung quantity   | 1     | relative error after one revolution, RMS over designs
+seconds*         | integrator rung            | s     | wall time of one design over one revolution
+evaluations*     | integrator rung            | 1     | force evaluations of one design over one revolution
+order*           | integrator quantity        | 1     | slope of error against evaluations, both logarithmic
 reference_error* | quantity               | 1     | difference of two ways to the reference, relative
 transient        | transient              | count | revolutions waited for
 averaged         | averaged               | count | revolutions averaged

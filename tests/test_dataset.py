@@ -93,6 +93,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "objective_smallest mean deviation",
         "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
         "timing": "busy idle compile write command",
+        "accuracy": "error seconds evaluations averaging_error r2 moment_error strong_seconds lost_seconds",
     }
     dims = {
         "response": "time joint",
@@ -105,6 +106,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "reading design",
         "statistics": "joint bin edge",
         "timing": "rank stage",
+        "accuracy": "integrator rung quantity",
     }
     assert set(KINDS) == set(contract)
     for kind, names in contract.items():

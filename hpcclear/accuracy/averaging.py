@@ -1,0 +1,135 @@
+"""Error of the objective against the revolutions waited for and averaged, and the floor that chaos sets.
+
+Copies of the scene that differ by tiny kicks run for a long time, half of them with ten times stricter tolerances.
+Where
+motion is periodic they come to agree; where it is chaotic they part, and each sees another stretch of the same
+attractor; where the damping keeps an old impact speed they can settle on different orbits for good. The last is an
+error
+that no average removes: the scatter of the copies' long averages.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..evaluator import DEFAULT_LANES
+from ..kernel import layout as at
+from ..kernel.lanes import Lanes
+from ..kernel.lifecycle import STATE
+from ..lowering import parameters, problem_of, start_states
+from ..scene import Scene
+from .methods import one_turn
+from .profile import Profile
+
+Array = NDArray[np.float64]
+
+KICK = 1e-10
+"""Relative size of the kicks at the start."""
+
+STRICTER = 10.0
+"""How many times stricter the tolerances of every other copy are."""
+
+
+@dataclass(frozen=True)
+class Averaging:
+    """The panel.
+
+    Attributes
+    ----------
+    transient, averaged : ndarray of int
+        Revolutions waited for (t,) and averaged (a,).
+    error : ndarray, shape (t, a)
+        Relative error of the objective, root mean square over copies.
+    floor : float
+        Scatter of the copies' averages over the second half of the run, relative: no average goes below.
+    sampling : float
+        What that scatter would be if revolutions were independent draws of one attractor.
+    seconds : float
+        Time of one revolution of one copy in a full block of lanes.
+    """
+
+    transient: NDArray[np.int64]
+    averaged: NDArray[np.int64]
+    error: Array
+    floor: float
+    sampling: float
+    seconds: float
+
+
+def measure(scene: Scene, profile: Profile) -> Averaging:
+    """Run the copies and compare short averages with the long one."""
+    gaps, seconds = revolutions_of(scene, profile.copies, profile.revolutions)
+    half = profile.revolutions // 2
+    transient = doubling(half // 2, start=0)
+    averaged = doubling(half // 2, start=1)
+    late = objective(gaps[half:].mean(axis=0))  # (copies,)
+    truth = late.mean()
+    error = np.array([[_error(gaps, t, a, truth) for a in averaged] for t in transient])
+    each = objective(gaps[half:])
+    sampling = each.std(axis=0, ddof=1).mean() / np.sqrt(len(each)) / truth
+    floor = late.std(ddof=1) / truth
+    return Averaging(transient, averaged, error, float(floor), float(sampling), seconds)
+
+
+def objective(gaps: Array) -> Array:
+    """f (eq. 13) from mean gaps of both joints, last axis."""
+    return np.hypot(gaps[..., 0], gaps[..., 1])
+
+
+def doubling(most: int, start: int) -> NDArray[np.int64]:
+    """`start`, then powers of two up to `most`."""
+    powers = 2 ** np.arange(1 + int(np.log2(max(most, 1))))
+    return np.unique(np.append(start, powers)).astype(np.int64)
+
+
+def _error(gaps: Array, transient: int, averaged: int, truth: float) -> float:
+    f = objective(gaps[transient : transient + averaged].mean(axis=0))
+    return float(np.sqrt(np.mean((f / truth - 1.0) ** 2)))
+
+
+def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, float]:
+    """Mean gaps (revolutions, copies, 2 joints) revolution by revolution, and seconds of one of them.
+
+    Each revolution starts from the state in which the last one ended; a failed copy is NaN from there on and left out.
+    """
+    here = one_turn(scene)
+    problem = problem_of(here)
+    par = np.repeat(parameters(here), copies, axis=0)
+    par[1::2, at.STRICTNESS] = STRICTER**2  # squared, as the kernel keeps it
+    state = np.repeat(start_states(here, parameters(here)), copies, axis=0)
+    n = 2 * at.MAX_COORDINATES
+    kicks = np.random.default_rng(0).uniform(-KICK, KICK, (copies, n))
+    state[:, :n] *= 1.0 + kicks
+    lanes = Lanes(problem, DEFAULT_LANES)
+    lanes.step(1)  # without samples it only compiles
+    gaps = np.full((revolutions, copies, 2), np.nan)
+    started = time.perf_counter()
+    for revolution in range(revolutions):
+        lanes.queue(par, state, np.arange(copies))
+        while lanes.step(1 << 40):
+            pass
+        labels, rows, *_ = lanes.collect()
+        rows = rows[np.argsort(labels)]
+        good = rows[:, at.OUT_STATUS] == 0
+        gaps[revolution, good] = rows[good][:, [at.OUT_GAP_12, at.OUT_GAP_23]]
+        state = _ends(rows)
+        if not good.all():
+            gaps, par, state, copies = gaps[:, good], par[good], state[good], int(good.sum())
+    return gaps, (time.perf_counter() - started) / (revolutions * max(copies, 1))
+
+
+def _ends(rows: Array) -> Array:
+    """Ends of samples as starts of the next revolution, shape (m, STATE)."""
+    state = np.empty((len(rows), STATE))
+    n = 2 * at.MAX_COORDINATES
+    state[:, :n] = np.nan_to_num(rows[:, at.OUT_STATE : at.OUT_STATE + n])
+    contact = [
+        at.OUT_ACTIVE_12,
+        at.OUT_ACTIVE_23,
+        at.OUT_INVERSE_IMPACT_12,
+        at.OUT_INVERSE_IMPACT_23,
+    ]
+    state[:, n:] = rows[:, contact]
+    return state

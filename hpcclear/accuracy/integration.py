@@ -1,0 +1,120 @@
+"""Work and precision: error of one revolution against time and force evaluations, over a ladder of tolerances.
+
+One revolution from the start, so that errors are those of the integrator: over many revolutions rattling contacts
+amplify any error to the same size (the averaging panel shows that floor).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernel import layout as at
+from ..scene import Scene
+from .methods import QUANTITIES, kernel_method, methods_of, solve_turn, systems, timed
+from .profile import Profile
+
+Array = NDArray[np.float64]
+
+REFERENCE_RTOL = 1e-13
+MARGIN = 100.0
+"""The reference must be this many times better than what is measured against it."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Values (designs, 4) as in `QUANTITIES`, what errors are divided by, and the reference's own relative error."""
+
+    values: Array
+    scale: Array  # (designs, 4)
+    error: Array  # (4,)
+
+
+@dataclass(frozen=True)
+class Integration:
+    """The panel; arrays (methods, rungs), errors (methods, rungs, 4), orders (methods, 4)."""
+
+    methods: tuple[str, ...]
+    setting: Array
+    error: Array
+    seconds: Array
+    evaluations: Array
+    order: Array
+    reference_error: Array
+
+
+def reference_of(scene: Scene, designs: int) -> Reference:
+    """One revolution, solved two ways.
+
+    scipy's DOP853, restarted wherever a gap changes sign, gives the values; the kernel's Dormand-Prince pair at the
+    same tolerance is the second way. On the largest force LSODA is, since the kernel reports it at steps' ends.
+    """
+    made = systems(scene, designs)
+    values = np.array([solve_turn(scene, one, "DOP853", REFERENCE_RTOL)[0] for one in made])
+    method = kernel_method(
+        "second", scene, designs, 1, formulation="minimal", method="dormand-prince"
+    )
+    second = method.prepare(REFERENCE_RTOL)[0]().values
+    second[:, 2] = [solve_turn(scene, one, "LSODA", 10 * REFERENCE_RTOL)[0][2] for one in made]
+    scale = np.abs(values)
+    scale[:, 0] = [one.par[at.CRANK_LENGTH] for one in made]
+    scale[:, 1] = [one.par[at.CRANK_LENGTH] * one.par[at.SPEED] for one in made]
+    scale = np.where(scale > 0.0, scale, np.nan)
+    return Reference(values, scale, rms((second - values) / scale))
+
+
+def rms(errors: Array) -> Array:
+    """Root mean square over the first axis."""
+    return np.sqrt(np.mean(np.square(errors), axis=0))
+
+
+def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> Integration:
+    """Measure every method that can integrate this scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    profile : Profile
+    tell : callable
+        Gets the name of each method as its turn comes.
+
+    Returns
+    -------
+    Integration
+    """
+    tell("integration: reference")
+    reference = reference_of(scene, profile.designs)
+    methods = methods_of(scene, profile.designs, profile.more_methods)
+    shape = (len(methods), len(profile.rungs))
+    seconds, evaluations, setting = (np.full(shape, np.nan) for _ in range(3))
+    error = np.full((*shape, len(QUANTITIES)), np.nan)
+    for m, method in enumerate(methods):
+        tell(f"integration: {method.name}")
+        repeats = profile.repeats if method.compiled else profile.outside_repeats
+        for r, rtol in enumerate(profile.rungs):
+            run, share = method.prepare(rtol)
+            outcome, total = timed(run, repeats)
+            seconds[m, r] = total * share
+            evaluations[m, r] = outcome.evaluations.mean()
+            setting[m, r] = method.setting(rtol)
+            error[m, r] = rms((outcome.values - reference.values) / reference.scale)
+    floor = MARGIN * reference.error
+    order = np.array([[observed_order(n, e[:, k], floor[k]) for k in range(len(QUANTITIES))]
+                      for n, e in zip(evaluations, error, strict=True)])  # fmt: skip
+    names = tuple(method.name for method in methods)
+    return Integration(names, setting, error, seconds, evaluations, order, reference.error)
+
+
+def observed_order(evaluations: Array, errors: Array, floor: float) -> float:
+    """Slope of error against force evaluations, both logarithmic: the median over all pairs of rungs (Theil and Sen).
+
+    Rungs count whose error lies above `floor` and below a tenth, and that are at least twice as dear as one another.
+
+    Returns NaN where fewer than two count.
+    """
+    good = (errors > floor) & (errors < 0.1)
+    x, y = np.log(evaluations[good]), np.log(errors[good])
+    apart = x[:, None] - x > np.log(2.0)
+    slopes = (y[:, None] - y)[apart] / (x[:, None] - x)[apart]
+    return -float(np.median(slopes)) if slopes.size else np.nan

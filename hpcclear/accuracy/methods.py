@@ -1,0 +1,326 @@
+"""Every way to integrate one revolution: the kernel's methods, and three that are not the kernel's."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
+
+from .. import geometry
+from ..errors import InputError
+from ..evaluator import DEFAULT_LANES
+from ..kernel import layout as at
+from ..kernel.lanes import Lanes, Problem
+from ..lowering import parameters, problem_of, start_states, topology
+from ..scene import Scene
+from ..scene.points import Points
+from .equations import FORCE, OPEN, RATE, Equations
+
+Array = NDArray[np.float64]
+
+QUANTITIES = ("slider_position", "slider_velocity", "peak_contact_force", "objective")
+LARGEST_STEP = 1.0 / 64.0
+"""Of the classical method, over the period; the tolerance ladder is turned into steps from here."""
+
+_SLIDER_9 = 5  # slider position among the nine coordinates of the multiplier formulation
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method makes of the designs: values (designs, 4) as in `QUANTITIES`, NaN where it failed."""
+
+    values: Array
+    evaluations: Array  # (designs,)
+
+
+Run = Callable[[], Outcome]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of the panel.
+
+    Attributes
+    ----------
+    name : str
+    prepare : callable
+        From a tolerance to a run that can be timed, and the share of its time that one design takes; everything
+        is compiled when it returns.
+    compiled : bool
+        Whether it runs without Python inside, so that repeating it is cheap.
+    setting : callable
+        From the rung's tolerance to what the method is really given: the same, or a step over the period.
+    """
+
+    name: str
+    prepare: Callable[[float], tuple[Run, float]]
+    compiled: bool = True
+    setting: Callable[[float], float] = lambda rtol: rtol
+
+
+def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
+    """The scene for one revolution from the start, all of it averaged."""
+    changes: dict[str, Any] = {
+        "transient_revolutions": 0,
+        "averaged_revolutions": 1,
+        "target_error": None,
+        "atol": None,
+        "uncertainty": False,
+        "energy": False,
+        **numerics,
+    }
+    if rtol is not None:
+        changes["rtol"] = rtol
+    return scene.with_({f"numerics.{key}": value for key, value in changes.items()})
+
+
+def neighbours(scene: Scene, count: int) -> Points:
+    """The scene and designs beside it: slider masses growing by 2 % each, so that no result is one lucky number."""
+    mass = scene.number("mechanism.slider.mass") * np.power(1.02, np.arange(count, dtype=float))
+    return Points(("m3",), mass[:, None], (("mechanism.slider.mass",),))
+
+
+def slider_of(
+    scene: Scene, par: Array, q: Array, v: Array, phi: float = at.TURN
+) -> tuple[float, float]:
+    """Slider position and velocity at the end of a revolution from coordinates and velocities."""
+    first, second, free = topology(scene)
+    if scene.numerics.formulation == "baumgarte":
+        return float(q[_SLIDER_9]), float(v[_SLIDER_9])
+    omega = v[-1] if free else par[at.SPEED]
+    if free:
+        phi, q, v = q[-1], q[:-1], v[:-1]
+    angle, speed = np.array([phi]), np.array([omega])
+    m = geometry.motion((first, second), par, angle, speed, q[:, None], v[:, None])
+    return float(m.slider[0]), float(m.slider_speed[0])
+
+
+# ---- the kernel's own methods -------------------------------------------------------------------
+
+
+def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics: Any) -> Method:
+    """A method of the kernel.
+
+    Raises
+    ------
+    InputError
+        If this scene cannot be integrated so.
+    """
+    problem_of(one_turn(scene, **numerics))  # refuses what there is not
+
+    def prepare(rtol: float) -> tuple[Run, float]:
+        here = one_turn(scene, rtol, **numerics)
+        problem = problem_of(here)
+        par = parameters(here, neighbours(here, designs))
+        state = start_states(here, par)
+        copies = -(-2 * width // designs) if width > 1 else 1
+        par, state = (np.tile(x, (copies, 1)) for x in (par, state))
+        Lanes(problem, width).step(1)  # without samples it only compiles
+        return (lambda: _kernel_outcome(here, problem, width, par, state, designs)), 1.0 / len(par)
+
+    return Method(name, prepare)
+
+
+def kernel_rows(problem: Problem, width: int, par: Array, state: Array) -> Array:
+    """Outcome rows (m, OUT) of designs in their order."""
+    lanes = Lanes(problem, width)
+    lanes.queue(par, state, np.arange(len(par)))
+    while lanes.step(1 << 40):
+        pass
+    labels, rows, *_ = lanes.collect()
+    return rows[np.argsort(labels)]
+
+
+def _kernel_outcome(
+    scene: Scene, problem: Problem, width: int, par: Array, state: Array, designs: int
+) -> Outcome:
+    rows = kernel_rows(problem, width, par, state)[:designs]
+    n = problem.coordinates
+    values = np.full((designs, len(QUANTITIES)), np.nan)
+    for k, row in enumerate(rows):
+        if row[at.OUT_STATUS] == 0:
+            q = row[at.OUT_STATE : at.OUT_STATE + n]
+            v = row[at.OUT_STATE + at.MAX_COORDINATES :][:n]
+            peak = max(row[at.OUT_PEAK_12], row[at.OUT_PEAK_23])
+            values[k] = *slider_of(scene, par[k], q, v), peak, row[at.OUT_OBJECTIVE]
+    return Outcome(values, rows[:, at.OUT_EVALUATIONS])
+
+
+# ---- methods that are not the kernel's ----------------------------------------------------------
+
+
+def systems(scene: Scene, designs: int) -> list[Equations]:
+    """The equations of the designs in minimal coordinates."""
+    here = one_turn(scene, formulation="minimal", method="auto")
+    problem = problem_of(here)
+    par = parameters(here, neighbours(here, designs))
+    state = start_states(here, par)
+    return [Equations(problem, p, s) for p, s in zip(par, state, strict=True)]
+
+
+def classical_method(scene: Scene, designs: int) -> Method:
+    """Classical Runge-Kutta steps of one length; contacts are noticed between steps, as simple codes do."""
+    made = systems(scene, designs)
+    step_of = lambda rtol: LARGEST_STEP * (rtol / 1e-3) ** 0.25 / 4.0  # noqa: E731
+
+    def run(steps: int) -> Outcome:
+        values = np.full((designs, len(QUANTITIES)), np.nan)
+        counts = np.zeros(designs)
+        for k, one in enumerate(made):
+            y, duration, peak, counts[k] = one.classical(steps)
+            if np.isfinite(y).all():
+                values[k] = _values(scene, one, y, duration, peak)
+        return Outcome(values, counts)
+
+    def prepare(rtol: float) -> tuple[Run, float]:
+        made[0].classical(1)
+        steps = round(1.0 / step_of(rtol))
+        return (lambda: run(steps)), 1.0 / designs
+
+    return Method("RK4, fixed steps", prepare, setting=step_of)
+
+
+def outside_method(scene: Scene, designs: int, name: str) -> Method:
+    """A solver of scipy on the compiled equations, restarted wherever a gap changes sign."""
+    made = systems(scene, designs)
+
+    def run(rtol: float) -> Outcome:
+        pairs = [solve_turn(scene, one, name, rtol) for one in made]
+        return Outcome(np.array([values for values, _ in pairs]), np.array([n for _, n in pairs]))
+
+    def prepare(rtol: float) -> tuple[Run, float]:
+        made[0](0.0, made[0].start)
+        return (lambda: run(rtol)), 1.0 / designs
+
+    return Method(f"{name} (scipy)", prepare, compiled=False)
+
+
+def _values(
+    scene: Scene, one: Equations, y: Array, duration: float, peak: float
+) -> tuple[float, float, float, float]:
+    n = one.n
+    f = float(np.hypot(y[2 * n], y[2 * n + 1])) / duration
+    here = scene.with_({"numerics.formulation": "minimal"})
+    return *slider_of(here, one.par, y[:n], y[n : 2 * n]), peak, f
+
+
+def solve_turn(
+    scene: Scene, one: Equations, solver: str, rtol: float
+) -> tuple[tuple[float, ...], int]:
+    """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
+    here, start = Equations(one.problem, one.par, np.zeros(at.WORK)), one.start.copy()
+    here.contacts[:] = one.contacts
+    side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
+    end = np.inf if one.free else one.par[at.PERIOD]
+    limit = 20.0 * one.par[at.PERIOD] if one.free else end
+    atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
+    atol = np.append(atol, 2 * [rtol * 1e-3 * one.par[at.PERIOD]])
+    t, y, peak, count = 0.0, start, 0.0, 0
+    for _ in range(100_000):
+        gaps = here.joints(t, y)[:, OPEN].copy()
+        events = [_crossing(here, j, side[j], gaps[j]) for j in range(2)]
+        if one.free:
+            events.append(_full_turn(one.n))
+        piece = solve_ivp(
+            here, (t, limit), y, solver, rtol=rtol, atol=atol, events=events, dense_output=True,
+            max_step=one.par[at.PERIOD] / 64.0,  # a whole contact inside a step would go unnoticed
+        )  # fmt: skip
+        count += piece.nfev
+        peak = max(peak, _largest_force(here, piece))
+        t, y = piece.t[-1], piece.y[:, -1].copy()
+        hit = [j for j, when in enumerate(piece.t_events) if len(when)]
+        if piece.status < 0:
+            return (np.nan,) * 4, count
+        if piece.status == 0 or 2 in hit:
+            return _values(scene, one, y, t, peak), count
+        for j in hit:
+            side[j] = -side[j]
+            if here.latched:
+                here.contacts[j] = float(side[j] > 0.0)
+                rate = here.joints(t, y)[j, RATE]
+                here.contacts[2 + j] = 1.0 / max(rate, one.problem.impact_floor)
+    return (np.nan,) * 4, count
+
+
+def _crossing(
+    one: Equations, joint: int, side: float, at_start: float
+) -> Callable[[float, Array], float]:
+    """The event that a gap leaves its side of zero; right after the last event it is taken to be on it."""
+    shift = 2.0 * at_start if side * at_start < 0.0 else 0.0
+
+    def gap(time: float, y: Array) -> float:
+        return float(one.joints(time, y)[joint, OPEN]) - shift
+
+    gap.terminal, gap.direction = True, -side  # type: ignore[attr-defined]
+    return gap
+
+
+def _full_turn(n: int) -> Callable[[float, Array], float]:
+    def beyond(time: float, y: Array) -> float:
+        return float(y[n - 1] - at.TURN)
+
+    beyond.terminal, beyond.direction = True, 1.0  # type: ignore[attr-defined]
+    return beyond
+
+
+def _largest_force(one: Equations, piece: object) -> float:
+    """Largest contact force of a piece, by its dense output about the largest step end."""
+    times, states, dense = piece.t, piece.y.T, piece.sol  # type: ignore[attr-defined]
+    forces = np.array(
+        [one.joints(t, y)[:, FORCE].copy() for t, y in zip(times, states, strict=True)]
+    )
+    largest = float(forces.max())
+    row, joint = np.unravel_index(forces.argmax(), forces.shape)
+    low, high = times[max(row - 1, 0)], times[min(row + 1, len(times) - 1)]
+    if largest == 0.0 or not low < high:
+        return largest
+    found = minimize_scalar(
+        lambda t: -one.joints(t, dense(t))[joint, FORCE],
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-6 * (high - low)},
+    )
+    return max(largest, -float(found.fun))
+
+
+# ---- all of them --------------------------------------------------------------------------------
+
+
+def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
+    """Every method that can integrate this scene, the kernel's first."""
+    wanted: list[tuple[str, int, dict[str, Any]]] = [
+        ("dormand-prince", 1, {"formulation": "minimal", "method": "dormand-prince"}),
+        (
+            f"dormand-prince, {DEFAULT_LANES} lanes",
+            DEFAULT_LANES,
+            {"formulation": "minimal", "method": "dormand-prince"},
+        ),
+        ("fehlberg", 1, {"formulation": "minimal", "method": "fehlberg"}),
+    ]
+    if more:
+        wanted += [
+            ("radau", 1, {"formulation": "minimal", "method": "radau"}),
+            ("baumgarte", 1, {"formulation": "baumgarte", "method": "dormand-prince"}),
+        ]
+    found = []
+    for name, width, numerics in wanted:
+        try:
+            found.append(kernel_method(name, scene, designs, width, **numerics))
+        except InputError:
+            continue  # not for this scene
+    found.append(classical_method(scene, designs))
+    return found + [outside_method(scene, designs, name) for name in ("DOP853", "LSODA")]
+
+
+def timed(run: Run, repeats: int) -> tuple[Outcome, float]:
+    """Outcome and median seconds of repeated runs."""
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        outcome = run()
+        seconds.append(time.perf_counter() - start)
+    return outcome, float(np.median(seconds))

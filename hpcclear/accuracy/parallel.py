@@ -1,0 +1,90 @@
+"""Speed-up and efficiency on the ranks at hand, and where time is lost."""
+
+import os
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ranks import COLUMNS, Ranks
+from ..sampling import generator
+from ..scene import Scene
+from ..scene.domain import study_of, to_physical
+from ..scene.points import Points
+from ..work import payload_of
+from .profile import Profile
+from .resting import SOME_RANKS
+from .surrogate import region_of
+
+Array = NDArray[np.float64]
+
+LOSSES = ("start-up", "compilation", "imbalance", "writing")
+
+
+@dataclass(frozen=True)
+class Parallel:
+    """The panel; arrays over the numbers of ranks, seconds."""
+
+    ranks: NDArray[np.int64]
+    strong: Array
+    weak: Array
+    samples: int  # of the fixed batch
+    lost: Array  # (4,), as in `LOSSES`, over all ranks, core-seconds
+
+
+def measure(
+    scene: Scene, case: str, sample_seconds: float, profile: Profile, ranks: Ranks
+) -> Parallel:
+    """Time a fixed batch, and one that grows with the ranks, on 1, 2, 4, ... ranks."""
+    numbers = np.unique([*2 ** np.arange(1 + int(np.log2(ranks.size))), ranks.size])
+    samples = int(np.clip(profile.strong_seconds / sample_seconds, 64, 10**6))
+    each = max(samples // ranks.size, 32)
+    strong = np.array([_timed(scene, case, samples, int(n), ranks) for n in numbers])
+    last = ranks.stage_seconds[_stage(int(numbers[-1]), samples)]
+    weak = np.array([_timed(scene, case, each * int(n), int(n), ranks) for n in numbers])
+    total = sum(ranks.stage_seconds.values())
+    column = {name: k for k, name in enumerate(COLUMNS)}
+    lost = [
+        process_age_at_start() * ranks.size,
+        float(total[:, column["compile"]].sum()),  # type: ignore[call-overload,index]
+        float(last[:, column["idle"]].sum()),
+        float(total[:, column["write"]].sum()),  # type: ignore[call-overload,index]
+    ]
+    return Parallel(numbers.astype(np.int64), strong, weak, samples, np.array(lost))
+
+
+def _stage(number: int, samples: int) -> str:
+    return f"parallel: {samples} samples on {number} ranks"
+
+
+def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> float:
+    """Wall seconds of a batch on the first `number` ranks, making of the workers left out."""
+    region = region_of(scene, case)
+    rng = generator(study_of(scene).seed, "accuracy", "parallel")
+    unit = rng.random((samples, len(region.names)))
+    coordinates = region.lower + unit * (region.upper - region.lower)
+    paths = tuple(study_of(scene).variable(name).paths for name in region.names)
+    points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
+    payload = {**payload_of(scene, points), "ranks": number}
+    stage = _stage(number, samples)
+    started = time.perf_counter()
+    ranks.run_points(SOME_RANKS, payload, points.values, stage=stage, keep=False)
+    wall = time.perf_counter() - started
+    return float(wall - ranks.stage_seconds[stage][0, COLUMNS.index("compile")])
+
+
+_IMPORTED = time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else np.nan
+
+
+def process_age_at_start() -> float:
+    """Seconds from the start of this process to the import of this module, on Linux; NaN elsewhere.
+
+    That is the interpreter, the package's imports and MPI's start.
+    """
+    try:
+        with open("/proc/self/stat", encoding="utf-8") as file:
+            ticks = int(file.read().rpartition(")")[2].split()[19])
+    except OSError:
+        return float("nan")
+    return float(_IMPORTED - ticks / os.sysconf("SC_CLK_TCK"))

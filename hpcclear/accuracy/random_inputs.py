@@ -1,0 +1,124 @@
+"""Error of mean and deviation against Monte Carlo size: on the surrogate, beside quadrature, and by simulation."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from ..errors import InputError
+from ..ranks import Ranks
+from ..robust import sample_moments
+from ..sampling import generator, monte_carlo
+from ..scene import Scene
+from ..scene.domain import study_of
+from ..study.optimisation import problem_of
+from ..surrogate.kriging import Kriging
+from .profile import Profile
+from .surrogate import objectives
+
+Array = NDArray[np.float64]
+
+ESTIMATES = ("surrogate", "simulation")
+MOMENTS = ("mean", "deviation")
+LEAST_BLOCKS = 4
+"""Samples of one size below which their scatter says nothing."""
+
+
+@dataclass(frozen=True)
+class RandomInputs:
+    """The panel; arrays (2 estimates, 2 moments, sizes) relative to the moment, NaN where nothing was measured."""
+
+    draws: NDArray[np.int64]
+    error: Array
+    lower: Array  # 95 % confidence limits of the error
+    upper: Array
+    seconds: Array  # (2 estimates, sizes), of one Monte Carlo estimate
+    bias: Array  # (2 moments,), surrogate by quadrature against direct simulation
+    bias_error: Array
+    closed_form: Array  # (2 moments,), quadrature against closed form; NaN where there is none
+    quadrature_seconds: float
+
+
+def measure(
+    scene: Scene, case: str, model: Kriging, profile: Profile, ranks: Ranks
+) -> RandomInputs:
+    """Measure at the middle of the design space.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study that has the case.
+    case : str
+    model : Kriging
+        In the inputs of the study's optimisation.
+    profile : Profile
+    ranks : Ranks
+    """
+    problem = problem_of(scene, case, model)  # type: ignore[arg-type]
+    region = problem.region
+    design = problem.physical(0.5 * (region.lower + region.upper)[None])
+    problem.objective.monte_carlo(design, 4, np.random.default_rng(0))  # compiles
+    problem.objective(design)
+    started = time.perf_counter()
+    exact = problem.objective(design)[0]
+    quadrature_seconds = time.perf_counter() - started
+    try:
+        closed = exact / problem.objective.closed_form(design)[0] - 1.0
+    except InputError:  # inputs derived from others have none
+        closed = np.full(len(MOMENTS), np.nan)
+    sizes = np.array(profile.draws, np.int64)
+    error = np.full((len(ESTIMATES), len(MOMENTS), len(sizes)), np.nan)
+    lower, upper = error.copy(), error.copy()
+    seconds = np.full((len(ESTIMATES), len(sizes)), np.nan)
+    rng = generator(study_of(scene).seed, "accuracy", "draws")
+    for k, size in enumerate(sizes):
+        started = time.perf_counter()
+        found = [
+            problem.objective.monte_carlo(design, int(size), rng) for _ in range(profile.blocks)
+        ]
+        seconds[0, k] = (time.perf_counter() - started) / profile.blocks
+        table = np.array([[one.mean[0], one.deviation[0]] for one in found])
+        error[0, :, k], lower[0, :, k], upper[0, :, k] = root_mean_square(table / exact - 1.0, 0)
+    chosen = dict(zip(problem.names, design[0], strict=True))
+    random = study_of(scene).case(case).random
+    points = monte_carlo(
+        scene, profile.simulations, random=random, design=chosen, purpose="accuracy"
+    )
+    values, each = objectives(scene, points, ranks, "random inputs: simulations")
+    values = values[np.isfinite(values)]
+    true = sample_moments(values[None])
+    truth = np.array([true.mean[0], true.deviation[0]])
+    for k, size in enumerate(sizes):
+        blocks = len(values) // size
+        seconds[1, k] = each * size
+        if blocks >= LEAST_BLOCKS:
+            parts = values[: blocks * size].reshape(blocks, size)
+            table = np.stack([parts.mean(axis=1), parts.std(axis=1, ddof=1)], axis=1)
+            error[1, :, k], lower[1, :, k], upper[1, :, k] = root_mean_square(
+                table / truth - 1.0, 1
+            )
+    bias_error = np.array([true.mean_error[0], true.deviation_error[0]]) / truth
+    return RandomInputs(
+        sizes,
+        error,
+        lower,
+        upper,
+        seconds,
+        exact / truth - 1.0,
+        bias_error,
+        closed,
+        quadrature_seconds,
+    )
+
+
+def root_mean_square(errors: Array, known: int) -> tuple[Array, Array, Array]:
+    """Root mean square over the first axis, with 95 % limits for normal errors.
+
+    `known` is 1 if the truth the errors are about was taken from the same values, which hides a share of them.
+    """
+    freedom = len(errors) - known
+    square = np.square(errors).sum(axis=0)
+    limits = [np.sqrt(square / chi2.ppf(p, freedom)) for p in (0.975, 0.025)]
+    return np.sqrt(square / freedom), limits[0], limits[1]

@@ -1,0 +1,42 @@
+"""Batches on fewer ranks than there are: the others rest. Light to import, for the rank boundary."""
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ranks import Maker, Ranks
+from ..schedule import Worker
+from ..status import OUTCOME
+from ..work import MAKERS as WORK_MAKERS
+from ..work import make_evaluator
+
+SOME_RANKS = "points on some ranks"
+
+
+class Resting:
+    """A rank's worker that takes no samples, so that a batch runs on fewer ranks than there are."""
+
+    lanes = 1
+    pending = 1 << 40  # never hungry
+
+    def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
+        """Nothing is ever submitted to it."""
+        raise AssertionError("a resting rank was given samples")
+
+    def advance(self, seconds: float) -> NDArray[np.void]:
+        """Rest."""
+        time.sleep(seconds)
+        return np.zeros(0, OUTCOME)
+
+
+def make_on_some(payload: Mapping[str, Any], ranks: Ranks) -> Worker:
+    """The worker of a rank among the first ``payload["ranks"]``; the others rest."""
+    evaluator = make_evaluator(payload, ranks)  # everywhere: one rank of each node compiles first
+    return evaluator if ranks.rank < payload["ranks"] else Resting()
+
+
+MAKERS: Mapping[str, Maker] = {**WORK_MAKERS, SOME_RANKS: make_on_some}
+"""For `hpcclear.comm.run_on_ranks`."""

@@ -1,0 +1,55 @@
+"""A study for scenes that have none, or none with random inputs: what surrogates and moments are measured on."""
+
+from typing import Any
+
+from ..scene import Scene
+from ..scene.variables import PAPER_PATHS
+
+CASE = "about_the_scene"
+WIDTH = 0.2
+"""Half-width of a variable's range about the scene's value, relative, where the scene has no study."""
+SHARE = 0.05
+"""Half-width of a random input about the design, as a share of the variable's range, where a study has none."""
+
+
+def with_case(scene: Scene) -> tuple[Scene, str, str]:
+    """The scene with a study that has a case, the name of the case, and where the study comes from, in words."""
+    scene = scene.with_({"numerics.target_error": None})
+    if scene.study is not None and scene.study.cases:
+        case = scene.study.cases[-1].name
+        return _by_quadrature(scene), case, f"the scene's study, case {case}"
+    if scene.study is not None:
+        where = (
+            f"the scene's study, inputs uniform within {SHARE:.0%} of their range about a design"
+        )
+    else:
+        scene = scene.with_({"study": {"seed": 1, "variables": _variables(scene)}})
+        where = f"no study in the scene: variables within {WIDTH:.0%} of its values"
+    assert scene.study is not None
+    names = scene.study.optimisation
+    widths = {
+        row.name: SHARE * (row.range[1] - row.range[0])
+        for row in scene.study.variables
+        if row.range is not None and row.name in names
+    }
+    random: dict[str, Any] = {
+        name: {"distribution": "uniform", "half_width": width} for name, width in widths.items()
+    }
+    changes = {"study.random": random, "study.cases": {CASE: list(random)}}
+    return _by_quadrature(scene.with_(changes)), CASE, where
+
+
+def _by_quadrature(scene: Scene) -> Scene:
+    return scene.with_({"study.swarm.statistics": "quadrature"})
+
+
+def _variables(scene: Scene) -> dict[str, Any]:
+    """Rod mass, slider mass and the clearances, each about the scene's value."""
+    known = set(scene.numeric_paths())
+    clearances = {scene.number(path) for path in PAPER_PATHS["C"] if path in known}
+    names = ["m2", "m3", *(["C"] if len(clearances) == 1 else ["C12", "C23"])]
+    rows = {}
+    for name in names:
+        value = scene.number(next(path for path in PAPER_PATHS[name] if path in known))
+        rows[name] = {"range": [(1.0 - WIDTH) * value, (1.0 + WIDTH) * value]}
+    return rows

@@ -1,0 +1,109 @@
+"""Accuracy of response surface and Kriging against sample size and simulation time."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ranks import Ranks
+from ..sampling import generator, unit_lhs
+from ..scene import Scene
+from ..scene.domain import Box, box, study_of, to_physical
+from ..scene.points import Points
+from ..status import Status
+from ..study.simulations import objective_of
+from ..study.surrogates import coordinate
+from ..surrogate.kriging import Kriging, fit_kriging
+from ..surrogate.metrics import accuracy
+from ..surrogate.response_surface import fit_response_surface, n_terms
+from ..work import sample_points
+from .profile import Profile
+
+Array = NDArray[np.float64]
+
+SURROGATES = ("response surface", "Kriging")
+
+
+@dataclass(frozen=True)
+class Surrogates:
+    """The panel; arrays (2 surrogates, sample sizes), NaN where a surrogate cannot be fitted to so few samples."""
+
+    training: NDArray[np.int64]
+    r2: Array
+    rmae: Array
+    leave_one_out: Array  # RMS, over the standard deviation of the values
+    fit_seconds: Array
+    sample_seconds: float
+    model: Kriging
+    """The Kriging model of the largest sample."""
+
+
+def region_of(scene: Scene, case: str) -> Box:
+    """Where the surrogates hold: the design space, widened so that no random input of the case leaves it."""
+    study = study_of(scene)
+    return box(scene, study.optimisation, study.case(case).random)
+
+
+def measure(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> Surrogates:
+    """Fit both surrogates to samples of each size and compare them with fresh simulations."""
+    region = region_of(scene, case)
+    sizes = [*profile.training, profile.tests]
+    rng = generator(study_of(scene).seed, "accuracy", "surrogate")
+    unit = [unit_lhs(size, len(region.names), rng) for size in sizes]
+    coordinates = [region.lower + u * (region.upper - region.lower) for u in unit]
+    values, sample_seconds = simulated(scene, region, np.concatenate(coordinates), ranks)
+    parts = np.split(values, np.cumsum(sizes)[:-1])
+    bounds = np.column_stack([region.lower, region.upper])
+    names = [coordinate(study_of(scene).variable(name)) for name in region.names]
+    shape = (len(SURROGATES), len(profile.training))
+    r2, rmae, loo, seconds = (np.full(shape, np.nan) for _ in range(4))
+    for k, (points, f) in enumerate(zip(coordinates[:-1], parts[:-1], strict=True)):
+        deviation = np.nanstd(f)
+        started = time.perf_counter()
+        order = next((m for m in (3, 2, 1) if 1.3 * n_terms(len(names), m) <= len(points)), 0)
+        surface = fit_response_surface(points, f, bounds, order)
+        seconds[0, k] = time.perf_counter() - started
+        loo[0, k] = np.sqrt(np.mean(surface.leave_one_out_errors**2)) / deviation
+        started = time.perf_counter()
+        model = fit_kriging(points, f, bounds, rng=rng, names=names)
+        seconds[1, k] = time.perf_counter() - started
+        loo[1, k] = np.sqrt(np.mean(leave_one_out(model) ** 2)) / deviation
+        for j, surrogate in enumerate((surface, model)):
+            found = accuracy(parts[-1], surrogate.predict(coordinates[-1]))  # type: ignore[attr-defined]
+            r2[j, k], rmae[j, k] = found.r2, found.rmae
+    training = np.array(profile.training, np.int64)
+    return Surrogates(training, r2, rmae, loo, seconds, sample_seconds, model)
+
+
+def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
+    """Simulate one design on the ranks at hand: every rank compiles the kernel, or loads it."""
+    region = region_of(scene, case)
+    simulated(scene, region, 0.5 * (region.lower + region.upper)[None], ranks)
+
+
+def simulated(scene: Scene, region: Box, coordinates: Array, ranks: Ranks) -> tuple[Array, float]:
+    """The study's objective at points in sampling coordinates, NaN where failed; core-seconds of one of them."""
+    paths = tuple(study_of(scene).variable(name).paths for name in region.names)
+    points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
+    return objectives(scene, points, ranks, "surrogate: simulations")
+
+
+def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:
+    """The study's objective at points, NaN where failed, and core-seconds of one of them."""
+    records = sample_points(scene, points, ranks, stage=stage)
+    values = objective_of(scene)[1](records)
+    busy = float(ranks.stage_seconds[stage][:, 0].sum())
+    return np.where(records["status"] == Status.OK, values, np.nan), busy / len(points)
+
+
+def leave_one_out(model: Kriging) -> Array:
+    """Error at each training point of the Kriging model with the same hyperparameters and without that point.
+
+    Dubrule 1983 (doi:10.1007/BF01033232): ``alpha_i / (K^-1)_ii``; in the unit of the values, shape (n,).
+    """
+    train = model.to_unit(model.inputs) / model.length_scales
+    squares = np.square(train[:, None, :] - train[None, :, :]).sum(axis=2)
+    matrix = model.signal_variance * np.exp(-0.5 * squares)
+    matrix[np.diag_indices_from(matrix)] += model.noise_variance
+    return model.scale * model.alpha / np.diag(np.linalg.inv(matrix))
