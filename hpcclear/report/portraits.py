@@ -42,7 +42,7 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
         panel.plot(x, y, color=_FLIGHT, lw=0.7, label="free flight")
         panel.plot(*_only(x, y, contact), color=_CONTACT, lw=0.7, label="contact")
         _circle(panel, clearances[row])
-        _arcs(panel, clearances[row], np.arctan2(y, x)[contact])
+        _arcs(panel, clearances[row], x, y, contact)
         panel.set_title(f"{style.JOINT_NAMES[joint]}: in contact {contact.mean():.0%} of the time")
         _equal(panel, unit)
     handles, words = axes[0, 0].get_legend_handles_labels()
@@ -192,15 +192,11 @@ def _circle(axes: "Axes", radius: float) -> None:
         )
 
 
-def _arcs(axes: "Axes", radius: float, angles: Array) -> None:
-    """Where on the circle there was contact, in steps of two degrees."""
-    touched = np.histogram(angles, bins=180, range=(-np.pi, np.pi))[0] > 0
-    fine = np.linspace(-np.pi, np.pi, 1801)
-    shown = np.append(np.repeat(touched, 10), touched[-1])
-    x, y = _only(radius * np.cos(fine), radius * np.sin(fine), shown)
-    axes.plot(
-        x, y, color=style.PALETTE["black"], lw=2.4, solid_capstyle="butt", label="contact arc"
-    )
+def _arcs(axes: "Axes", radius: float, x: Array, y: Array, contact: NDArray[np.bool_]) -> None:
+    """Where on the circle there was contact."""
+    angle = np.arctan2(y, x)
+    shown = _only(radius * np.cos(angle), radius * np.sin(angle), contact)
+    axes.plot(*shown, color=style.PALETTE["black"], lw=2.4, label="contact arc")
 
 
 def _cyclic() -> Any:

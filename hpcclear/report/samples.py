@@ -111,7 +111,8 @@ def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.Data
     _cloud(below, main, samples["objective_spread"], _values(main))
     below.set_xlabel(labels.of(main).label(symbol(main)))
     below.set_ylabel(labels.of(samples["objective_spread"]).label("spread of $f$"))
-    if bool((samples["objective_spread"] > 0).any()):
+    spread = samples["objective_spread"].where(samples["objective_spread"] > 0)
+    if float(spread.max()) > 30.0 * float(spread.min()):
         below.set_yscale("log")
     style.settle([first, below])
     style.settle([side], 3)

@@ -1,0 +1,309 @@
+"use strict";
+/* The interactive parts of a report: front, responses, moving mechanism. Text from files only ever enters as
+   textContent or attribute values of SVG elements, never as markup. */
+(() => {
+  const content = JSON.parse(document.getElementById("content").textContent);
+  const SVG = "http://www.w3.org/2000/svg";
+  const byId = (id) => document.getElementById(id);
+
+  function draw(parent, name, attributes = {}, text = null) {
+    const element = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    if (text !== null) element.textContent = text;
+    parent.append(element);
+    return element;
+  }
+
+  function put(parent, name, text = null, attributes = {}) {
+    const element = document.createElement(name);
+    if (text !== null) element.textContent = text;
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    parent.append(element);
+    return element;
+  }
+
+  function ticks(low, high, count) {
+    const raw = (high - low) / count || 1;
+    const size = 10 ** Math.floor(Math.log10(raw));
+    const step = [1, 2, 5, 10].map((m) => m * size).find((s) => s >= raw * 0.999);
+    const found = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
+      found.push(Number((k * step).toPrecision(12)));
+    }
+    return found;
+  }
+
+  function extent(values, margin) {
+    let low = Math.min(...values), high = Math.max(...values);
+    const pad = (high - low || Math.abs(high) || 1) * margin;
+    return [low - pad, high + pad];
+  }
+
+  function axes(svg, box, xs, ys, xLabel, yLabel, counts = [6, 6]) {
+    const x = (v) => box.left + ((v - xs[0]) / (xs[1] - xs[0])) * box.width;
+    const y = (v) => box.top + box.height - ((v - ys[0]) / (ys[1] - ys[0])) * box.height;
+    const bottom = box.top + box.height;
+    for (const v of ticks(ys[0], ys[1], counts[1])) {
+      draw(svg, "line", { x1: box.left, x2: box.left + box.width, y1: y(v), y2: y(v), class: "rule" });
+      draw(svg, "text", { x: box.left - 6, y: y(v) + 4, "text-anchor": "end" }, String(v).replace("-", "−"));
+    }
+    for (const v of ticks(xs[0], xs[1], counts[0])) {
+      draw(svg, "line", { x1: x(v), x2: x(v), y1: bottom, y2: bottom + 4, class: "axis" });
+      draw(svg, "text", { x: x(v), y: bottom + 18, "text-anchor": "middle" }, String(v).replace("-", "−"));
+    }
+    draw(svg, "line", { x1: box.left, x2: box.left + box.width, y1: bottom, y2: bottom, class: "axis" });
+    draw(svg, "line", { x1: box.left, x2: box.left, y1: box.top, y2: bottom, class: "axis" });
+    draw(svg, "text", { x: box.left + box.width / 2, y: bottom + 36, "text-anchor": "middle" }, xLabel);
+    draw(svg, "text", { x: box.left - 6, y: box.top - 10, "text-anchor": "start" }, yLabel);
+    return [x, y];
+  }
+
+  /* ---- the front ---- */
+
+  const colour = (name) => `var(--c${Math.max(0, content.front.cases.indexOf(name)) % 4})`;
+
+  function marker(svg, point, x, y) {
+    const size = point.kind === "solution" ? (point.direct.length ? 6 : 4) : 7;
+    const hollow = point.kind !== "solution";
+    const style = hollow ? `stroke: ${colour(point.case)}` : `fill: ${colour(point.case)}`;
+    const shared = { class: hollow ? "point hollow" : "point", style };
+    if (point.kind === "original") {
+      return draw(svg, "rect", { x: x - size, y: y - size, width: 2 * size, height: 2 * size, ...shared });
+    }
+    if (point.kind === "paper") {
+      const d = `M${x},${y - size * 1.3}L${x + size * 1.3},${y}L${x},${y + size * 1.3}L${x - size * 1.3},${y}Z`;
+      return draw(svg, "path", { d, ...shared });
+    }
+    if (content.front.cases.indexOf(point.case) === 1 && !hollow) {
+      const d = `M${x},${y - size * 1.2}L${x + size * 1.1},${y + size}L${x - size * 1.1},${y + size}Z`;
+      return draw(svg, "path", { d, ...shared });
+    }
+    return draw(svg, "circle", { cx: x, cy: y, r: size, ...shared });
+  }
+
+  function list(panel, title, rows) {
+    if (!rows.length) return;
+    put(panel, "h3", title);
+    const entries = put(panel, "dl");
+    for (const [name, value] of rows) {
+      put(entries, "dt", name);
+      put(entries, "dd", value);
+    }
+  }
+
+  function describe(panel, point) {
+    panel.replaceChildren();
+    put(panel, "h3", point.case && !point.name.startsWith(point.case) ? `${point.case}: ${point.name}` : point.name);
+    list(panel, "Design", point.design);
+    list(panel, "By the surrogate", point.surrogate);
+  }
+
+  function chart(panel, one, base) {
+    const width = 360, height = 150;
+    const svg = draw(panel, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img" });
+    svg.setAttribute("aria-label", `${one.label} over two revolutions`);
+    const all = base ? one.y.concat(base.y) : one.y;
+    const big = Math.max(...all.map(Math.abs));
+    const kilo = big >= 2000;
+    const values = (y) => y.map((v) => (kilo ? v / 1000 : v));
+    const box = { left: 48, top: 26, width: width - 56, height: height - 66 };
+    const label = `${one.label} (${kilo ? "k" : ""}${one.unit.replace("^2", "²")})`;
+    const [x, y] = axes(svg, box, extent(one.x, 0), extent(values(all), 0.03), "crank angle (revolutions)", label, [4, 4]);
+    const path = (c) => values(c.y).map((v, k) => `${k ? "L" : "M"}${x(c.x[k]).toFixed(1)},${y(v).toFixed(1)}`).join("");
+    if (base) draw(svg, "path", { d: path(base), class: "curve before" });
+    draw(svg, "path", { d: path(one), class: "curve after" });
+  }
+
+  function detail(panel, point) {
+    const below = byId("front-responses");
+    below.replaceChildren();
+    describe(panel, point);
+    if (point.direct.length) list(panel, "By direct simulation, with confidence limits", point.direct);
+    else put(panel, "p", "This solution was not simulated directly; larger marks were.", { class: "soft" });
+    const one = content.responses[point.response];
+    const base = point.response === "original" ? null : content.responses.original;
+    if (one) {
+      put(below, "h3", `Responses of ${point.name}${base ? " (grey: the original design)" : ""}`);
+      const charts = put(below, "div", null, { class: "charts" });
+      one.forEach((curve, k) => chart(charts, curve, base ? base[k] : null));
+    } else {
+      put(panel, "p", "No response was stored for this design.", { class: "soft" });
+    }
+  }
+
+  function front() {
+    const place = byId("front");
+    if (!place || !content.front.points.length) return;
+    const points = content.front.points, panel = byId("front-panel");
+    const width = 640, height = 480;
+    const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group" });
+    svg.setAttribute("aria-label", "Pareto front: arrow keys move between designs, Enter shows one");
+    const box = { left: 52, top: 34, width: width - 66, height: height - 84 };
+    const xs = extent(points.map((p) => p.x), 0.05), ys = extent(points.map((p) => p.y), 0.05);
+    const [x, y] = axes(svg, box, xs, ys, content.front.x, content.front.y);
+    /* simulated designs are drawn last, on top */
+    const order = points.map((p, k) => k).sort((a, b) => rank(points[a]) - rank(points[b]));
+    function rank(p) { return p.kind === "solution" ? (p.direct.length ? 1 : 0) : 2; }
+    const marks = [];
+    for (const k of order) {
+      const p = points[k], mark = marker(svg, p, x(p.x), y(p.y));
+      mark.setAttribute("tabindex", "-1");
+      mark.setAttribute("role", "button");
+      mark.setAttribute("aria-label", `${p.case} ${p.name}: ${content.front.x} ${p.x}, ${content.front.y} ${p.y}`);
+      mark.setAttribute("data-index", k);
+      marks[k] = mark;
+      mark.addEventListener("mouseenter", () => describe(panel, p));
+      mark.addEventListener("mouseleave", () => detail(panel, points[chosen]));
+      mark.addEventListener("focus", () => move(k, false));
+      mark.addEventListener("click", () => choose(k));
+    }
+    let here = 0, chosen = 0;
+    function move(k, focus = true) {
+      marks[here].setAttribute("tabindex", "-1");
+      here = Math.max(0, Math.min(points.length - 1, k));
+      marks[here].setAttribute("tabindex", "0");
+      if (focus) marks[here].focus();
+    }
+    function choose(k) {
+      marks[chosen].classList.remove("selected");
+      marks[chosen].removeAttribute("aria-pressed");
+      chosen = k;
+      marks[k].classList.add("selected");
+      marks[k].setAttribute("aria-pressed", "true");
+      move(k, false);
+      detail(panel, points[k]);
+    }
+    function further(step) {
+      for (let k = here + step; k >= 0 && k < points.length; k += step) if (points[k].direct.length) return k;
+      return here;
+    }
+    svg.addEventListener("keydown", (event) => {
+      const keys = {
+        ArrowRight: () => move(here + 1), ArrowLeft: () => move(here - 1),
+        ArrowUp: () => move(further(-1)), ArrowDown: () => move(further(1)),
+        Home: () => move(0), End: () => move(points.length - 1),
+        Enter: () => choose(here), " ": () => choose(here),
+      };
+      if (!keys[event.key]) return;
+      event.preventDefault();
+      keys[event.key]();
+    });
+    legend(byId("front-legend"));
+    const first = points.findIndex((p) => content.responses[p.response] && p.kind === "design");
+    choose(first >= 0 ? first : Math.max(0, points.findIndex((p) => p.direct.length)));
+  }
+
+  function legend(place) {
+    const entry = (point, words) => {
+      const item = put(place, "span");
+      const svg = draw(item, "svg", { viewBox: "0 0 24 24", "aria-hidden": "true" });
+      marker(svg, point, 12, 12);
+      item.append(` ${words}`);
+    };
+    const kinds = new Set(content.front.points.map((p) => p.kind));
+    for (const name of content.front.cases) {
+      if (kinds.has("solution")) entry({ kind: "solution", case: name, direct: [1] }, `${name || "case"}, by the surrogate`);
+    }
+    const words = { design: "simulated directly", original: "original design", paper: "the paper’s design" };
+    for (const kind of Object.keys(words)) {
+      if (kinds.has(kind)) entry({ kind, case: content.front.cases[0], direct: [] }, words[kind]);
+    }
+  }
+
+  /* ---- the mechanism ---- */
+
+  function mechanism() {
+    const place = byId("mechanism"), names = Object.keys(content.motions);
+    if (!place || !names.length) return;
+    const select = byId("motion-name"), button = byId("motion-play"), gain = byId("motion-gain");
+    const at = byId("motion-at"), out = byId("motion-text"), speed = byId("motion-speed");
+    for (const name of names) put(select, "option", name, { value: name });
+    const svg = draw(place, "svg", { role: "img" });
+    svg.setAttribute("aria-label", "The mechanism, its clearances drawn larger than they are");
+    const shapes = {};
+    for (const name of ["guide", "slider", "crank", "rod", "ring0", "ring1", "pin0", "pin1", "force0", "force1", "hub"]) {
+      const kind = /ring|pin|hub/.test(name) ? "circle" : name === "slider" ? "rect" : "line";
+      shapes[name] = draw(svg, kind);
+    }
+    const set = (name, attributes) => {
+      for (const [key, value] of Object.entries(attributes)) shapes[name].setAttribute(key, value);
+    };
+    let motion = null, frame = 0, playing = false, last = 0, strongest = 1;
+
+    function load(name) {
+      motion = content.motions[name];
+      const l = motion.crank, far = Math.max(...motion.slider) + 0.9 * l;
+      strongest = Math.max(1e-9, ...motion.force.flat());
+      svg.setAttribute("viewBox", `${-1.6 * l} ${-1.7 * l} ${far + 1.6 * l} ${3.4 * l}`);
+      const thin = `${0.02 * l}`, thick = `${0.09 * l}`;
+      set("guide", { x1: 0, x2: far, y1: 0, y2: 0, stroke: "var(--line)", "stroke-width": thin });
+      set("slider", { width: 0.9 * l, height: 0.7 * l, y: -0.35 * l, fill: "var(--line)", stroke: "var(--soft)", "stroke-width": thin });
+      set("hub", { cx: 0, cy: 0, r: 0.12 * l, fill: "var(--soft)" });
+      set("crank", { x1: 0, y1: 0, stroke: "var(--c0)", "stroke-width": thick, "stroke-linecap": "round" });
+      set("rod", { stroke: "var(--c2)", "stroke-width": thick, "stroke-linecap": "round", "stroke-opacity": 0.75 });
+      for (const k of [0, 1]) {
+        set(`ring${k}`, { fill: "none", stroke: "var(--c2)", "stroke-width": `${0.035 * l}` });
+        set(`pin${k}`, { r: 0.05 * l, fill: "var(--ink)" });
+        set(`force${k}`, { stroke: "var(--c1)", "stroke-width": `${0.05 * l}`, "stroke-linecap": "round" });
+      }
+      const widest = Math.max(...motion.clearance, 1e-9);
+      gain.max = Math.max(2, Math.round((0.6 * l) / widest));
+      gain.value = Math.min(gain.max, Math.max(1, Math.round((0.16 * l) / widest)));
+      at.max = motion.turn.length - 1;
+      show(Math.min(frame, motion.turn.length - 1));
+    }
+
+    function show(k) {
+      frame = Math.floor(k);
+      const g = Number(gain.value), l = motion.crank;
+      const pin = motion.pin[frame], e = motion.e[frame], s = motion.slider[frame];
+      /* journals stay where they are, the rod's bearings move away from them by the enlarged eccentricity */
+      const ends = [[pin[0], -pin[1]], [s, 0]];
+      const centres = [[pin[0] - g * e[0], -(pin[1] - g * e[1])], [s - g * e[2], g * e[3]]];
+      set("crank", { x2: ends[0][0], y2: ends[0][1] });
+      set("slider", { x: s - 0.45 * l });
+      set("rod", { x1: centres[0][0], y1: centres[0][1], x2: centres[1][0], y2: centres[1][1] });
+      for (const j of [0, 1]) {
+        const size = (0.9 * l * motion.force[frame][j]) / strongest, length = Math.hypot(e[2 * j], e[2 * j + 1]) || 1;
+        set(`ring${j}`, { cx: centres[j][0], cy: centres[j][1], r: Math.max(g * motion.clearance[j], 0.03 * l) });
+        set(`pin${j}`, { cx: ends[j][0], cy: ends[j][1] });
+        set(`force${j}`, {
+          x1: ends[j][0], y1: ends[j][1],
+          x2: ends[j][0] + (size * e[2 * j]) / length, y2: ends[j][1] - (size * e[2 * j + 1]) / length,
+          visibility: size > 0 ? "visible" : "hidden",
+        });
+      }
+      at.value = frame;
+      const angle = Math.round((motion.turn[frame] % 1) * 360) % 360;
+      const force = motion.force[frame].map((f, j) => `${j ? "O23" : "O12"} ${f > 0 ? `${(f / 1000).toFixed(2)} kN` : "free flight"}`);
+      out.textContent = `crank ${String(angle).padStart(3, "\u2007")}°, ${force.join(", ")}, clearance × ${g}`;
+      at.setAttribute("aria-valuetext", `crank ${angle} degrees`);
+    }
+
+    function step(now) {
+      if (!playing) return;
+      const rate = (motion.turn.length / (motion.turn[motion.turn.length - 1] - motion.turn[0] || 1)) * Number(speed.value);
+      const next = frame + Math.max(1, Math.round(((now - last) / 1000) * rate));
+      if (now - last > 30) {
+        show(next >= motion.turn.length ? 0 : next);
+        last = now;
+      }
+      requestAnimationFrame(step);
+    }
+    function play(on) {
+      playing = on;
+      button.textContent = on ? "Pause" : "Play";
+      last = performance.now();
+      if (on) requestAnimationFrame(step);
+    }
+    button.addEventListener("click", () => play(!playing));
+    select.addEventListener("change", () => load(select.value));
+    gain.addEventListener("input", () => show(frame));
+    at.addEventListener("input", () => { play(false); show(Number(at.value)); });
+    load(names[0]);
+    play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  }
+
+  front();
+  mechanism();
+})();
