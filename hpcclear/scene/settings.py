@@ -109,9 +109,11 @@ class Verification(Table):
     """Level of the confidence limits."""
     tolerance: Share = 0.02
     """Relative difference of surrogate and true mean above which points are added."""
+    deviation_tolerance: Share = 0.05
+    """The same for the deviation."""
     infill_rounds: Annotated[int, Count(0, 100)] = 3
     """Rounds of added points at most."""
-    infill_samples: Annotated[int, Count(1, 10**5)] = 20
+    infill_samples: Annotated[int, Count(1, 10**5)] = 40
     """Points added a round."""
     response_clearance: Annotated[float, Quantity("m", above=0)] = 3e-4
     """Clearance of the responses that are compared, m (Fig. 10)."""

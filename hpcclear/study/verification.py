@@ -90,14 +90,17 @@ def predicted(run: Run, choices: Sequence[Choice], model: PiecewiseKriging) -> A
 def misses(
     run: Run, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
 ) -> tuple[list[Choice], list[str]]:
-    """Designs whose surrogate mean is further from the true one than the study allows; in words."""
-    missed, texts = [], []
-    errors = predicted(run, choices, model)[:, 0] / true["mean"] - 1.0
-    for choice, error in zip(choices, errors, strict=True):
-        if not abs(error) <= run.study.verification.tolerance:  # true for NaN
+    """Designs at which the surrogate is further from the truth than the study allows; in words."""
+    settings, missed, texts = run.study.verification, [], []
+    surrogate = predicted(run, choices, model)
+    for k, choice in enumerate(choices):
+        errors = surrogate[k] / [true["mean"][k], true["deviation"][k]] - 1.0
+        good = abs(errors) <= (settings.tolerance, settings.deviation_tolerance)  # False for NaN
+        if not good.all():
             missed.append(choice)
             texts.append(
-                f"At {choice.name} the surrogate's mean is {100 * error:+.1f} % off the true one."
+                f"At {choice.name} the surrogate's mean is {100 * errors[0]:+.1f} % and its "
+                f"deviation {100 * errors[1]:+.1f} % off the true one."
             )
     return missed, texts
 
