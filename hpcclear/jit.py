@@ -22,19 +22,22 @@ FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
 
 
+def _compiled_sources(root: Path) -> list[Path]:
+    """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
+    parts = {path for folder in ("kernel", "physics") for path in (root / folder).glob("*.py")}
+    parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
+    return sorted(parts | {root / "status.py"})
+
+
 def source_key() -> str:
-    """Hash of the package's sources and of the versions that shape compiled code (16 hex digits)."""
+    """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits)."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in _compiled_sources(root):
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
-    for version in (
-        numba.__version__,
-        llvmlite.__version__,
-        np.__version__,
-        platform.python_version(),
-    ):
+    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
+    for version in versions:
         digest.update(version.encode())
     digest.update(str(root).encode())
     return digest.hexdigest()[:16]
