@@ -12,7 +12,11 @@ from hpcclear.surrogate.kriging import fit_kriging
 NAMES = ("m2", "m3", "u2", "I2", "C")
 LOWER = np.array([0.105, 0.07, 0.0, 1.3e-4, 0.3e-3])
 UPPER = np.array([0.42, 0.28, 0.12, 2.0e-3, 1.0e-3])
-SCENE = '# <script>window.hostile = 1</script>\nname = "</pre><b onclick=alert(1)>&amp;"\n'
+SCENE = """# <script>window.hostile = 1</script>
+name = "</pre><b onclick=alert(1)>&amp;"
+[effects]
+"<u>contact" = "<img src=y onerror=alert(1)>"
+"""
 CASES = ("deterministic", "robust")
 ATTRIBUTES = dataset.provenance(SCENE, "0" * 64)
 

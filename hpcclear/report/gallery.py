@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from ..errors import InputError
-from . import designs, portraits, response, samples, style, surrogates, timing
+from . import accuracy_figures, designs, portraits, response, samples, style, surrogates, timing
 from .content import Content
 from .markup import Html, image, tag
 
@@ -82,6 +82,10 @@ def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
     if front is not None:
         caption = "Pareto fronts of all runs, and the designs simulated directly."
         yield designs.front_figure(front, content.get("verification")), caption
+    costs = content.get("accuracy")
+    if costs is not None:
+        for name, draw in accuracy_figures.FIGURES.items():
+            yield from _tried(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
     found = content.responses
     if len(found) > 1:
         caption = "Responses of the designs, two revolutions."

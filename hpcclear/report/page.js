@@ -65,7 +65,7 @@
   function marker(svg, point, x, y) {
     const size = point.kind === "solution" ? (point.direct.length ? 6 : 4) : 7;
     const hollow = point.kind !== "solution";
-    const style = hollow ? `stroke: ${colour(point.case)}` : `fill: ${colour(point.case)}`;
+    const style = `--own: ${colour(point.case)}`;
     const shared = { class: hollow ? "point hollow" : "point", style };
     if (point.kind === "original") {
       return draw(svg, "rect", { x: x - size, y: y - size, width: 2 * size, height: 2 * size, ...shared });
@@ -135,12 +135,13 @@
     const place = byId("front");
     if (!place || !content.front.points.length) return;
     const points = content.front.points, panel = byId("front-panel");
-    const width = 640, height = 480;
+    /* as wide as there is room for, so that type keeps its size on a phone */
+    const width = Math.max(300, Math.min(640, place.clientWidth)), height = Math.max(320, 0.72 * width);
     const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group" });
     svg.setAttribute("aria-label", "Pareto front: arrow keys move between designs, Enter shows one");
     const box = { left: 52, top: 34, width: width - 66, height: height - 84 };
     const xs = extent(points.map((p) => p.x), 0.05), ys = extent(points.map((p) => p.y), 0.05);
-    const [x, y] = axes(svg, box, xs, ys, content.front.x, content.front.y);
+    const [x, y] = axes(svg, box, xs, ys, content.front.x, content.front.y, [width < 450 ? 3 : 6, 6]);
     /* simulated designs are drawn last, on top */
     const order = points.map((p, k) => k).sort((a, b) => rank(points[a]) - rank(points[b]));
     function rank(p) { return p.kind === "solution" ? (p.direct.length ? 1 : 0) : 2; }
@@ -157,6 +158,7 @@
       mark.addEventListener("focus", () => move(k, false));
       mark.addEventListener("click", () => choose(k));
     }
+    const halo = draw(svg, "circle", { r: 13, class: "halo" });
     let here = 0, chosen = 0;
     function move(k, focus = true) {
       marks[here].setAttribute("tabindex", "-1");
@@ -169,6 +171,8 @@
       marks[chosen].removeAttribute("aria-pressed");
       chosen = k;
       marks[k].classList.add("selected");
+      halo.setAttribute("cx", x(points[k].x));
+      halo.setAttribute("cy", y(points[k].y));
       marks[k].setAttribute("aria-pressed", "true");
       move(k, false);
       detail(panel, points[k]);
@@ -234,7 +238,7 @@
       motion = content.motions[name];
       const l = motion.crank, far = Math.max(...motion.slider) + 0.9 * l;
       strongest = Math.max(1e-9, ...motion.force.flat());
-      svg.setAttribute("viewBox", `${-1.6 * l} ${-1.7 * l} ${far + 1.6 * l} ${3.4 * l}`);
+      svg.setAttribute("viewBox", `${-1.5 * l} ${-1.5 * l} ${far + 1.5 * l} ${3 * l}`);
       const thin = `${0.02 * l}`, thick = `${0.09 * l}`;
       set("guide", { x1: 0, x2: far, y1: 0, y2: 0, stroke: "var(--line)", "stroke-width": thin });
       set("slider", { width: 0.9 * l, height: 0.7 * l, y: -0.35 * l, fill: "var(--line)", stroke: "var(--soft)", "stroke-width": thin });
@@ -264,7 +268,7 @@
       set("slider", { x: s - 0.45 * l });
       set("rod", { x1: centres[0][0], y1: centres[0][1], x2: centres[1][0], y2: centres[1][1] });
       for (const j of [0, 1]) {
-        const size = (0.9 * l * motion.force[frame][j]) / strongest, length = Math.hypot(e[2 * j], e[2 * j + 1]) || 1;
+        const size = (0.6 * l * motion.force[frame][j]) / strongest, length = Math.hypot(e[2 * j], e[2 * j + 1]) || 1;
         set(`ring${j}`, { cx: centres[j][0], cy: centres[j][1], r: Math.max(g * motion.clearance[j], 0.03 * l) });
         set(`pin${j}`, { cx: ends[j][0], cy: ends[j][1] });
         set(`force${j}`, {

@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from .. import storage
-from . import gallery, origin, picture, sections
+from . import costs, gallery, origin, picture, sections
 from .content import Content, read
 from .markup import Html, data, join, tag
 
@@ -115,6 +115,7 @@ def _sections(content: Content) -> Iterator[tuple[str, str, Html | None]]:
     yield "claims", "Claims of the paper", sections.claims(content)
     yield "readings", "How the paper can be read", sections.readings(content)
     yield "motion", "The mechanism in motion", _motion(content)
+    yield "accuracy", "What accuracy cost", costs.accuracy(content)
     yield "figures", "Figures", gallery.figures(content)
     yield "trust", "Which samples to trust", sections.trust(content)
     yield "time", "How the ranks spent their time", origin.timing(content)

@@ -75,8 +75,8 @@ def _claims_words(content: Content) -> list[str]:
     verdicts = [str(verdict) for verdict in claims["verdict"].to_numpy()]
     counts = [verdicts.count(verdict) for verdict in _MARKS]
     return [
-        f"Of {len(verdicts)} claims of the paper, {counts[0]} hold here, {counts[1]} do not, "
-        f"{counts[2]} cannot be told."
+        f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, "
+        f"{counts[1]} do not, and {counts[2]} cannot be told."
     ]
 
 

@@ -1,0 +1,403 @@
+"""The page of a report: complete, honest about what is missing, safe with hostile text, and usable in a browser."""
+
+import base64
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import report_data as data
+from browser import Browser
+
+from hpcclear import dataset
+from hpcclear.errors import InputError
+from hpcclear.report import markup, picture
+from hpcclear.report.content import read
+from hpcclear.report.page import write_report
+
+
+class Tree(HTMLParser):
+    """Elements, balance of tags, and text outside scripts."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.content: dict[str, str] = {}
+        self._open: list[str] = []
+        self.feed(page)
+        assert self._open == [], "elements left open"
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        assert len(dict(attrs)) == len(attrs), f"attribute twice in {tag}"
+        if tag not in ("img", "input", "meta", "br", "hr"):
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, text: str) -> None:
+        if self._open and self._open[-1] in ("script", "style"):
+            kind, attrs = next(e for e in reversed(self.elements) if e[0] == self._open[-1])
+            self.content[attrs.get("id") or kind] = text
+        else:
+            self.text += text
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_report(data.write_study(tmp_path_factory.mktemp("study")))
+
+
+@pytest.fixture(scope="module")
+def tree(page: Path) -> Tree:
+    return Tree(page.read_text(encoding="utf-8"))
+
+
+def test_the_page_is_one_file_that_asks_nothing_of_the_network(page: Path, tree: Tree) -> None:
+    assert page.name == "report.html"
+    for tag, attrs in tree.elements:
+        for name in ("src", "href", "srcset", "action", "data", "poster"):
+            value = attrs.get(name)
+            assert value is None or value.startswith(("#", "data:image/png;base64,")), (tag, value)
+    assert not re.search(
+        r"url\(|@import|fetch\(|XMLHttpRequest|import\(",
+        tree.content["style"] + tree.content["script"],
+    )
+
+
+def test_only_the_pages_own_script_may_run(tree: Tree) -> None:
+    policy = next(
+        a["content"] for t, a in tree.elements if a.get("http-equiv") == "Content-Security-Policy"
+    )
+    digest = base64.b64encode(hashlib.sha256(tree.content["script"].encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in str(policy)
+    assert "default-src 'none'" in str(policy)
+
+
+def test_hostile_text_stays_text(page: Path, tree: Tree) -> None:
+    raw = page.read_text(encoding="utf-8")
+    for hostile in (
+        "<script>window.hostile",
+        "<b onclick",
+        "<img src=x",
+        "<img src=y",
+        "<u>contact",
+        "<i>x</i>",
+    ):
+        assert hostile not in raw
+        assert hostile in tree.text
+    assert [t for t, _ in tree.elements].count("script") == 2
+    assert not any(name.startswith("on") for _, attrs in tree.elements for name in attrs)
+
+
+def test_structure_can_be_walked_without_eyes(tree: Tree) -> None:
+    ids = [a["id"] for _, a in tree.elements if a.get("id")]
+    assert len(set(ids)) == len(ids)
+    for tag, attrs in tree.elements:
+        if tag == "img":
+            assert attrs["alt"]
+        if "aria-labelledby" in attrs:
+            assert attrs["aria-labelledby"] in ids
+        if tag == "a":
+            assert str(attrs["href"]).removeprefix("#") in ids
+    assert [t for t, _ in tree.elements].count("h1") == 1
+    assert [a for t, a in tree.elements if t == "html"] == [{"lang": "en"}]
+
+
+def test_the_page_says_what_was_found(tree: Tree) -> None:
+    for words in (
+        "60 designs",
+        "3 failed",
+        "Design “robust alpha”",
+        "19% less than the original design",
+        "1 hold on this data, 1 do not, and 1 cannot be told",
+        "numerics.max_steps was reached",
+        "raise numerics.max_steps",
+        "beyond the range of Hertz",
+        "2 ranks worked on it",
+        "accuracy.nc: what accuracy costs was not measured",
+        "mpiexec -n 2 hpcclear run",
+        "effects.<u>contact",
+    ):
+        assert words in tree.text, words
+    for words in ("samples.nc: no design", "front.nc"):
+        assert words not in tree.text, words
+    assert [t for t, _ in tree.elements].count("img") == 16
+
+
+def test_sampled_results_alone_make_a_report(tmp_path: Path) -> None:
+    dataset.write(data.samples(), tmp_path / "quickstart.nc")
+    dataset.write(data.timing(), tmp_path / "timing.nc")
+    (tmp_path / "broken.nc").write_bytes(b"not a NetCDF file")
+    tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert [t for t, _ in tree.elements].count("img") == 2
+    for kind in ("sensitivity", "kriging", "front", "verification", "claims", "accuracy"):
+        assert f"{kind}.nc:" in tree.text
+    assert "broken.nc was left out" in tree.text
+    assert "no animation" in tree.text
+
+
+def test_one_response_makes_a_report(tmp_path: Path) -> None:
+    dataset.write(data.response(3), tmp_path / "mine.nc")
+    tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert "nothing was sampled" in tree.text
+    assert list(json.loads(tree.content["content"])["motions"]) == ["mine"]
+
+
+def test_all_samples_failed_is_reported(tmp_path: Path) -> None:
+    dataset.write(data.samples(20, failed=20), tmp_path / "samples.nc")
+    tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert "20 failed" in tree.text
+    assert "nan" not in tree.text.lower().replace("nanj", "")
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("[effects]\nfriction = { coefficient = 0.01 }\n", "effects.friction.coefficient"),
+        ("[effects\n", "not readable as TOML"),
+        ("effects = 3\n", "The whole scene file"),
+    ],
+)
+def test_a_scene_is_shown_whatever_it_is(tmp_path: Path, scene: str, words: str) -> None:
+    claims = data.claims().assign_attrs(scene=scene)
+    dataset.write(claims, tmp_path / "claims.nc")
+    assert words in Tree(write_report(tmp_path).read_text(encoding="utf-8")).text
+
+
+def test_results_of_different_scenes_are_not_mixed_silently(tmp_path: Path) -> None:
+    dataset.write(data.samples(), tmp_path / "samples.nc")
+    dataset.write(data.claims().assign_attrs(scene_hash="1" * 64), tmp_path / "claims.nc")
+    assert any("different scenes" in trouble for trouble in read(tmp_path).troubles)
+
+
+def test_equal_results_give_equal_pages(tmp_path: Path) -> None:
+    dataset.write(data.samples(), tmp_path / "samples.nc")
+    first = write_report(tmp_path).read_bytes()
+    assert write_report(tmp_path).read_bytes() == first
+
+
+def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match="no such directory"):
+        write_report(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no result file"):
+        write_report(tmp_path)
+    dataset.write(data.samples(), tmp_path / "samples.nc")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r"hpcclear\[analysis\]"):
+        write_report(tmp_path)
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_solution_knows_its_direct_simulation(page: Path) -> None:
+    points = picture.front(read(page.parent))["points"]
+    solutions = [p for p in points if p["kind"] == "solution"]
+    assert len(solutions) == 2 * (12 + 11)  # the last solution of each second run does not exist
+    simulated = {(p["case"], p["name"]) for p in solutions if p["direct"]}
+    assert ("robust", "run 0, solution 3") in simulated
+    assert ("robust", "run 0, solution 1") not in simulated
+    assert {p["kind"] for p in points} == {"solution", "design", "original", "paper"}
+    assert [p["x"] for p in points] == sorted(p["x"] for p in points)
+
+
+def test_the_crank_is_found_from_the_motion() -> None:
+    response = data.response(2, clearance=3e-4)
+    rod = np.column_stack([response["rod_x"].to_numpy(), response["rod_y"].to_numpy()])
+    angle, along = response["crank_angle"].to_numpy(), response["rod_angle"].to_numpy()
+    crank = 0.05 * np.column_stack([np.cos(angle), np.sin(angle)])
+    bearing = rod - 0.06 * np.column_stack([np.cos(along), np.sin(along)])
+    response["eccentricity_x"][:, 0] = crank[:, 0] - bearing[:, 0]
+    response["eccentricity_y"][:, 0] = crank[:, 1] - bearing[:, 1]
+    assert picture.frames(response)["crank"] == pytest.approx(0.05, rel=1e-12)
+
+
+def test_data_for_the_script_cannot_end_its_element() -> None:
+    made = markup.data({"a": "</script><script>alert(1)</script>&"}, "x")
+    assert made.count("<") == 2
+    assert json.loads(re.sub(r"<.*?>", "", made)) == {"a": "</script><script>alert(1)</script>&"}
+
+
+def test_drawing_needs_neither_kernel_nor_mpi() -> None:
+    code = (
+        "import sys, hpcclear.report.page\n"
+        "bad = {'numba', 'mpi4py', 'sklearn', 'matplotlib', 'scipy'} & set(sys.modules)\n"
+        "sys.exit(f'imported: {bad}' if bad else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+
+
+# -----------------------------------------------------------------------------------------------
+# In a real browser
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    made = Browser()
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def _panel(browser: Browser) -> str:
+    return str(browser.run("return document.getElementById('front-panel').innerText;"))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_loads_cleanly_and_fits_the_screen(
+    browser: Browser, page: Path, width: int, scheme: str
+) -> None:
+    browser.log()
+    browser.open(page, width, scheme)
+    browser.wait("document.querySelectorAll('#front .point').length > 40")
+    assert browser.log() == []
+    assert browser.run("return document.documentElement.scrollWidth;") <= width
+    overflow = browser.run(
+        "return [...document.querySelectorAll('body *')].filter(e => !e.closest('.scroll, pre, svg, .skip')"
+        " && e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 80));"
+    )
+    assert overflow == []
+    assert browser.run("return window.hostile;") is None
+    small = browser.run(
+        "return [...document.querySelectorAll('p, td, th, dd, dt, li, a, figcaption, button, label')]"
+        ".filter(e => e.innerText && parseFloat(getComputedStyle(e).fontSize) < 12).length;"
+    )
+    assert small == 0
+    text = browser.run(
+        "const s = document.querySelector('#front svg'), f = s.getBoundingClientRect().width /"
+        " s.viewBox.baseVal.width; return f * parseFloat(getComputedStyle(s.querySelector('text')).fontSize);"
+    )
+    assert text >= 11.0
+
+
+_CONTRAST = """
+const light = (c) => { const v = c.match(/[\\d.]+/g).slice(0, 3).map(x => x / 255)
+    .map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
+  return 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };
+const back = (e) => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
+  if (!/, 0\\)$|transparent/.test(c)) return c; } return 'rgb(255, 255, 255)'; };
+return [...document.querySelectorAll('h1, h2, h3, p, td, th, dd, dt, li, a, caption, figcaption, button, .verdict')]
+  .filter(e => e.innerText && e.getClientRects().length).map(e => {
+    const a = light(getComputedStyle(e).color), b = light(back(e));
+    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 60)]; })
+  .sort((x, y) => x[0] - y[0])[0];
+"""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("scheme", "dark"), [("light", False), ("dark", True)])
+def test_text_stands_out_in_both_schemes(
+    browser: Browser, page: Path, scheme: str, dark: bool
+) -> None:
+    browser.open(page, 1280, scheme)
+    back = browser.run("return getComputedStyle(document.documentElement).backgroundColor;")
+    assert (max(map(int, re.findall(r"\d+", back)[:3])) < 60) == dark
+    ratio, where = browser.run(_CONTRAST)
+    assert ratio >= 4.5, where  # WCAG AA
+
+
+@pytest.mark.full
+def test_hover_shows_and_click_changes_the_panel(browser: Browser, page: Path) -> None:
+    browser.open(page, 1280)
+    browser.wait("document.querySelector('#front .point.selected')")
+    first = _panel(browser)
+    assert "By direct simulation" in first
+    assert browser.run("return document.querySelectorAll('#front-responses svg').length;") == 4
+    points = json.loads(browser.run("return document.getElementById('content').textContent;"))[
+        "front"
+    ]["points"]
+    index = next(k for k, p in enumerate(points) if p["kind"] == "paper" and p["case"] == "robust")
+    browser.point(f"[data-index='{index}']", press=False)
+    assert "robust paper alpha" in _panel(browser)
+    assert "By direct simulation" not in _panel(browser)
+    browser.point("h1", press=False)
+    assert _panel(browser) == first
+    browser.point(f"[data-index='{index}']", press=True)
+    browser.point("h1", press=False)
+    assert "robust paper alpha" in _panel(browser)
+    assert "printed in the paper" in _panel(browser)
+    assert "No response was stored" in _panel(browser)
+    plain = next(k for k, p in enumerate(points) if p["kind"] == "solution" and not p["direct"])
+    browser.run(
+        f"document.querySelector(\"[data-index='{plain}']\").dispatchEvent(new Event('click'));"
+    )
+    assert "not simulated directly" in _panel(browser)
+    assert browser.log() == []
+
+
+@pytest.mark.full
+def test_the_front_is_walked_by_keyboard(browser: Browser, page: Path) -> None:
+    browser.open(page, 1280)
+    browser.wait("document.querySelector('#front .point.selected')")
+    assert (
+        browser.run("return document.querySelectorAll('#front .point[tabindex=\"0\"]').length;")
+        == 1
+    )
+    for _ in range(40):
+        browser.press("Tab")
+        if browser.run("return document.activeElement.classList.contains('point');"):
+            break
+    here = "return Number(document.activeElement.dataset.index);"
+    start, before = browser.run(here), _panel(browser)
+    browser.press("ArrowRight", "ArrowRight", "ArrowRight", "ArrowLeft")
+    assert browser.run(here) == start + 2
+    assert _panel(browser) == before
+    browser.press("Enter")
+    assert _panel(browser) != before
+    assert browser.run("return document.activeElement.getAttribute('aria-pressed');") == "true"
+    assert browser.run("return Boolean(document.activeElement.getAttribute('aria-label'));")
+    browser.press("Tab")
+    assert not browser.run("return document.activeElement.classList.contains('point');")
+
+
+@pytest.mark.full
+def test_the_mechanism_moves_when_asked(browser: Browser, page: Path) -> None:
+    browser.open(page, 1280)
+    text = "return document.getElementById('motion-text').textContent;"
+    rod = "return document.querySelectorAll('#mechanism line')[2].getAttribute('x1');"
+    still = browser.run(text)
+    assert (
+        browser.run("return document.getElementById('motion-play').textContent;") == "Play"
+    )  # reduced motion
+    browser.run("document.getElementById('motion-play').focus();")
+    browser.press("Enter")
+    browser.wait(f"(() => {{ {text} }})() !== {json.dumps(still)}")
+    browser.press("Enter")
+    assert browser.run("return document.getElementById('motion-play').textContent;") == "Play"
+    before = browser.run(rod)
+    browser.run("document.getElementById('motion-gain').focus();")
+    browser.press(*["ArrowRight"] * 10)
+    assert browser.run(rod) != before
+    browser.run(
+        "const s = document.getElementById('motion-name'); s.value = 'robust beta';"
+        "s.dispatchEvent(new Event('change'));"
+    )
+    assert browser.log() == []
+
+
+@pytest.mark.full
+def test_without_scripts_the_tables_remain(browser: Browser, page: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "report.html"
+    shutil.copy(page, copy)
+    browser.command("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        browser.open(copy, 1280)
+        text: Any = browser.command("DOM.getDocument", depth=0)
+        node = text["root"]["nodeId"]
+        notes = browser.command("DOM.querySelectorAll", nodeId=node, selector="noscript .note")
+        assert len(notes["nodeIds"]) == 2
+    finally:
+        browser.command("Emulation.setScriptExecutionDisabled", value=False)
