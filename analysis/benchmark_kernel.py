@@ -1,0 +1,201 @@
+"""The kernel alone: milliseconds a revolution, nanoseconds a force evaluation, and what the assembly holds.
+
+    python analysis/benchmark_kernel.py                  # about 3 minutes, most of it compiling
+    python analysis/benchmark_kernel.py --samples 64     # shorter
+
+Lanes of W = 1, 16 and 32 beside the plain loop of `plain_loop.py`, all on one core and in one run: Latin
+hypercube of the paper's Table 3, Lankarani-Nikravesh, rtol 1e-6, 10 revolutions. Paired rounds in changing
+order; medians of the ratios within a round. Writes benchmark_kernel.nc.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plain_loop
+import xarray as xr
+from assembly import Arithmetic, executed_arithmetic, force_evaluation
+from numba import njit
+from scenes import Setup, ensemble, scene
+
+from hpcclear.dataset import provenance
+from hpcclear.jit import FASTMATH
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.lanes import Lanes
+from hpcclear.kernel.rhs import accelerations
+
+WIDTHS = (1, 16, 32)
+YARDSTICK = "plain loop"
+REVOLUTIONS = (5, 5)  # transient, averaged
+
+
+def run_lanes(setup: Setup, width: int) -> np.ndarray:
+    """Simulate a setup on lanes; outcome rows in the order of the samples, shape (m, OUT)."""
+    lanes = Lanes(setup.problem, width)
+    lanes.queue(setup.par, setup.state, np.arange(len(setup.par)))
+    labels, rows = [], []
+    while lanes.pending:
+        lanes.advance(10.0)
+        finished = lanes.collect()
+        labels.append(finished[0])
+        rows.append(finished[1])
+    return np.concatenate(rows)[np.argsort(np.concatenate(labels))]
+
+
+def run_plain(setup: Setup) -> np.ndarray:
+    """The same by the plain loop."""
+    p = setup.problem
+    latched = p.effects.latched is not None
+    return plain_loop.run(
+        setup.par, setup.state, p.rtol, p.atol, (p.transient, p.averaged), latched, p.impact_floor
+    )
+
+
+def paired_rounds(tasks: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, np.ndarray]:
+    """Seconds of every task in every round; the order changes from round to round."""
+    names = list(tasks)
+    seconds: dict[str, list[float]] = {name: [] for name in names}
+    for round_number in range(rounds):
+        shift = round_number % len(names)
+        for name in names[shift:] + names[:shift]:
+            started = time.perf_counter()
+            tasks[name]()
+            seconds[name].append(time.perf_counter() - started)
+    return {name: np.array(values) for name, values in seconds.items()}
+
+
+def _force_loop(width: int) -> Callable[..., Any]:
+    """Repeats the force evaluation of all lanes, each at a state that depends on the one before."""
+
+    @njit(error_model="numpy", fastmath=FASTMATH)
+    def repeat(effects, work, par, table, count):
+        for _ in range(count):
+            accelerations(effects, work, par, table, table, width)
+            for i in range(width):
+                work[(at.QS + 3) * width + i] += 1e-14 * work[(at.ACC + 3) * width + i]
+
+    return repeat
+
+
+@njit(error_model="numpy", fastmath=FASTMATH)
+def _plain_force_loop(y, p, latched, count):
+    dy, gaps = np.empty(plain_loop.STATES), np.empty(4)
+    active, inverse = np.ones(2, np.bool_), np.ones(2)
+    for _ in range(count):
+        plain_loop.rates(1e-3, y, dy, p, latched, active, inverse, gaps)
+        y[3] += 1e-14 * dy[7]
+    return gaps
+
+
+def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
+    """Force evaluations in contact, `count` a lane, compiled already."""
+    tasks: dict[str, Callable[[], Any]] = {}
+    q, v = setup.state[0, :4].copy(), setup.state[0, at.MAX_COORDINATES :][:4]
+    q[3] += 4e-4  # O23 well in contact
+    for width in WIDTHS:
+        repeat = _force_loop(width)
+        work, par = np.zeros((at.WORK, width)), np.repeat(setup.par[:1].T, width, 1).copy()
+        work[at.QS : at.QS + 4], work[at.VS : at.VS + 4] = q[:, None], v[:, None]
+        work[[at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23]] = 1.0
+        arguments = (setup.problem.effects, work.ravel(), par.ravel(), np.zeros(4))
+        repeat(*arguments, 1)
+        tasks[f"W = {width}"] = lambda f=repeat, a=arguments: f(*a, count)
+    y = np.concatenate([q, v, [0.0, 0.0]])
+    latched = setup.problem.effects.latched is not None
+    _plain_force_loop(y.copy(), setup.par[0], latched, 1)
+    tasks[YARDSTICK] = lambda: _plain_force_loop(y.copy(), setup.par[0], latched, count)
+    return tasks
+
+
+def assembly_of(setup: Setup, width: int) -> Arithmetic:
+    """The force evaluation's arithmetic as emitted for this processor."""
+    evaluate = force_evaluation(width)
+    work, par = np.zeros(at.WORK * width), np.ones(at.PARAMETERS * width)
+    evaluate(setup.problem.effects, work, par, np.zeros(4), np.zeros(4))
+    return executed_arithmetic(evaluate.inspect_asm(evaluate.signatures[0]))
+
+
+def measure(samples: int, rounds: int) -> xr.Dataset:
+    """All measurements of this benchmark."""
+    setup = ensemble(scene("lankarani-nikravesh", 1e-6, *REVOLUTIONS), samples)
+    tasks: dict[str, Callable[[], Any]] = {
+        f"W = {width}": lambda width=width: run_lanes(setup, width) for width in WIDTHS
+    }
+    tasks[YARDSTICK] = lambda: run_plain(setup)
+    results = {name: task() for name, task in tasks.items()}  # compiles as well
+    seconds = paired_rounds(tasks, rounds)
+    count = 200_000
+    force = paired_rounds(force_tasks(setup, count), rounds)
+    lanes = [*WIDTHS, 1]
+    found = [assembly_of(setup, width) for width in WIDTHS]
+    agreement = np.abs(results[YARDSTICK][:, 0] / results["W = 1"][:, at.OUT_OBJECTIVE] - 1.0)
+    table = np.array([seconds[name] for name in tasks])
+    ns = np.array([force[name] for name in tasks]) / (np.array(lanes)[:, None] * count) * 1e9
+    plain_evaluations = results[YARDSTICK][:, 3].sum()
+    evaluations = [results[f"W = {w}"][:, at.OUT_EVALUATIONS].sum() for w in WIDTHS]
+    unit = {"units": "1"}
+    return xr.Dataset(
+        {
+            "time": (
+                ("code", "round"),
+                table / (samples * sum(REVOLUTIONS)) * 1e3,
+                {"units": "ms"},
+            ),
+            "force_time": (("code", "round"), ns, {"units": "ns"}),
+            "evaluations": (("code",), [*evaluations, plain_evaluations], unit),
+            "packed_share": (("width",), [part.packed_share for part in found], unit),
+            "packed": (("width",), [part.packed.total() for part in found], unit),
+            "vector_bits": (("width",), [part.vector_bits for part in found], unit),
+            "disagreement": ((), float(np.median(agreement)), unit),
+        },
+        coords={"code": list(tasks), "width": list(WIDTHS)},
+        attrs={
+            "samples": samples,
+            **provenance("", ""),
+            "packed_kinds": str(dict(found[-1].packed)),
+        },
+    )
+
+
+def report(data: xr.Dataset) -> str:
+    """80-column table."""
+    lines = [
+        f"{'':<12}{'ms a revolution':>16}{'of plain':>10}{'evaluations':>13}{'ns a force':>12}"
+    ]
+    ratio = data["time"] / data["time"].sel(code=YARDSTICK)
+    for code in data["code"].values:
+        row = data.sel(code=code)
+        lines.append(
+            f"{code:<12}{float(row['time'].median()):>16.4f}"
+            f"{1.0 / float(ratio.sel(code=code).median()):>9.2f}x"
+            f"{int(row['evaluations']):>13}{float(row['force_time'].median()):>12.1f}"
+        )
+    shares = ", ".join(
+        f"W = {int(w)}: {float(s):.0%}"
+        for w, s in zip(data["width"], data["packed_share"], strict=True)
+    )
+    lines.append(f"packed arithmetic in the force evaluation: {shares}")
+    lines.append(f"W = 32 emits {data.attrs['packed_kinds']}")
+    lines.append(
+        f"median disagreement with the plain loop: {float(data['disagreement']):.1e} of the objective"
+    )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("-o", "--output", type=Path, default=Path("benchmark_kernel.nc"))
+    options = parser.parse_args()
+    data = measure(options.samples, options.rounds)
+    print(report(data))
+    data.to_netcdf(options.output, engine="h5netcdf")
+
+
+if __name__ == "__main__":
+    main()
