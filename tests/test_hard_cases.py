@@ -1,0 +1,166 @@
+"""The library of hard scenes: each ends as its file says, at every tolerance, with numbers or without, never with both.
+
+Here over a few revolutions; `tests/run.sh --full` runs whole files and tighter tolerances.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hard_case_runs import hard_cases
+
+from hpcclear.errors import InputError
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.lanes import Lanes
+from hpcclear.kernel.lifecycle import STATE
+from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points, check_points
+from hpcclear.status import Flag, Status
+
+CASES = sorted((Path(__file__).parent / "hard_cases").glob("*.toml"))
+SHORT = 4  # revolutions
+BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}  # on the energy residual, over ten revolutions
+NUMBERS = ("objective", "mean_gap", "peak_contact_force")
+BAD = (math.nan, math.inf, -math.inf)
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a scene file says of itself."""
+
+    refused: str | None
+    status: Status | None
+    flags: frozenset[Flag]
+
+
+def word(member) -> str:
+    return member.name.lower().replace("_", "-")
+
+
+def expectation(path: Path) -> Expectation:
+    """The line that starts with ``# expect:``, read strictly."""
+    (line,) = re.findall(r"^# expect: (.*)$", path.read_text(), re.MULTILINE)
+    if line.startswith("refused at "):
+        return Expectation(line.removeprefix("refused at "), None, frozenset())
+    status, _, flags = line.partition("; flags may include ")
+    names = set(filter(None, flags.split(", ")))
+    by_word = {word(flag): flag for flag in Flag}
+    (ends,) = [s for s in Status if f"status = {word(s)}" == status]
+    return Expectation(None, ends, frozenset(by_word[name] for name in names))
+
+
+SIMULATED = [path for path in CASES if expectation(path).refused is None]
+
+
+def check(run, rtol: float, expected: Expectation) -> None:
+    """No number without a valid status, no valid status without numbers; at 1e-6 and below, the status promised."""
+    valid = run.status.valid
+    for name in NUMBERS:
+        values = run.outcome[name]
+        assert np.isfinite(values).all() if valid else np.isnan(values).all(), name
+    assert math.isfinite(run.residual)
+    if rtol <= 1e-6:
+        assert run.status is expected.status
+        assert run.flags <= expected.flags
+    if rtol in BOUNDS and valid:
+        assert run.residual < BOUNDS[rtol]
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8])
+@pytest.mark.parametrize("path", SIMULATED, ids=lambda path: path.stem)
+def test_hard_case(path: Path, rtol: float):
+    check(hard_cases.run(hard_cases.cut(load_scene(path), rtol, SHORT)), rtol, expectation(path))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10, 1e-13])
+@pytest.mark.parametrize("path", SIMULATED, ids=lambda path: path.stem)
+def test_hard_case_over_ten_revolutions(path: Path, rtol: float):
+    check(hard_cases.run(hard_cases.cut(load_scene(path), rtol, 10)), rtol, expectation(path))
+
+
+@pytest.mark.full
+def test_ten_thousand_revolutions():
+    path = Path(__file__).parent / "hard_cases" / "ten_thousand_revolutions.toml"
+    scene = load_scene(path)
+    run = hard_cases.run(scene.with_({"numerics.rtol": 1e-8}))
+    assert run.status is Status.OK
+    assert run.residual < 1e-5
+    early = hard_cases.run(hard_cases.cut(scene, 1e-8, 100))
+    assert run.outcome["objective"] == pytest.approx(early.outcome["objective"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in CASES if p not in SIMULATED], ids=lambda path: path.stem
+)
+def test_refused(path: Path):
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    assert caught.value.key == expectation(path).refused
+    assert caught.value.remedy
+
+
+def test_every_case_says_what_makes_it_hard_and_what_must_hold():
+    assert len(CASES) >= 45
+    for path in CASES:
+        text = path.read_text()
+        for line in ("# hard: ", "# must hold: ", "# expect: "):
+            assert text.count(f"\n{line}") == 1, path.name
+
+
+@pytest.fixture(scope="module")
+def latched() -> Scene:
+    """The paper's case over one revolution."""
+    path = Path(__file__).parent / "hard_cases" / "centred_start.toml"
+    return load_scene(path).with_(
+        {
+            "numerics.transient_revolutions": 0,
+            "numerics.averaged_revolutions": 1,
+            "numerics.max_steps": 3000,
+        }
+    )
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_every_number_that_is_not_finite_is_refused(latched: Scene, bad: float):
+    for path in latched.numeric_paths():
+        with pytest.raises(InputError) as caught:
+            latched.with_({path: bad})
+        assert caught.value.key.startswith(path.rpartition(".")[0])
+        points = Points(("x",), np.array([[latched.number(path)], [bad]]), ((path,),))
+        with pytest.raises(InputError, match="finite"):
+            check_points(latched, points)
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: float):
+    """Behind the validation: each parameter and each part of the start state in turn, one sample each."""
+    problem = problem_of(latched, ledger=True, series=True)
+    par = np.repeat(parameters(latched), at.PARAMETERS + STATE, axis=0)
+    state = start_states(latched, par)
+    for k in range(at.PARAMETERS):
+        par[k, k] = bad
+    for k in range(STATE):
+        state[at.PARAMETERS + k, k] = bad
+    lanes = Lanes(problem, 1, np.zeros((4096, hard_cases.rec.columns(problem.coordinates))))
+    lanes.queue(par, state, np.arange(len(par)))
+    for _ in hard_cases.chunks(lanes):
+        pass
+    outcomes = hard_cases.outcome_records(*lanes.collect())
+    assert len(outcomes) == len(par)
+    good = hard_cases.run(latched).outcome
+    for outcome in outcomes:
+        for name in NUMBERS:
+            if Status(outcome["status"]).valid:
+                assert np.isfinite(outcome[name]).all()
+            else:
+                assert np.isnan(outcome[name]).all()
+    # what does not act on the motion may be anything; most numbers do
+    unmoved = outcomes["objective"] == good["objective"]
+    failed = np.isnan(outcomes["objective"])
+    assert failed.sum() >= 20
+    assert unmoved.any()
