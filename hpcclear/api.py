@@ -13,6 +13,7 @@ from .evaluator import evaluate_records
 from .scene import Scene
 from .scene.points import Points, check_points
 from .scene.variables import PAPER_PATHS
+from .target import recorded, resolve
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
@@ -71,11 +72,12 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
         If a name is unknown, a design makes no mechanism, or the scene asks for what the kernel cannot do.
     """
     designs = as_points(scene, points)
-    records = evaluate_records(scene, designs)
+    chosen, reason = resolve(scene, designs)
+    records = evaluate_records(chosen, designs)
     return dataset.samples_dataset(
         designs.names,
         designs.values,
         dict(zip(designs.names, designs.units, strict=True)),
         records,
-        dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+        dataset.provenance(scene.text or scene.to_toml(), scene.hash) | recorded(reason),
     )

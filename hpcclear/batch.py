@@ -20,6 +20,7 @@ from .ranks import COLUMNS, Ranks
 from .sampling import latin_hypercube, monte_carlo, read_points
 from .scene import Scene
 from .scene.points import Points
+from .target import recorded, resolve
 from .work import run_key, sample_points
 
 
@@ -125,7 +126,12 @@ def _simulate(
 ) -> xr.Dataset:
     """Simulate what is not finished yet, write the dataset, drop the checkpoint."""
     units = dict(zip(points.names, points.units, strict=True))
+    chosen, reason = scene, ""
+    if scene.numerics.target_error is not None:
+        with ranks.stage("settings"):
+            chosen, reason = resolve(scene, points)
     attributes: dict[str, Any] = dataset.provenance(scene.text or scene.to_toml(), scene.hash)
+    attributes.update(recorded(reason))
     with ranks.stage("files"), ranks.writing():
         checkpoint = Checkpoint(
             parts_of(output),
@@ -137,7 +143,7 @@ def _simulate(
         )
     for problem in checkpoint.problems:
         sys.stderr.write(f"{problem}\n")
-    records = sample_points(scene, points, ranks, checkpoint, Progress("samples", style))
+    records = sample_points(chosen, points, ranks, checkpoint, Progress("samples", style))
     samples = dataset.samples_dataset(
         points.names, points.values, units, records, {**attributes, **key_attribute(key)}
     )

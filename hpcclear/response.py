@@ -15,6 +15,7 @@ from .kernel.lanes import Lanes, Problem
 from .kernel.observe import observe
 from .lowering import parameters, problem_of, start_states, topology
 from .scene import Scene
+from .target import recorded, resolve
 
 Array = NDArray[np.float64]
 
@@ -156,6 +157,8 @@ def simulate(scene: Scene) -> xr.Dataset:
     InputError
         If the scene asks for what the kernel cannot do.
     """
+    named = scene
+    scene, reason = resolve(scene)
     first, second, free = topology(scene)
     steps, record, par = integrate(scene)
     times = instants(scene, steps)
@@ -187,7 +190,9 @@ def simulate(scene: Scene) -> xr.Dataset:
         name: record[name][0] for name in (*names, "latched", "rhs_evaluations", "status", "flags")
     }
     return dataset.response_dataset(
-        times, {**data, **outcome}, dataset.provenance(scene.text or scene.to_toml(), scene.hash)
+        times,
+        {**data, **outcome},
+        dataset.provenance(named.text or named.to_toml(), named.hash) | recorded(reason),
     )
 
 

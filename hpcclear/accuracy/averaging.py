@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ..evaluator import DEFAULT_LANES
 from ..kernel import layout as at
 from ..kernel.lanes import Lanes
-from ..kernel.lifecycle import STATE
 from ..lowering import parameters, problem_of, start_states
 from ..scene import Scene
+from ..turns import objective, turn_by_turn
 from .methods import one_turn
 from .profile import Profile
 
@@ -44,8 +44,6 @@ class Averaging:
         Relative error of the objective, root mean square over copies.
     floor : float
         Scatter of the copies' averages over the second half of the run, relative: no average goes below.
-    sampling : float
-        What that scatter would be if revolutions were independent draws of one attractor.
     seconds : float
         Time of one revolution of one copy in a full block of lanes.
     """
@@ -54,7 +52,6 @@ class Averaging:
     averaged: NDArray[np.int64]
     error: Array
     floor: float
-    sampling: float
     seconds: float
 
 
@@ -67,15 +64,8 @@ def measure(scene: Scene, profile: Profile) -> Averaging:
     late = objective(gaps[half:].mean(axis=0))  # (copies,)
     truth = late.mean()
     error = np.array([[_error(gaps, t, a, truth) for a in averaged] for t in transient])
-    each = objective(gaps[half:])
-    sampling = each.std(axis=0, ddof=1).mean() / np.sqrt(len(each)) / truth
     floor = late.std(ddof=1) / truth
-    return Averaging(transient, averaged, error, float(floor), float(sampling), seconds)
-
-
-def objective(gaps: Array) -> Array:
-    """f (eq. 13) from mean gaps of both joints, last axis."""
-    return np.hypot(gaps[..., 0], gaps[..., 1])
+    return Averaging(transient, averaged, error, float(floor), seconds)
 
 
 def doubling(most: int, start: int) -> NDArray[np.int64]:
@@ -92,7 +82,7 @@ def _error(gaps: Array, transient: int, averaged: int, truth: float) -> float:
 def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, float]:
     """Mean gaps (revolutions, copies, 2 joints) revolution by revolution, and seconds of one of them.
 
-    Each revolution starts from the state in which the last one ended; a failed copy is NaN from there on and left out.
+    Copies that failed are left out.
     """
     here = one_turn(scene)
     problem = problem_of(here)
@@ -104,32 +94,7 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
     state[:, :n] *= 1.0 + kicks
     lanes = Lanes(problem, DEFAULT_LANES)
     lanes.step(1)  # without samples it only compiles
-    gaps = np.full((revolutions, copies, 2), np.nan)
     started = time.perf_counter()
-    for revolution in range(revolutions):
-        lanes.queue(par, state, np.arange(copies))
-        while lanes.step(1 << 40):
-            pass
-        labels, rows, *_ = lanes.collect()
-        rows = rows[np.argsort(labels)]
-        good = rows[:, at.OUT_STATUS] == 0
-        gaps[revolution, good] = rows[good][:, [at.OUT_GAP_12, at.OUT_GAP_23]]
-        state = _ends(rows)
-        if not good.all():
-            gaps, par, state, copies = gaps[:, good], par[good], state[good], int(good.sum())
-    return gaps, (time.perf_counter() - started) / (revolutions * max(copies, 1))
-
-
-def _ends(rows: Array) -> Array:
-    """Ends of samples as starts of the next revolution, shape (m, STATE)."""
-    state = np.empty((len(rows), STATE))
-    n = 2 * at.MAX_COORDINATES
-    state[:, :n] = np.nan_to_num(rows[:, at.OUT_STATE : at.OUT_STATE + n])
-    contact = [
-        at.OUT_ACTIVE_12,
-        at.OUT_ACTIVE_23,
-        at.OUT_INVERSE_IMPACT_12,
-        at.OUT_INVERSE_IMPACT_23,
-    ]
-    state[:, n:] = rows[:, contact]
-    return state
+    gaps = turn_by_turn(lanes, par, state, revolutions)
+    seconds = (time.perf_counter() - started) / (revolutions * copies)
+    return gaps[:, np.isfinite(gaps[-1]).all(axis=1)], seconds
