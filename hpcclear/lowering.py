@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""
 
+IMPLICIT_METHODS = {"auto": "stiff", "radau": "always"}
+"""Methods that may take implicit steps, and when."""
+
 CELLS = 2048
 """Cells of a tabulated torque or load over one turn."""
 
@@ -84,7 +87,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
 
 
 def tableau_of(scene: Scene) -> Tableau:
-    """The embedded pair of ``numerics.method``.
+    """The embedded pair of ``numerics.method``; beside the implicit method, Dormand and Prince's.
 
     Raises
     ------
@@ -92,11 +95,11 @@ def tableau_of(scene: Scene) -> Tableau:
         If the method is not available for this scene.
     """
     method = scene.numerics.method
-    if method == "auto":
+    if method in IMPLICIT_METHODS:
         return DORMAND_PRINCE
     if method not in TABLEAUS:
         raise InputError(
-            "numerics.method", method, "is not available", f"Use auto, {', '.join(TABLEAUS)}"
+            "numerics.method", method, "is not available", f"Use auto, radau, {', '.join(TABLEAUS)}"
         )
     return TABLEAUS[method]
 
@@ -165,6 +168,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         max_steps=scene.numerics.max_steps,
         torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,  # type: ignore[arg-type]
         load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,  # type: ignore[arg-type]
+        implicit=IMPLICIT_METHODS.get(scene.numerics.method, "never"),
     )
 
 

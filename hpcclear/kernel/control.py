@@ -41,6 +41,8 @@ def judge_step(work, expo, beta, max_steps, smallest, W):
     special = 0.0
     for i in range(W):
         error = work[at.ERROR * W + i]
+        # not a number has a sign too, and a negative one would pass for a tiny error below
+        error = error if error <= 1e300 else 1e300
         running = work[at.RUNNING * W + i]
         h = work[at.STEP * W + i]
         log = 0.5 * rough_log2(error)
