@@ -190,6 +190,68 @@ def claims() -> xr.Dataset:
     return dataset.dataset("claims", {"claim": np.arange(1, 4)}, data, ATTRIBUTES)
 
 
+def accuracy() -> xr.Dataset:
+    """What accuracy costs: errors that fall as powers of the work, with a floor."""
+    methods = [
+        "Dormand-Prince 5(4), minimal",
+        "adaptive order 4, Baumgarte",
+        "fixed steps, order 4",
+        "Radau IIA",
+    ]
+    rung, draws = np.arange(5), 10 ** np.arange(2, 6)
+    setting = np.tile(10.0 ** -(3.0 + rung), (4, 1))
+    evaluations = 600 * setting**-0.2 * np.arange(1, 5)[:, None]
+    error = setting[..., None] * np.array([1e-2, 0.1, 1.0, 0.3]) + 1e-9
+    moments = np.stack([1.0 / np.sqrt(draws), 0.7 / np.sqrt(draws)])
+    moment = np.stack([moments, np.where(draws > 10**4, np.nan, moments)])
+    data = {
+        "setting": setting,
+        "error": error,
+        "seconds": 1e-7 * evaluations,
+        "evaluations": evaluations,
+        "order": np.full((4, 4), 5.0),
+        "reference_error": np.full(4, 1e-10),
+        "averaging_error": np.outer([0.3, 0.02, 0.001], 1 / np.sqrt([1, 4, 16, 64])) + 1e-3,
+        "averaging_floor": 1e-3,
+        "turn_seconds": 2e-4,
+        "r2": 1 - np.outer([1.0, 0.3], 10.0 / np.array([50, 100, 200])),
+        "rmae": np.outer([1.0, 0.3], 30.0 / np.array([50, 100, 200])),
+        "leave_one_out": np.outer([1.0, 0.3], 20.0 / np.array([50, 100, 200])),
+        "fit_seconds": np.full((2, 3), 0.5),
+        "sample_seconds": 1e-3,
+        "moment_error": moment,
+        "moment_lower": 0.9 * moment,
+        "moment_upper": 1.1 * moment,
+        "moment_seconds": np.outer([1e-7, 1e-3], draws),
+        "moment_bias": np.array([2e-3, -1e-2]),
+        "bias_error": np.array([1e-4, 1e-3]),
+        "quadrature_seconds": 1e-5,
+        "closed_form": np.array([1e-9, 1e-8]),
+        "strong_seconds": np.array([10.0, 5.2]),
+        "weak_seconds": np.array([10.0, 10.4]),
+        "lost_seconds": np.array([0.5, 2.0, 0.3, 0.1]),
+    }
+    coords = {
+        "integrator": np.array(methods),
+        "rung": rung,
+        "quantity": np.array(
+            ["slider_position", "slider_velocity", "peak_contact_force", "objective"]
+        ),
+        "transient": np.array([0, 2, 8]),
+        "averaged": np.array([1, 4, 16, 64]),
+        "surrogate": np.array(["response surface", "kriging"]),
+        "training": np.array([50, 100, 200]),
+        "estimate": np.array(["surrogate", "simulation"]),
+        "moment": np.array(["mean", "deviation"]),
+        "draws": draws,
+        "ranks": np.array([1, 2]),
+        "loss": np.array(["start-up", "compilation", "imbalance", "writing"]),
+    }
+    words = {"designs": "16 designs over the box", "repeats": "median of 5 repeats"}
+    words |= {"copies": "16 copies", "study": "m2, m3, u2, I2, C", "batch": "512 samples"}
+    return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words)
+
+
 def timing(ranks: int = 2) -> xr.Dataset:
     """Two ranks, two stages."""
     busy = np.array([[10.0, 5.0], [9.5, 0.0]])[:ranks]

@@ -18,7 +18,7 @@ from matplotlib.transforms import Bbox
 
 from hpcclear import report
 from hpcclear.errors import InputError
-from hpcclear.report import labels, models, motion, style
+from hpcclear.report import accuracy_figures, labels, models, motion, style
 from hpcclear.surrogate.kriging import fit_kriging
 
 DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
@@ -61,6 +61,10 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "bifurcation": lambda: report.bifurcation_figure(
         [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
     ),
+    **{
+        f"accuracy, {name}": lambda draw=draw: draw(data.accuracy())  # type: ignore[misc]
+        for name, draw in accuracy_figures.FIGURES.items()
+    },
     "timing": lambda: report.timing_figure(data.timing()),
     "timing, one rank": lambda: report.timing_figure(data.timing(1)),
 }
@@ -77,7 +81,7 @@ def _drawn_ticks(axis: Axis) -> Iterator[Text]:
     """Tick labels that are on the page: inside the limits and switched on."""
     low, high = sorted(axis.get_view_interval())
     slack = 1e-9 * (high - low)
-    for tick in axis.get_major_ticks():
+    for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
         if low - slack <= tick.get_loc() <= high + slack:
             yield from (label for label in (tick.label1, tick.label2) if label.get_visible())
 

@@ -28,15 +28,16 @@ def _foot(figure: "Figure", found: xr.Dataset, *sentences: str) -> None:
     """Where the numbers come from, below a figure."""
     versions = str(found.attrs.get("versions", ""))
     lines = [*sentences, str(found.attrs.get("processor", "")), versions]
-    text = "\n".join(textwrap.fill(line, 80) for line in lines)
-    figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL - 1.5)
+    text = "\n".join(textwrap.fill(line, 58) for line in lines)
+    figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL)
 
 
 def _decades(axis: Any) -> None:
     """Few decade ticks, so that labels do not meet in half a column."""
-    from matplotlib.ticker import LogLocator
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(numticks=5))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _plain(axis: Any) -> None:
@@ -50,21 +51,21 @@ def _plain(axis: Any) -> None:
 
 
 def _small(axes: Any) -> None:
-    """Minor labels of short logarithmic axes as small as the others."""
+    """Minor labels of short logarithmic axes of the same size as the others."""
     for panel in np.ravel(axes):
-        panel.tick_params(axis="both", which="minor", labelsize=style.SMALL - 1.5)
+        panel.tick_params(axis="both", which="minor", labelsize=style.SMALL)
 
 
 @style.drawn
 def integration_figure(found: xr.Dataset) -> "Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
     quantities = [str(q) for q in found["quantity"].to_numpy()]
-    figure, axes = style.grid(len(quantities), 2, 190.0, sharey="row", sharex="col")
+    figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
     for row, quantity in enumerate(quantities):
         here = found.sel(quantity=quantity)
         for column, work in enumerate(("seconds", "evaluations")):
             _ladder(axes[row, column], here, work)
-        axes[row, 0].set_ylabel(f"error of {_WORDS.get(quantity, quantity)}")
+        axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)}\nrelative error (–)")
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
     style.settle(axes)
@@ -105,7 +106,7 @@ def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
 @style.drawn
 def averaging_figure(found: xr.Dataset) -> "Figure":
     """Error of the objective against revolutions averaged, for several transients, and the floor that is left."""
-    figure, axes = style.grid(1, 1, 85.0)
+    figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], found["averaging_error"]
     for k, transient in enumerate(found["transient"].to_numpy()):
         y = error.sel(transient=transient).to_numpy()
@@ -126,7 +127,7 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
         handles, names, title="transient revolutions", loc="outside upper center", ncols=5
     )
     panel.set_xlabel("averaged revolutions (–)")
-    panel.set_ylabel("relative error of $f$")
+    panel.set_ylabel("relative error of $f$ (–)")
     turn = 1e3 * float(found["turn_seconds"])
     above = panel.secondary_xaxis("top", functions=(lambda x: x * turn, lambda t: t / turn))
     above.set_xlabel("core time of the averaged revolutions (ms)")
@@ -143,12 +144,12 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
 @style.drawn
 def surrogate_figure(found: xr.Dataset) -> "Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
-    figure, axes = style.grid(3, 1, 130.0, sharex=True)
+    figure, axes = style.grid(3, 1, 145.0, sharex=True)
     size, each = found["training"].to_numpy(), float(found["sample_seconds"])
     rows = (
-        ("unexplained share 1 – R²", 1.0 - found["r2"]),
-        ("RMAE", found["rmae"]),
-        ("leave-one-out error\nover deviation", found["leave_one_out"]),
+        ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"]),
+        ("RMAE (–)", found["rmae"]),
+        ("leave-one-out error\nover deviation (–)", found["leave_one_out"]),
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
         for k, surrogate in enumerate(found["surrogate"].to_numpy()):
@@ -178,7 +179,7 @@ def surrogate_figure(found: xr.Dataset) -> "Figure":
 @style.drawn
 def random_inputs_figure(found: xr.Dataset) -> "Figure":
     """Error of mean and deviation against Monte Carlo size and time, with 95 % limits; the surrogate's bias."""
-    figure, axes = style.grid(2, 2, 110.0, sharey="row", sharex="col")
+    figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
     for row, moment in enumerate(found["moment"].to_numpy()):
         here = found.sel(moment=moment)
         for k, estimate in enumerate(found["estimate"].to_numpy()):
@@ -202,7 +203,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
             float(found["quadrature_seconds"]), color=style.PALETTE["green"], lw=0.8, ls=":",
             label="quadrature",
         )  # fmt: skip
-        axes[row, 0].set_ylabel(f"relative error of the {moment}")
+        axes[row, 0].set_ylabel(f"relative error of the {moment} (–)")
     axes[-1, 0].set_xlabel("Monte Carlo size (–)")
     axes[-1, 1].set_xlabel("core time (s)")
     for panel in axes.flat:
@@ -223,7 +224,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
 @style.drawn
 def parallel_figure(found: xr.Dataset) -> "Figure":
     """Speed-up and efficiency on the ranks at hand, and the core-seconds lost."""
-    figure, axes = style.grid(1, 2, 65.0)
+    figure, axes = style.grid(1, 2, 80.0)
     number = found["ranks"].to_numpy()
     strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
     left, right = axes[0]
@@ -238,6 +239,7 @@ def parallel_figure(found: xr.Dataset) -> "Figure":
     right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.PALETTE["sky"])
     right.set_yticks(np.arange(len(lost)), [str(x) for x in found["loss"].to_numpy()])
     right.set_xlabel("lost (core-seconds)")
+    right.set_ylabel("time lost to (what)")
     style.settle(axes)
     _foot(figure, found, f"{found.attrs.get('batch', '')}.")
     return figure
