@@ -131,10 +131,11 @@ def closed_form(options: argparse.Namespace) -> np.ndarray:
 
 def table(options: argparse.Namespace) -> xr.Dataset:
     """All pairs as a dataset."""
-    rows = np.array([measured(pair, options) for pair in PAIRS])
+    pairs = [pair for pair in PAIRS if options.only in pair.name]
+    rows = np.array([measured(pair, options) for pair in pairs])
     names = ("time_off", "time_on", "evaluations_off", "evaluations_on")
     words = ("time of a revolution", "force evaluations of a revolution")
-    content = xr.Dataset(coords={"effect": [pair.name for pair in PAIRS]})
+    content = xr.Dataset(coords={"effect": [pair.name for pair in pairs]})
     for k, name in enumerate(names):
         dims = ("effect", "repetition")
         state = "on" if k % 2 else "off"
@@ -190,6 +191,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--revolutions", type=int, default=5)
     parser.add_argument("--lanes", type=int, default=32, help="1 for the single response")
+    parser.add_argument("--only", default="", help="measure effects with this in their name")
     options = parser.parse_args()
     content = table(options)
     dataset.storage.save(content, options.output)

@@ -20,11 +20,24 @@ def latest(work, stages, k, n, stage, i, W):
 
 
 @lane_function
+def group_of(n):
+    """Coordinates worked on in one loop over lanes: the compiler unrolls four of them, nine it would not."""
+    return n if n <= 5 else 3
+
+
+@lane_function
 def stage_state(work, stages, weights, c, av, aq, n, terms, W):
     """Coordinates and velocities of a stage; `av`, `aq`: where its rows of A and A A start in `weights`."""
+    for first in range(0, n, group_of(n)):
+        stage_part(work, stages, weights, c, av, aq, n, first, group_of(n), terms, W)
+
+
+@lane_function
+def stage_part(work, stages, weights, c, av, aq, n, first, count, terms, W):
+    """`stage_state` of some coordinates."""
     for i in range(W):
         h = work[at.STEP * W + i]
-        for k in range(n):
+        for k in range(first, first + count):
             a = latest(work, stages, k, n, terms - 1, i, W)
             dv = weights[av + terms - 1] * a
             dq = weights[aq + terms - 1] * a
@@ -72,21 +85,40 @@ def gap_error(flag, work, par, gap, clearance, rtol, i, W):
 @lane_function
 def step_error(crank_rod, rod_slider, work, stages, par, weights, ev, eq, n, rtol, atol, terms, W):
     """Mean square of the scaled error, per lane; `terms` stages come before the new point."""
-    for i in range(W):
-        h = work[at.STEP * W + i]
-        total = gap_error(crank_rod, work, par, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, i, W)
-        total += gap_error(rod_slider, work, par, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, i, W)
-        for k in range(n):
-            a = work[(at.ACC + k) * W + i]
-            dv = weights[ev + terms] * a
-            dq = weights[eq + terms] * a
-            for j in range(terms):
-                a = stages[(j * n + k) * W + i]
-                dv += weights[ev + j] * a
-                dq += weights[eq + j] * a
-            q = max(abs(work[(at.Q + k) * W + i]), abs(work[(at.QS + k) * W + i]))
-            v = max(abs(work[(at.V + k) * W + i]), abs(work[(at.VS + k) * W + i]))
-            dq = h * h * dq / (atol[k] + rtol * q)
-            dv = h * dv / (atol[at.MAX_COORDINATES + k] + rtol * v)
-            total += dq * dq + dv * dv
-        work[at.ERROR * W + i] = total * (0.5 / n) * par[at.STRICTNESS * W + i]
+    count = group_of(n)
+    for first in range(0, n, count):
+        for i in range(W):
+            if first == 0:
+                total = gap_error(
+                    crank_rod, work, par, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, i, W
+                )
+                total += gap_error(
+                    rod_slider, work, par, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, i, W
+                )
+            else:
+                total = work[at.ERROR * W + i]
+            for k in range(first, first + count):
+                total += coordinate_error(
+                    work, stages, weights, ev, eq, n, k, rtol, atol, terms, i, W
+                )
+            if first + count == n:
+                total *= (0.5 / n) * par[at.STRICTNESS * W + i]
+            work[at.ERROR * W + i] = total
+
+
+@lane_function
+def coordinate_error(work, stages, weights, ev, eq, n, k, rtol, atol, terms, i, W):
+    """Squares of the scaled errors of one coordinate and its velocity, added."""
+    h = work[at.STEP * W + i]
+    a = work[(at.ACC + k) * W + i]
+    dv = weights[ev + terms] * a
+    dq = weights[eq + terms] * a
+    for j in range(terms):
+        a = stages[(j * n + k) * W + i]
+        dv += weights[ev + j] * a
+        dq += weights[eq + j] * a
+    q = max(abs(work[(at.Q + k) * W + i]), abs(work[(at.QS + k) * W + i]))
+    v = max(abs(work[(at.V + k) * W + i]), abs(work[(at.VS + k) * W + i]))
+    dq = h * h * dq / (atol[k] + rtol * q)
+    dv = h * dv / (atol[at.MAX_COORDINATES + k] + rtol * v)
+    return dq * dq + dv * dv
