@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from hpcclear import launcher
-from hpcclear.errors import InputError
+from hpcclear.errors import InputError, StorageError
 from hpcclear.mail import Mail, Nap, Tag
 from hpcclear.ranks import Leave, Maker, RankFailed, Ranks
 from hpcclear.stopping import GRACE, Exit, Stopped, StopSwitch
@@ -40,7 +40,7 @@ def run_on_ranks(
     -------
     int
         Exit code for `sys.exit`, the same on every rank: 0, or the program's own; 1 after a program
-        error, reported once; 2 after an `InputError`; 3 after `Stopped`.
+        error, a refused write or want of memory, reported once; 2 after an `InputError`; 3 after `Stopped`.
     """
     launcher.pin_threads()
     with contextlib.ExitStack() as stack:
@@ -124,6 +124,8 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
         code, text = Exit.STOPPED, f"Stopped early: {error}. The same command goes on from here."
     except InputError as error:
         code, text = Exit.BAD_INPUT, f"Error: {error}"
+    except StorageError as error:
+        code, text = Exit.FAILED, f"Error: {error}"
     except RankFailed as error:
         code, text = Exit.FAILED, str(error)
     except SystemExit as error:
@@ -187,7 +189,13 @@ def _tell_root(ranks: Ranks, error: BaseException) -> int:
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:
-    """Where a program error happened, and its traceback."""
+    """Where a program error happened, and its traceback; for want of memory, what to do about it."""
+    if isinstance(error, MemoryError):
+        why = f" ({error})" if str(error) else ""
+        return (
+            f"Error: out of memory on {ranks.where}{why}. Give the job more memory, or fewer ranks a "
+            "node, and run the same command again; what was finished is saved"
+        )
     trace = "".join(traceback.format_exception(error)).rstrip()
     return f"hpcclear failed on {ranks.where}\n{trace}"
 
