@@ -1,6 +1,7 @@
 """The real commands under mpiexec, for tests of what ends them: started, killed, resumed, read meanwhile."""
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -127,3 +128,32 @@ def wait_until(
     while writing and job.poll() is None and time.time() < patience:
         if any(folder.rglob(".hpcclear-*.tmp")):
             return
+
+
+class Commands:
+    """Runs many commands one after the other, each in a fork of one warm process."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, str(PROGRAM.with_name("many_commands.py"))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        )
+
+    def __call__(self, *words: object, user: int | None = None) -> tuple[int, str]:
+        """Exit code (negative: killed by a signal, which is how one that hangs ends) and output."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        asked = {"words": [str(word) for word in words], "user": user}
+        self._process.stdin.write(json.dumps(asked) + "\n")
+        self._process.stdin.flush()
+        answer = json.loads(self._process.stdout.readline())
+        return answer["code"], answer["output"]
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait(60.0)

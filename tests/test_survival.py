@@ -1,5 +1,6 @@
 """Nothing finished is ever lost: kills, signals, time limits and program errors of the real commands."""
 
+import itertools
 import random
 import signal
 import subprocess
@@ -75,8 +76,10 @@ def longest_repeated(log: Path, kills: list[float]) -> float:
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
     expected, wall = undisturbed
     dice, done, repeated, states = random.Random(kills), 0, 0.0, defaultdict(int)
-    while done < kills:
-        folder = tmp_path / f"from-{done}"
+    for turn in itertools.count():
+        if done >= kills:
+            break
+        folder = tmp_path / str(turn)
         folder.mkdir()
         words = sample(folder / "samples.nc", SAMPLES, *OPTIONS)
         moments: list[float] = []
@@ -120,8 +123,9 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
         folder.mkdir()
         words, delay = sample(folder / "samples.nc", SAMPLES, *OPTIONS), dice.uniform(0.8, wall)
         if how == "time limit":
-            told = time.time() + delay
-            code, output = run([*words, "--time-limit", str(delay)])
+            began = folder / "began.log"
+            code, output = run([*words, "--time-limit", str(delay)], TEST_BEGAN=str(began))
+            told = began.stat().st_mtime + delay
         else:
             job = start(words)
             wait_until(job, time.time() + delay, folder)

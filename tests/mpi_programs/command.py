@@ -1,6 +1,7 @@
 """The real command, watched or sabotaged: command.py ARGUMENTS OF hpcclear; settings in the environment.
 
 TEST_LOG    file that gets a line "seconds rank sample" for every sample that a rank finishes
+TEST_BEGAN  file that root touches when it begins
 TEST_FAIL   what fails, see `sabotage`
 TEST_RANK   on which rank
 TEST_MARK   file that is touched when it does
@@ -94,6 +95,8 @@ def sabotage() -> None:
 
 
 if __name__ == "__main__":
+    if launcher.launched_rank() in (0, None) and "TEST_BEGAN" in os.environ:
+        pathlib.Path(os.environ["TEST_BEGAN"]).touch()
     watch()
     sabotage()
     cli.main()
