@@ -18,9 +18,13 @@ if TYPE_CHECKING:
     from .evaluator import Evaluator
     from .scene import Scene
     from .scene.points import Points
+    from .study.compiling import Compiled
 
 KIND = "points"
 """The kind of stage that simulates designs; see `MAKERS`."""
+
+COMPILE = "compile"
+"""The kind of stage that compiles ahead what a study needs."""
 
 
 def payload_of(scene: "Scene", points: "Points", lanes: int | None = None) -> dict[str, Any]:
@@ -49,7 +53,13 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Evaluator":
     return evaluator
 
 
-MAKERS: Mapping[str, Maker] = {KIND: make_evaluator}
+def _make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
+    from .study.compiling import make_compiler
+
+    return make_compiler(payload, ranks)
+
+
+MAKERS: Mapping[str, Maker] = {KIND: make_evaluator, COMPILE: _make_compiler}
 """For `hpcclear.comm.run_on_ranks` and `hpcclear.comm.alone`."""
 
 

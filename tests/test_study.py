@@ -23,7 +23,7 @@ sys.path.insert(0, str(PROGRAMS))
 
 import formula  # noqa: E402
 
-MAKERS = {"points": formula.make_formula}
+MAKERS = formula.MAKERS
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
 

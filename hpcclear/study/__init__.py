@@ -16,6 +16,8 @@ and ends with the same bytes.
 """
 
 import itertools
+import shlex
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,9 +32,11 @@ from ..progress import Style
 from ..ranks import COLUMNS, Ranks
 from ..scene import Scene
 from ..scene.domain import study_of
+from ..scene.points import Points
 from ..surrogate.subintervals import PiecewiseKriging
 from ..work import run_key
 from . import audit, claims, optimisation, paper, responses, sensitivities, surrogates, verification
+from .compiling import compile_ahead
 from .optimisation import Choice
 from .run import Result, Run
 from .simulations import Simulations, objective_of
@@ -47,7 +51,6 @@ def run_study(
     *,
     fresh: bool = False,
     progress_style: Style = "auto",
-    command: str = "",
     tell: Callable[[str], object] = lambda text: None,
 ) -> int | None:
     """Carry a study through; call it on root, under `hpcclear.comm.run_on_ranks`.
@@ -64,8 +67,6 @@ def run_study(
     fresh : bool
         Start anew in a directory beside it, if there is one already.
     progress_style : {"auto", "bar", "log", "quiet"}
-    command : str
-        The command line, for timing.nc.
     tell : callable
         Gets what the user should know, a sentence at a time.
 
@@ -100,8 +101,11 @@ def run_study(
         for problem in checkpoint.problems:
             tell(problem)
         simulations = Simulations(scene, ranks, checkpoint, progress_style)
+        columns = tuple(variable.paths for variable in study.variables)
+        points = Points(study.names, np.empty((0, len(columns))), columns)
+        compile_ahead(scene, ranks, points, progress_style)
         _tell_the_story(Run(scene, place, ranks, checkpoint, simulations, tell))
-        _write_timing(place, ranks, command, attributes)
+        _write_timing(place, ranks, attributes)
         checkpoint.finish()
     return None
 
@@ -184,10 +188,12 @@ def _write_samples(run: Run) -> None:
     run.write(content, "samples.nc")
 
 
-def _write_timing(place: Path, ranks: Ranks, command: str, attributes: dict[str, str]) -> None:
+def _write_timing(place: Path, ranks: Ranks, attributes: dict[str, str]) -> None:
     table = np.stack(list(ranks.stage_seconds.values()), axis=1)
     data = {name: table[:, :, k] for k, name in enumerate(COLUMNS)}
-    content = dataset.timing_dataset(list(ranks.stage_seconds), data, command, attributes)
+    content = dataset.timing_dataset(
+        list(ranks.stage_seconds), data, shlex.join(sys.argv), attributes
+    )
     dataset.write(content, place / "timing.nc")
 
 

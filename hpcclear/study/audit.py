@@ -88,11 +88,10 @@ def evaluate(run: Run) -> Result:
     designs = printed_designs(run.scene)
     rows = []
     for reading in readings(run):
-        row = [
-            _over_steps(run, reading, one) if reading.over_steps else _over_time(run, reading, one)
-            for one in designs
-        ]
-        rows.append(row)
+        if reading.over_steps:
+            rows.append([_over_steps(run, reading, one) for one in designs])
+        else:
+            rows.append(_over_time(run, reading, designs))
     table = np.array(rows)
     result = {name: table[..., k] for k, name in enumerate((*_COLUMNS, "objective_smallest"))}
     result["failed"] = result["failed"].astype(np.int64)
@@ -113,11 +112,14 @@ def write(run: Run, result: Result) -> None:
     run.write(dataset.dataset("readings", coords, data), "readings.nc")
 
 
-def _over_time(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]:
+def _over_time(run: Run, reading: Reading, designs: Sequence[Choice]) -> list[tuple[float, ...]]:
+    """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
     count = run.study.verification.audit_samples
-    sampled = samples_of(run, choice, count)
+    batches = [
+        batch for one in designs for batch in (samples_of(run, one, count), _smallest(run, one))
+    ]
     points = Points(
-        sampled.names, np.vstack([sampled.values, _smallest(run, choice).values]), sampled.paths
+        batches[0].names, np.vstack([batch.values for batch in batches]), batches[0].paths
     )
     records = sample_points(
         _scene(run, reading),
@@ -128,7 +130,7 @@ def _over_time(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]:
         stage=f"{STAGE}: simulations",
     )
     f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
-    return (*moments(f[:count]), float(f[count]))
+    return [(*moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
 
 
 def _over_steps(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]:

@@ -149,6 +149,24 @@ def make_formula(payload: dict[str, Any], ranks: Ranks) -> FormulaWorker:
     return FormulaWorker(payload)
 
 
+class NothingToCompile(FormulaWorker):
+    """Stands in for the compiler."""
+
+    def advance(self, seconds: float) -> np.ndarray:
+        records = np.zeros(len(self._queue), OUTCOME)
+        records["sample"] = [index for index, _ in self._queue]
+        self._queue.clear()
+        return records
+
+
+def make_compiler(payload: dict[str, Any], ranks: Ranks) -> NothingToCompile:
+    """Maker of the ranks' compilers."""
+    return NothingToCompile(payload)
+
+
+MAKERS = {"points": make_formula, "compile": make_compiler}
+
+
 def respond(scene: Scene):
     """A response whose forces and accelerations are the objective times a wave."""
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
@@ -201,4 +219,4 @@ if __name__ == "__main__":
         scene = load_scene(sys.argv[1])
         run_study(scene, sys.argv[2], ranks, progress_style="quiet")
 
-    sys.exit(run_on_ranks(program, {"points": make_formula}))
+    sys.exit(run_on_ranks(program, MAKERS))

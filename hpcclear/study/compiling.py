@@ -1,0 +1,107 @@
+"""Everything a study compiles, shared out over the ranks at its start.
+
+Compilation takes longer than many a study's simulations. What one rank has compiled the others on
+its node load from disk.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..distributions import Uniform
+from ..evaluator import Evaluator
+from ..mopso import minimise
+from ..progress import Progress, Style
+from ..random_inputs import RandomInput
+from ..ranks import Ranks
+from ..response import simulate
+from ..robust import RobustObjective
+from ..scene import Scene, load_scene
+from ..scene.points import Points
+from ..status import OUTCOME
+from ..surrogate.kriging import fit_kriging
+from ..work import COMPILE, payload_of
+
+
+def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
+    """Compile this rank's share of the parts; root and the others are at it together.
+
+    Parameters
+    ----------
+    payload : mapping
+        Of `hpcclear.work.payload_of`.
+    ranks : Ranks
+    """
+    if ranks.is_root:
+        _ensemble(payload)  # takes as long as the others together
+    helpers = max(ranks.size - 1, 1)
+    if ranks.size == 1 or not ranks.is_root:
+        for part in (_response, _statistics)[max(ranks.rank - 1, 0) :: helpers]:
+            part(payload)
+    return Compiled()
+
+
+class Compiled:
+    """A worker that has done its work when it is made."""
+
+    lanes = 1
+
+    def __init__(self) -> None:
+        self._waiting: list[int] = []
+
+    @property
+    def pending(self) -> int:
+        """Samples not returned yet."""
+        return len(self._waiting)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        """Queue samples."""
+        self._waiting += index.tolist()
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Return all samples."""
+        records = np.zeros(self.pending, OUTCOME)
+        records["sample"] = self._waiting
+        self._waiting.clear()
+        return records
+
+
+def _ensemble(payload: Mapping[str, Any]) -> None:
+    """The kernel for many samples."""
+    columns = Points(payload["names"], np.empty((0, len(payload["names"]))), payload["paths"])
+    Evaluator(load_scene(payload["scene"]), columns, payload["lanes"]).advance(0.0)
+
+
+def _response(payload: Mapping[str, Any]) -> None:
+    """The kernel for one response."""
+    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
+    simulate(load_scene(payload["scene"]).with_(short))
+
+
+def _statistics(payload: Mapping[str, Any]) -> None:
+    """Surrogate, its moments, and the swarm."""
+    rng = np.random.default_rng(0)
+    points = rng.random((12, 2))
+    bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
+    model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
+    model.predict(points)
+    objective = RobustObjective(model, ("x",), [RandomInput("y", Uniform(0.0, 1.0))])
+    minimise(objective, bounds[:1], iterations=4, rng=rng, size=2)
+
+
+def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> None:
+    """Compile what a study of this scene needs, each part on a rank of its own if there are three.
+
+    Parameters
+    ----------
+    scene : Scene
+    ranks : Ranks
+    points : Points
+        Perhaps none; their columns are what counts.
+    style : str
+        How progress is shown.
+    """
+    progress = Progress("compiling", style=style)
+    nothing = np.zeros((1, 1))  # a stage needs a sample
+    ranks.run_points(COMPILE, payload_of(scene, points), nothing, progress=progress)
