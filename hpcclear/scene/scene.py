@@ -35,6 +35,7 @@ class Scene(Table):
     study: Study | None = None
 
     _text: str = PrivateAttr("")
+    _known_numbers: dict[str, float] | None = PrivateAttr(None)
 
     @field_validator("format_version", mode="before")
     @classmethod
@@ -234,14 +235,16 @@ class Scene(Table):
         self.number(path)
         return quantities()[path].unit
 
-    def _numbers(self) -> dict[str, float]:
-        tables = {name: _plain(getattr(self, name)) for name in PHYSICAL}
-        known = quantities()
-        return {
-            path: value
-            for path, value in flatten(tables)
-            if path in known and isinstance(value, float)
-        }
+    def _numbers(self) -> Mapping[str, float]:
+        if self._known_numbers is None:  # a scene never changes, and a swarm asks often
+            tables = {name: _plain(getattr(self, name)) for name in PHYSICAL}
+            known = quantities()
+            self._known_numbers = {
+                path: value
+                for path, value in flatten(tables)
+                if path in known and isinstance(value, float)
+            }
+        return self._known_numbers
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.resolved() == other.resolved()

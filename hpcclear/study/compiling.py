@@ -4,7 +4,7 @@ Compilation takes longer than many a study's simulations. What one rank has comp
 its node load from disk.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,13 @@ def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
         Of `hpcclear.work.payload_of`.
     ranks : Ranks
     """
-    if ranks.is_root:
-        _ensemble(payload)  # takes as long as the others together
-    helpers = max(ranks.size - 1, 1)
-    if ranks.size == 1 or not ranks.is_root:
-        for part in (_response, _statistics)[max(ranks.rank - 1, 0) :: helpers]:
-            part(payload)
+    mine: tuple[Callable[[Mapping[str, Any]], None], ...] = (_ensemble, _response, _statistics)
+    if ranks.size > 1 and ranks.is_root:
+        mine = mine[:1]  # takes as long as the others together
+    elif ranks.size > 1:
+        mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
+    for part in mine:
+        part(payload)
     return Compiled()
 
 
