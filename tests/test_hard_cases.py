@@ -22,7 +22,8 @@ from hpcclear.scene.points import Points, check_points
 from hpcclear.status import Flag, Status
 
 CASES = sorted((Path(__file__).parent / "hard_cases").glob("*.toml"))
-SHORT = 4  # revolutions
+# one open joint is a kernel of its own each, which takes long to compile
+LONG_ONLY = ("ideal_crank_rod", "ideal_rod_slider")
 BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}  # on the energy residual, over ten revolutions
 NUMBERS = ("objective", "mean_gap", "peak_contact_force")
 BAD = (math.nan, math.inf, -math.inf)
@@ -71,9 +72,13 @@ def check(run, rtol: float, expected: Expectation) -> None:
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8])
-@pytest.mark.parametrize("path", SIMULATED, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [p for p in SIMULATED if p.stem not in LONG_ONLY], ids=lambda path: path.stem
+)
 def test_hard_case(path: Path, rtol: float):
-    check(hard_cases.run(hard_cases.cut(load_scene(path), rtol, SHORT)), rtol, expectation(path))
+    scene = hard_cases.cut(load_scene(path), rtol, 4)
+    cap = min(scene.numerics.max_steps, 1_000_000)
+    check(hard_cases.run(scene.with_({"numerics.max_steps": cap})), rtol, expectation(path))
 
 
 @pytest.mark.full
