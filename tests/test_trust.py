@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hpcclear.api import as_points
 from hpcclear.evaluator import evaluate_records
 from hpcclear.sampling import latin_hypercube
 from hpcclear.scene import load_scene
@@ -75,3 +76,22 @@ def test_penetration_beyond_hertz_is_flagged():
     record = evaluate_records(gentle, latin_hypercube(gentle, 1))[0]
     assert record["status"] == Status.OK
     assert not record["flags"] & Flag.BEYOND_HERTZ
+
+
+def test_an_impact_just_before_the_end_of_a_revolution_is_met():
+    """This sample strikes within the last 1 % of a step that would end the revolution; it was tried for ever once."""
+    scene = load_scene(
+        "jobs/slider_crank.toml",
+        [
+            "mechanism.rod.mass=0.34291349981467410",
+            "mechanism.rod.mass_center=0.10129649712920465",
+            "mechanism.rod.inertia=0.0014369236130354981",
+            "mechanism.slider.mass=0.20708013443922535",
+            "joints.crank_rod.clearance=0.001",
+            "joints.rod_slider.clearance=0.001",
+            "numerics.max_steps=20000",
+        ],
+    )
+    for method in ("auto", "dormand-prince"):
+        record = evaluate_records(scene.with_({"numerics.method": method}), as_points(scene, {"m1": 0.3}), 1)
+        assert record["status"] == Status.OK

@@ -28,9 +28,9 @@ def choose_step(work, par, torque, W):
         h = work[at.NEXT_STEP * W + i]
         if torque is None:
             left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
-            # stretch a little rather than leave a sliver behind
-            ending = 1.0 if h * 1.01 >= left else 0.0
-            h = left if h * 1.01 >= left else h
+            # Never stretched by more than round-off: a step cut to end at an impact must stay cut, or it is tried for ever.
+            ending = 1.0 if h * (1.0 + 1e-12) >= left else 0.0
+            h = left if h * (1.0 + 1e-12) >= left else h
             work[at.ENDING * W + i] = ending
         work[at.STEP * W + i] = h
 
