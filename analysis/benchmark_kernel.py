@@ -9,6 +9,7 @@ order; medians of the ratios within a round. Writes benchmark_kernel.nc.
 """
 
 import argparse
+import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -55,15 +56,15 @@ def run_plain(setup: Setup) -> np.ndarray:
 
 
 def paired_rounds(tasks: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, np.ndarray]:
-    """Seconds of every task in every round; the order changes from round to round."""
+    """Processor seconds of every task in every round; the order changes from round to round."""
     names = list(tasks)
     seconds: dict[str, list[float]] = {name: [] for name in names}
     for round_number in range(rounds):
         shift = round_number % len(names)
         for name in names[shift:] + names[:shift]:
-            started = time.perf_counter()
+            started = time.process_time()  # one core's, whatever else runs
             tasks[name]()
-            seconds[name].append(time.perf_counter() - started)
+            seconds[name].append(time.process_time() - started)
     return {name: np.array(values) for name, values in seconds.items()}
 
 
@@ -118,6 +119,66 @@ def assembly_of(setup: Setup, width: int) -> Arithmetic:
     return executed_arithmetic(evaluate.inspect_asm(evaluate.signatures[0]))
 
 
+@njit(error_model="numpy", fastmath=FASTMATH)
+def _roots(x, y, rounds):
+    for _ in range(rounds):
+        for i in range(x.size):
+            y[i] = math.sqrt(x[i])
+        x[0] = y[1]
+
+
+@njit(error_model="numpy")
+def _quotients(x, y, rounds):
+    for _ in range(rounds):
+        for i in range(x.size):
+            y[i] = 1.0 / x[i]
+        x[0] = y[1]
+
+
+@njit(error_model="numpy", fastmath=FASTMATH)
+def _products(x, y, rounds):
+    for _ in range(rounds):
+        for i in range(x.size):
+            z = x[i]
+            p = z
+            for _ in range(32):
+                p = p * z + 0.5
+            y[i] = p
+        x[0] = y[1]
+
+
+def throughput() -> dict[str, float]:
+    """Nanoseconds a lane that a square root, a quotient, and a product with a sum take this processor at best."""
+    x, y, rounds = np.full(512, 0.5), np.empty(512), 20_000
+    found = {}
+    for name, loop, each in (
+        ("root", _roots, 1),
+        ("quotient", _quotients, 1),
+        ("product", _products, 32),
+    ):
+        loop(x, y, 1)
+        seconds = []
+        for _ in range(5):
+            x[:] = 0.5
+            started = time.process_time()
+            loop(x, y, rounds)
+            seconds.append(time.process_time() - started)
+        found[name] = min(seconds) / (rounds * x.size * each) * 1e9
+    return found
+
+
+def floor_of(arithmetic: Arithmetic, speed: Mapping[str, float]) -> tuple[float, float]:
+    """Least nanoseconds of a force evaluation, per lane: by roots and quotients, by products and sums.
+
+    The divider works beside the multipliers: the larger of the two bounds the whole. Sums are counted with
+    the products, two at a time, which adders of their own would better.
+    """
+    kinds = arithmetic.packed
+    divider = kinds["sqrt"] * speed["root"] + kinds["div"] * speed["quotient"]
+    plain = kinds.total() - kinds["sqrt"] - kinds["div"]
+    return divider, plain * speed["product"]
+
+
 def measure(samples: int, rounds: int) -> xr.Dataset:
     """All measurements of this benchmark."""
     setup = ensemble(scene("lankarani-nikravesh", 1e-6, *REVOLUTIONS), samples)
@@ -136,6 +197,7 @@ def measure(samples: int, rounds: int) -> xr.Dataset:
     ns = np.array([force[name] for name in tasks]) / (np.array(lanes)[:, None] * count) * 1e9
     plain_evaluations = results[YARDSTICK][:, 3].sum()
     evaluations = [results[f"W = {w}"][:, at.OUT_EVALUATIONS].sum() for w in WIDTHS]
+    divider, multipliers = floor_of(found[-1], throughput())
     unit = {"units": "1"}
     return xr.Dataset(
         {
@@ -149,6 +211,8 @@ def measure(samples: int, rounds: int) -> xr.Dataset:
             "packed_share": (("width",), [part.packed_share for part in found], unit),
             "packed": (("width",), [part.packed.total() for part in found], unit),
             "vector_bits": (("width",), [part.vector_bits for part in found], unit),
+            "floor_divider": ((), divider, {"units": "ns"}),
+            "floor_multipliers": ((), multipliers, {"units": "ns"}),
             "disagreement": ((), float(np.median(agreement)), unit),
         },
         coords={"code": list(tasks), "width": list(WIDTHS)},

@@ -49,8 +49,8 @@ def joint(p, base, latched, active, inverse_impact, ex, ey, vx, vy, spin_journal
 
 
 @_compiled
-def rates(t, y, dy, p, latched, active, inverse_impact, gaps):
-    """Time derivatives `dy` of the states `y`; `gaps` gets both gaps, then both gap rates."""
+def motion(t, y, dy, p, latched, active, inverse_impact, gaps):
+    """Time derivatives `dy` of the first eight states; `gaps` gets both gaps, then both gap rates."""
     phi, omega = p[at.SPEED] * t, p[at.SPEED]
     sphi, cphi = math.sin(phi), math.cos(phi)
     st, ct = math.sin(y[2]), math.cos(y[2])
@@ -74,8 +74,14 @@ def rates(t, y, dy, p, latched, active, inverse_impact, gaps):
     dy[5] = (fy1 + fy2) / p[at.ROD_MASS]
     dy[6] = moment / p[at.ROD_INERTIA]
     dy[7] = -fx2 / p[at.SLIDER_MASS]
-    dy[8], dy[9] = abs(gap1), abs(gap2)
     gaps[0], gaps[1], gaps[2], gaps[3] = gap1, gap2, rate1, rate2
+
+
+@_compiled
+def rates(t, y, dy, p, latched, active, inverse_impact, gaps):
+    """Time derivatives `dy` of all states."""
+    motion(t, y, dy, p, latched, active, inverse_impact, gaps)
+    dy[8], dy[9] = abs(gaps[0]), abs(gaps[1])
 
 
 @_compiled

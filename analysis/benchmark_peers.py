@@ -1,0 +1,260 @@
+"""The same scene in this package and in everything a user might take instead.
+
+    python analysis/benchmark_peers.py            # about 15 minutes on a quiet machine
+    python analysis/benchmark_peers.py --quick    # one round, fewer tolerances
+
+Peers: pip install 'hpcclear[bench]'; numbalsoda is built from source and needs gfortran
+(apt-get install gfortran). One that does not load is listed as missing.
+
+Single response: the paper's mechanism, clearance 0.3 mm, first revolution; time against error of the slider's
+position, the error measured from one reference (scipy's DOP853 at its tightest, from event to event where the
+law has memory). For every decade of error the fastest run of each code that is at least as good.
+Ensemble: the box of the paper's Table 3, first revolution; every code at the loosest tolerance whose median
+error is at most the one asked for. All on one core, in processor time, everything in one run: paired rounds,
+each a pass over all codes; medians of the ratios within a round. Writes benchmark_peers.nc and .png.
+"""
+
+import argparse
+import importlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from scenes import LAWS, Setup, ensemble, scene, single
+
+from hpcclear.dataset import provenance
+
+MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
+OWN = "hpcclear"
+DECADES = 10.0 ** -np.arange(5.0, 13.0)
+ENSEMBLES = {"lankarani-nikravesh": 1e-5, "frictionless": 1e-7}  # m, median error asked for
+SHORTEST = 5e-3  # s, calls are repeated to last as long
+SLOWEST = 0.3  # s, tighter tolerances are left out beyond
+
+
+class Solver(NamedTuple):
+    """A code with its settings, for one law."""
+
+    name: str
+    law: str
+    solve: Callable[[Setup, int], float]
+
+
+def load() -> tuple[list[Any], dict[str, str]]:
+    """The modules of peers, and why others are missing."""
+    found, missing = [], {}
+    for name in MODULES:
+        try:
+            found.append(importlib.import_module(f"peers.{name}_peer"))
+        except (ImportError, OSError) as error:
+            missing[name] = str(error).splitlines()[0]
+    return found, missing
+
+
+def solvers_of(modules: list[Any], law: str) -> list[Solver]:
+    """Every code that runs this law."""
+    return [
+        Solver(name, law, solve)
+        for module in modules
+        for name, solve in module.SOLVERS.items()
+        if law in getattr(module, "LAWS_OF", {}).get(name, module.LAWS)
+    ]
+
+
+def setup_of(law: str, rtol: float) -> Setup:
+    """One revolution of the paper's mechanism."""
+    return single(scene(law, rtol, 0, 1, clearance=3e-4))
+
+
+def reference(law: str) -> float:
+    """Slider position by a code that is nobody's own here, at its tightest."""
+    from peers.scipy_peer import SOLVERS
+
+    return SOLVERS["scipy DOP853"](setup_of(law, 3e-14), 0)
+
+
+# ---- single response --------------------------------------------------------------------------
+
+
+def seconds_of(call: Callable[[], Any], repeats: int) -> float:
+    """Processor seconds of one call."""
+    started = time.process_time()
+    for _ in range(repeats):
+        call()
+    return (time.process_time() - started) / repeats
+
+
+def work_precision(solvers: list[Solver], law: str, rtols: np.ndarray, rounds: int) -> xr.Dataset:
+    """Error, and seconds in every round, of every code at every tolerance."""
+    exact = reference(law)
+    setups = [setup_of(law, float(rtol)) for rtol in rtols]
+    shape = (len(solvers), len(rtols))
+    error, seconds = np.full(shape, np.nan), np.full((*shape, rounds), np.nan)
+    repeats = np.zeros(shape, int)
+    for i, solver in enumerate(solvers):
+        for j, setup in enumerate(setups):
+            error[i, j] = abs(solver.solve(setup, 0) - exact)  # compiles as well
+            first = seconds_of(lambda solver=solver, setup=setup: solver.solve(setup, 0), 1)
+            repeats[i, j] = max(1, int(SHORTEST / max(first, 1e-6)))
+            if first > SLOWEST:
+                break
+    for k in range(rounds):
+        for i in np.roll(np.arange(len(solvers)), k):
+            for j in np.flatnonzero(repeats[i]):
+                call = lambda i=i, j=j: solvers[i].solve(setups[j], 0)  # noqa: E731
+                seconds[i, j, k] = seconds_of(call, int(repeats[i, j]))
+    return xr.Dataset(
+        {
+            "error": (("code", "rtol"), error, {"units": "m"}),
+            "seconds": (("code", "rtol", "round"), seconds, {"units": "s"}),
+        },
+        coords={"code": [solver.name for solver in solvers], "rtol": rtols},
+        attrs={"law": law, "reference": exact},
+    )
+
+
+def fastest(runs: xr.Dataset) -> xr.DataArray:
+    """Seconds of the fastest run of each code that is at least as good, (code, decade, round); NaN: none is."""
+    pieces = [runs["seconds"].where(runs["error"] <= decade).min("rtol") for decade in DECADES]
+    return xr.concat(pieces, xr.DataArray(DECADES, dims="decade", name="decade"))
+
+
+# ---- ensemble --------------------------------------------------------------------------------------
+
+
+def batches_of(modules: list[Any], law: str) -> dict[str, Callable[[Setup], np.ndarray]]:
+    """Every code as a function from a setup to slider positions."""
+    batches: dict[str, Callable[[Setup], np.ndarray]] = {}
+    for module in modules:
+        if law in module.LAWS:
+            batches |= getattr(module, "BATCH", {})
+    for solver in solvers_of(modules, law):
+        if not solver.name.startswith((OWN, "plain")):
+            batches[solver.name] = lambda setup, solve=solver.solve: np.array(
+                [solve(setup, k) for k in range(len(setup.par))]
+            )
+    return batches
+
+
+def run_ensemble(
+    modules: list[Any], law: str, wanted: float, samples: int, rounds: int
+) -> xr.Dataset:
+    """Milliseconds a trajectory and revolution at equal error."""
+    from peers.scipy_peer import SOLVERS
+
+    setups = [ensemble(scene(law, 10.0**-k, 0, 1), samples) for k in range(3, 12)]
+    tight = ensemble(scene(law, 1e-13, 0, 1), samples)
+    exact = np.array([SOLVERS["scipy DOP853"](tight, k) for k in range(samples)])
+    chosen, errors = {}, {}
+    for name, batch in batches_of(modules, law).items():
+        for setup in setups:
+            error = float(np.nanmedian(np.abs(batch(setup) - exact)))
+            if error <= wanted:
+                chosen[name], errors[name] = (batch, setup), error
+                break
+    seconds = np.full((len(chosen), rounds), np.nan)
+    names = list(chosen)
+    for k in range(rounds):
+        for i in np.roll(np.arange(len(names)), k):
+            batch, setup = chosen[names[i]]
+            seconds[i, k] = seconds_of(lambda batch=batch, setup=setup: batch(setup), 1)
+    return xr.Dataset(
+        {
+            "each": (("code", "round"), seconds / samples * 1e3, {"units": "ms"}),
+            "error": (("code",), [errors[name] for name in names], {"units": "m"}),
+            "rtol": (("code",), [chosen[name][1].problem.rtol for name in names], {"units": "1"}),
+        },
+        coords={"code": names},
+        attrs={"law": law, "wanted": wanted, "samples": samples},
+    )
+
+
+# ---- what is told ----------------------------------------------------------------------------------
+
+
+def single_table(runs: xr.Dataset) -> list[str]:
+    """Times by decade; under them how many times longer than this package."""
+    best = fastest(runs)
+    own = best.sel(code=OWN)
+    lines = ["", f"single response, {runs.attrs['law']}: ms a revolution (times ours), error up to"]
+    lines.append(f"{'':<20}" + "".join(f"{f'{decade:.0e}':>12}" for decade in DECADES[::2]))
+    for code in runs["code"].values:
+        cells = []
+        for decade in DECADES[::2]:
+            value = best.sel(code=code, decade=decade)
+            ratio = float((value / own.sel(decade=decade)).median("round"))
+            text = f"{float(value.median('round')) * 1e3:.3g} ({ratio:.2g})"
+            cells.append("-" if np.isnan(float(value.median("round"))) else text)
+        lines.append(f"{code:<20}" + "".join(f"{cell:>12}" for cell in cells))
+    return lines
+
+
+def ensemble_table(runs: xr.Dataset) -> list[str]:
+    """Times a trajectory, and how many times longer than this package."""
+    lines = ["", f"ensemble, {runs.attrs['law']}: median error up to {runs.attrs['wanted']:.0e} m"]
+    lines.append(f"{'':<24}{'ms a revolution':>16}{'times ours':>12}{'error m':>10}{'rtol':>8}")
+    own = runs["each"].sel(code=f"{OWN} lanes")
+    for code in runs["code"].values:
+        row = runs.sel(code=code)
+        lines.append(
+            f"{code:<24}{float(row['each'].median()):>16.4f}"
+            f"{float((row['each'] / own).median()):>12.2f}{float(row['error']):>10.0e}"
+            f"{float(row['rtol']):>8.0e}"
+        )
+    return lines
+
+
+def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
+    """Time against error, a panel for each law."""
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(runs), figsize=(3.4 * len(runs), 3.6), sharey=True)
+    for axis, (law, data) in zip(np.atleast_1d(axes), runs.items(), strict=True):
+        for k, code in enumerate(data["code"].values):
+            row = data.sel(code=code)
+            width = 2.0 if str(code).startswith(OWN) else 0.9
+            axis.plot(
+                np.maximum(row["error"], 1e-15), row["seconds"].median("round") * 1e3,
+                marker="osv^D"[k % 5], markersize=2.5, linewidth=width, label=code,
+                color=plt.cm.tab20(k % 20),
+            )  # fmt: skip
+        axis.set(xscale="log", yscale="log", title=law, xlabel="error of the slider position, m")
+        axis.legend(fontsize=5.5)
+    np.atleast_1d(axes)[0].set_ylabel("ms a revolution")
+    figure.tight_layout()
+    figure.savefig(path, dpi=200)
+
+
+def main() -> None:
+    """Load, measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("-o", "--output", type=Path, default=Path("benchmark_peers.nc"))
+    options = parser.parse_args()
+    rounds, per_decade = (1, 1) if options.quick else (5, 2)
+    rtols = 10.0 ** -np.arange(4.0, 13.5, 1.0 / per_decade)
+    modules, missing = load()
+    for name, reason in missing.items():
+        print(f"missing: {name} ({reason})")
+    tree = xr.DataTree(xr.Dataset(attrs={**provenance("", ""), "missing": str(missing)}))
+    runs = {}
+    for law in LAWS:
+        runs[law] = work_precision(solvers_of(modules, law), law, rtols, rounds)
+        tree[f"single/{law}"] = xr.DataTree(runs[law])
+        print("\n".join(single_table(runs[law])), flush=True)
+    for law, wanted in ENSEMBLES.items():
+        found = run_ensemble(modules, law, wanted, options.samples, rounds)
+        tree[f"ensemble/{law}"] = xr.DataTree(found)
+        print("\n".join(ensemble_table(found)), flush=True)
+    tree.to_netcdf(options.output, engine="h5netcdf")
+    draw(runs, options.output.with_suffix(".png"))
+
+
+if __name__ == "__main__":
+    main()

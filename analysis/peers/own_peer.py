@@ -1,0 +1,85 @@
+"""This package, and the plain loop beside it, in the form of a peer."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import plain_loop
+from scenes import Setup
+
+from hpcclear.kernel import layout as at
+from hpcclear.kernel.lanes import Lanes, Problem
+from hpcclear.kernel.tableau import TABLEAUS
+
+from .system import SLIDER, Array
+
+POSITION = at.OUT_STATE + SLIDER
+WIDTH = 32
+
+
+def lanes_positions(setup: Setup, width: int) -> Array:
+    """Slider positions at the end of every sample, shape (m,)."""
+    lanes = Lanes(setup.problem, width)
+    return _collected(lanes, setup)
+
+
+def _collected(lanes: Lanes, setup: Setup) -> Array:
+    lanes.queue(setup.par, setup.state, np.arange(len(setup.par)))
+    found = np.empty(len(setup.par))
+    while lanes.pending:
+        lanes.advance(10.0)
+        finished = lanes.collect()
+        found[finished[0]] = finished[1][:, POSITION]
+    return found
+
+
+@cache
+def _one_lane(key: tuple) -> Lanes:
+    return Lanes(_PROBLEMS[key], 1)
+
+
+_PROBLEMS: dict[tuple, Problem] = {}
+
+
+def _solver(tableau: str | None) -> Callable[[Setup, int], float]:
+    def solve(setup: Setup, sample: int = 0) -> float:
+        problem = setup.problem
+        if tableau is not None:
+            problem = replace(problem, tableau=TABLEAUS[tableau])
+        key = (problem.effects, problem.tableau.name, problem.rtol, problem.atol)
+        _PROBLEMS.setdefault(key, problem)
+        one = setup._replace(
+            par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
+        )
+        return float(_collected(_one_lane(key), one)[0])
+
+    return solve
+
+
+def plain(setup: Setup, sample: int = 0) -> float:
+    """The yardstick, one sample."""
+    return float(plain_positions(setup._replace(
+        par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
+    ))[0])  # fmt: skip
+
+
+def plain_positions(setup: Setup) -> Array:
+    """The yardstick, all samples."""
+    p = setup.problem
+    latched = p.effects.latched is not None
+    revolutions = (p.transient, p.averaged)
+    found = plain_loop.run(
+        setup.par, setup.state, p.rtol, p.atol, revolutions, latched, p.impact_floor
+    )
+    return found[:, 1]
+
+
+SOLVERS = {"hpcclear": _solver(None)} | {
+    f"hpcclear {name}": _solver(name) for name in TABLEAUS
+} | {"plain loop": plain}  # fmt: skip
+BATCH = {
+    "hpcclear lanes": lambda setup: lanes_positions(setup, WIDTH),
+    "plain loop": plain_positions,
+}
+LAWS = ("hunt-crossley", "frictionless", "lankarani-nikravesh")
