@@ -239,6 +239,37 @@ def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) 
 
 
 @cli.command()
+@_FILE
+@_SET
+@click.option(
+    "--error",
+    type=click.FloatRange(0.0, 0.5, min_open=True),
+    metavar="RELATIVE",
+    help="Error of the objective to plan for; by default the settings of the file.",
+)
+@click.option(
+    "--ranks",
+    "workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Ranks to plan for; by default those it runs on.",
+)
+def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: int | None) -> int:
+    """Measure some samples and say what a run costs: settings, core-hours, ranks, wall time.
+
+    Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from .plan import run_plan
+
+        planned = ranks.size if workers is None else workers
+        return run_plan(_scene(file, overrides), str(file), ranks, error, planned)
+
+    return _on_ranks(program)
+
+
+@cli.command()
 @click.argument("directory", type=click.Path(path_type=Path))
 def report(directory: Path) -> int:
     """Write figures and a self-contained HTML page about a directory of results.
