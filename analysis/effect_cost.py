@@ -4,7 +4,7 @@
 
 writes the table as NetCDF and the figure beside it. Each pair is timed in turn, off and on, several times over, so that
 both see the same machine; the median of the ratios counts. Samples come from the Latin hypercube of
-jobs/quickstart.toml. Nothing else should run meanwhile.
+jobs/quickstart.toml. Times are processor times; on a busy machine they still suffer from shared caches.
 """
 
 import argparse
@@ -80,13 +80,13 @@ class Ensemble:
         self.lanes = Lanes(problem_of(scene), width)
 
     def run(self) -> tuple[float, float]:
-        """Seconds and force evaluations of one revolution of one sample."""
+        """Seconds (of processor time: other work on the machine counts less) and force evaluations of a revolution."""
         labels = np.arange(len(self.par))
-        start = time.perf_counter()
+        start = time.process_time()
         self.lanes.queue(self.par, self.state, labels)
         while self.lanes.pending:
             self.lanes.advance(1.0)
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - start
         out = self.lanes.collect()[1]
         revolutions = out[:, at.OUT_REVOLUTIONS].sum()
         return seconds / revolutions, out[:, at.OUT_EVALUATIONS].sum() / revolutions
@@ -122,10 +122,10 @@ def closed_form(options: argparse.Namespace) -> np.ndarray:
     par, angles = parameters(bare)[0], np.linspace(0.0, at.TURN, 720)
     times = []
     for _ in range(options.pairs + 1):
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(100):
             ideal_response(effects_of(bare), par, None, angles)
-        times.append((time.perf_counter() - start) / (100 * len(angles)))
+        times.append((time.process_time() - start) / (100 * len(angles)))
     return np.array(times[1:])
 
 
