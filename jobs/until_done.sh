@@ -4,7 +4,7 @@
 #
 #     #SBATCH --signal=B:USR1@120      two minutes before the wall time
 #     #SBATCH --requeue
-#     exec bash jobs/until_done.sh srun --mpi=pmi2 hpcclear run ...
+#     exec bash jobs/until_done.sh srun --mpi=pmi2 --kill-on-bad-exit=1 hpcclear run ...
 #
 # USR1 and TERM are handed on; hpcclear then saves what is finished and exits 3 within 5 s. After USR1 the job is
 # requeued and the same command goes on; after TERM (scancel, or a node that goes down) it ends, to be resubmitted by hand.
@@ -22,6 +22,7 @@ while kill -0 "$child" 2>/dev/null; do # a signal ends `wait`, not the command
     wait "$child"
     code=$?
 done
+trap '' USR1 TERM INT # nobody is left to hand them to
 if [ "$code" = 3 ] && [ "$out_of_time" = yes ]; then
     turn=$((${SLURM_RESTART_COUNT:-0} + 1))
     if [ "$turn" -ge "$most_turns" ]; then

@@ -101,9 +101,9 @@ def array() -> None:
 
 
 def requeued(samples: int, expected: bytes) -> None:
-    """A job whose wall time of a minute is too short: it requeues itself until it is done."""
+    """A job whose wall time is too short: it requeues itself until it is done."""
     output, log = FOLDER / "requeued" / "samples.nc", "requeued.log"
-    options = ("--time=1", "--signal=B:USR1@15")
+    options = ("--time=2", "--signal=B:USR1@30")  # Slurm counts in minutes
     words = (SCENE, str(output), *study(samples))
     job = submit("many_nodes.slurm", log, *words, options=options)
     end = wait(job, *ENDS, seconds=1200.0)
