@@ -15,7 +15,15 @@ from hpcclear.comm import alone
 from hpcclear.errors import InputError
 from hpcclear.scene import load_scene
 from hpcclear.stopping import Stopped
-from hpcclear.study import audit, claims, optimisation, responses, run_study, surrogates
+from hpcclear.study import (
+    audit,
+    claims,
+    optimisation,
+    responses,
+    run_study,
+    simulations,
+    surrogates,
+)
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -345,11 +353,9 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet")
 
 
-def test_peak_contact_force_is_an_objective(tmp_path):
+def test_peak_contact_force_is_an_objective():
     scene = scene_of("study.objective=peak-contact-force")
-    unit, function = __import__(
-        "hpcclear.study.simulations", fromlist=["objective_of"]
-    ).objective_of(scene)
+    unit, function = simulations.objective_of(scene)
     records = np.zeros(2, [("peak_contact_force", float, 2)])
     records["peak_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
     assert unit == "N"

@@ -70,7 +70,8 @@ def write(run: Run, designs: Sequence[Choice]) -> None:
     folder.mkdir(exist_ok=True)
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
-        content = _steady(scene, simulate(scene), name)
+        with run.ranks.stage("responses"):
+            content = _steady(scene, simulate(scene), name)
         content.attrs["design"] = name
         run.write(content, f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc")
 

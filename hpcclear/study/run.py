@@ -82,5 +82,5 @@ class Run:
             for variable in content.data_vars.values():
                 if variable.attrs.get("units") == "m" and "scene_path" not in variable.attrs:
                     variable.attrs["units"] = unit
-        with self.ranks.writing():
+        with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)
