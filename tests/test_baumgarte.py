@@ -26,7 +26,9 @@ def largest_violation(scene_joints, result):
 
 
 @pytest.mark.parametrize(
-    ("contact", "revolutions"), [(HUNT_CROSSLEY, 1), (HUNT_CROSSLEY, 10), (LATCHED, 1)], ids=str
+    ("contact", "revolutions"),
+    [(HUNT_CROSSLEY, 1), (HUNT_CROSSLEY, 10), pytest.param(LATCHED, 1, marks=pytest.mark.full)],
+    ids=str,
 )
 def test_formulations_agree(contact, revolutions):
     minimal, nine = both({"effects.contact": contact}, revolutions)
@@ -51,6 +53,7 @@ def test_formulations_agree_with_one_ideal_joint(ideal_joint, drive):
     assert largest_violation((open_joint,), nine) < 1e-9
 
 
+@pytest.mark.full
 def test_formulation_follows_the_closed_form_without_clearance():
     scene = scene_with(
         {**IDEAL, "effects.friction": {"law": "none"}, "numerics.formulation": "baumgarte"}
