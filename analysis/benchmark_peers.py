@@ -177,19 +177,18 @@ def run_ensemble(
 
 
 def single_table(runs: xr.Dataset) -> list[str]:
-    """Times by decade; under them how many times longer than this package."""
+    """Times by decade of error, then how many times longer than this package."""
     best = fastest(runs)
-    own = best.sel(code=OWN)
-    lines = ["", f"single response, {runs.attrs['law']}: ms a revolution (times ours), error up to"]
-    lines.append(f"{'':<20}" + "".join(f"{f'{decade:.0e}':>12}" for decade in DECADES[::2]))
-    for code in runs["code"].values:
-        cells = []
-        for decade in DECADES[::2]:
-            value = best.sel(code=code, decade=decade)
-            ratio = float((value / own.sel(decade=decade)).median("round"))
-            text = f"{float(value.median('round')) * 1e3:.3g} ({ratio:.2g})"
-            cells.append("-" if np.isnan(float(value.median("round"))) else text)
-        lines.append(f"{code:<20}" + "".join(f"{cell:>12}" for cell in cells))
+    ratio = (best / best.sel(code=OWN)).median("round")
+    tables = {"ms a revolution": best.median("round") * 1e3, "times ours": ratio}
+    lines = []
+    for title, table in tables.items():
+        lines += ["", f"single response, {runs.attrs['law']}: {title}, error up to ... m"]
+        lines.append(f"{'':<24}" + "".join(f"{f'{decade:.0e}':>7}" for decade in DECADES))
+        for code in runs["code"].values:
+            values = table.sel(code=code).transpose("decade").values
+            cells = ["-" if np.isnan(value) else f"{value:.3g}" for value in values]
+            lines.append(f"{code:<24}" + "".join(f"{cell:>7}" for cell in cells))
     return lines
 
 
