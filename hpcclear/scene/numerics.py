@@ -16,8 +16,8 @@ class Numerics(Table):
     """Baumgarte feedback on constraint speed, 1/s; used by that formulation only."""
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
     """Baumgarte feedback on constraint position, 1/s; used by that formulation only."""
-    method: Literal["auto", "dormand-prince", "fehlberg", "dormand-prince-853", "radau"] = "auto"
-    """Integrator."""
+    method: Literal["auto", "dormand-prince", "fehlberg", "switching", "radau"] = "auto"
+    """Integrator; "switching" takes implicit steps where the motion is stiff, "radau" always, the others never."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
