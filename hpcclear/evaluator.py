@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .ideal import ClosedForm
 from .kernel import layout as at
 from .kernel.lanes import Lanes
 from .kernel.lifecycle import STATE
@@ -56,7 +57,8 @@ class Evaluator:
         self.lanes = lanes
         self._columns = columns
         self._copies = 1 + len(COPIES) * scene.numerics.uncertainty
-        self._lanes = Lanes(problem_of(scene), lanes)
+        problem = problem_of(scene)
+        self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._partial: dict[int, NDArray[np.void]] = {}
 
     @property

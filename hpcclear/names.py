@@ -100,6 +100,12 @@ eccentricity_y      | time joint | m     | y distance of the journal centre from
 penetration         | time joint | m     | overlap of journal and bearing
 contact_force       | time joint | N     | normal contact force
 friction_force      | time joint | N     | tangential contact force
+reaction_x          | time joint | N     | x force on the rod in an ideal joint
+reaction_y          | time joint | N     | y force on the rod in an ideal joint
+bearing_x           | time       | N     | x force of the frame on the crank
+bearing_y           | time       | N     | y force of the frame on the crank
+guide_force         | time       | N     | y force of the guide on the slider
+constraint_violation | time      | m     | largest position constraint that is not met
 crank_moment        | time       | N m   | reaction moment on the crank
 kinetic_energy      | time       | J     | kinetic energy
 elastic_energy      | time       | J     | energy stored in the contacts

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from . import dataset, geometry
 from .evaluator import outcome_records
+from .ideal import ClosedForm, ideal_series
+from .kernel import baumgarte, ideal
 from .kernel import layout as at
 from .kernel import record as rec
 from .kernel.lanes import Lanes, Problem
 from .kernel.observe import observe
-from .lowering import parameters, problem_of, start_states, topology
+from .lowering import coordinate_count, parameters, problem_of, start_states, topology
 from .scene import Scene
 from .target import recorded, resolve
 
@@ -131,7 +133,7 @@ def instants(scene: Scene, steps: Steps) -> Array:
     count = scene.output.instants_per_revolution
     if count == 0:
         return steps.time
-    ends = np.flatnonzero(np.diff(steps.revolution) > 0) + 1  # the row that closes a revolution
+    ends = np.flatnonzero(np.diff(steps.revolution) > 0)  # the rows that close a revolution
     borders = np.concatenate([[0.0], steps.time[ends]])
     if steps.time[-1] > borders[-1]:
         borders = np.append(borders, steps.time[-1])
@@ -159,26 +161,8 @@ def simulate(scene: Scene) -> xr.Dataset:
     """
     named = scene
     scene, reason = resolve(scene)
-    first, second, free = topology(scene)
-    steps, record, par = integrate(scene)
-    times = instants(scene, steps)
-    q, v, contacts, k, s = _between(steps, times, free)
-    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
-    problem = problem_of(scene, ledger=True, series=True)
-    seen = _observed(problem, par, np.hstack([_wrapped(q, free), v]), contacts, turn_time)
-    ends = np.hstack([_wrapped(steps.q, free), steps.v])
-    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)
-    n = problem.coordinates
-    powers = at_steps[:, n + at.DRIVE_POWER + np.array([0, 1, 2, 3])]
-    works = _works_between(steps, powers, k, s)
-    if free:
-        phi, omega, q, v = q[:, -1], v[:, -1], q[:, :-1], v[:, :-1]
-    else:
-        turns = times / par[at.PERIOD]
-        phi, omega = at.TURN * turns, np.full_like(times, par[at.SPEED])
-    m = geometry.motion((first, second), par, phi, omega, q.T, v.T)
-    data = _series(scene, m, par, seen, n, contacts, works)
-    data["crank_angle"] = phi
+    simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
+    times, data, record = simulated(scene)
     names = (
         "objective",
         "objective_spread",
@@ -196,11 +180,52 @@ def simulate(scene: Scene) -> xr.Dataset:
     )
 
 
-def _wrapped(q: Array, free: bool) -> Array:
-    """Coordinates with a free crank's angle within one turn, as the kernel keeps it."""
-    if free:
+def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+    """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
+    lanes = ClosedForm(problem_of(scene))
+    par = parameters(scene)
+    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
+    return *ideal_series(scene), outcome_records(*lanes.collect())
+
+
+def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+    """Instants, time series and outcome record (1,) of a scene that is integrated."""
+    first, second, free = topology(scene)
+    nine = scene.numerics.formulation == "baumgarte"
+    turning = free or nine  # the crank angle is the last coordinate
+    steps, record, par = integrate(scene)
+    times = instants(scene, steps)
+    q, v, contacts, k, s = _between(steps, times, turning)
+    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
+    problem = problem_of(scene, ledger=True, series=True)
+    states = np.hstack([_in_turn(q, steps.revolution[k], turning), v])
+    seen = _observed(problem, par, states, contacts, turn_time)
+    ends = np.hstack([steps.q, steps.v])
+    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)
+    n = problem.coordinates
+    works = _works_between(steps, at_steps[:, n + at.DRIVE_POWER + np.arange(4)], k, s)
+    phi, omega = at.TURN * times / par[at.PERIOD], np.full_like(times, par[at.SPEED])
+    data = {}
+    if nine:
+        data["constraint_violation"] = baumgarte.constraint_violation(first, second, par, q.T)
+    rows = baumgarte.minimal_rows(first, second) if nine else list(range(n - free))
+    if turning:
+        phi, omega = q[:, -1], v[:, -1]
+    if first or second:
+        slider = seen[:, rows[-1]]
+    else:
+        rigid = ideal.ideal_response(problem.effects, par, problem.load_table, phi, omega, seen[:, n - 1])
+        slider = rigid[ideal.SLIDER_A]
+    m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
+    data |= _series(scene, m, par, seen, n, contacts, works)
+    return times, data | {"crank_angle": phi, "slider_acceleration": slider}, record
+
+
+def _in_turn(q: Array, revolution: Array, turning: bool) -> Array:
+    """Coordinates with the crank angle, if it is one, counted from the start of its revolution, as the kernel does."""
+    if turning:
         q = q.copy()
-        q[:, -1] = np.mod(q[:, -1], at.TURN)
+        q[:, -1] -= at.TURN * revolution
     return q
 
 
@@ -225,11 +250,9 @@ def _series(
     potential = geometry.potential_energy(m, par, scene.effects.gravity)
     driving, _, dissipated, load = works.T
     total = kinetic + elastic + potential
-    slider = n - 1 - (scene.drive.kind == "torque")
     return {
         "slider_position": m.slider,
         "slider_velocity": m.slider_speed,
-        "slider_acceleration": seen[:, slider],
         "rod_x": m.rod_x,
         "rod_y": m.rod_y,
         "rod_angle": m.rod_angle,
