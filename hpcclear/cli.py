@@ -205,7 +205,12 @@ def run(
         from .study import run_study
 
         return run_study(
-            _scene(file, overrides), output, ranks, fresh=fresh, progress_style=progress
+            _scene(file, overrides),
+            output,
+            ranks,
+            fresh=fresh,
+            progress_style=progress,
+            tell=lambda text: click.echo(text, err=True),
         )
 
     return _on_ranks(program, time_limit)

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
 from .kernel import layout as at
 from .kernel.lanes import Problem
 from .kernel.lifecycle import STATE

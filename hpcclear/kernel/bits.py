@@ -26,7 +26,7 @@ def _double_of(typingctx, n):
 @lane_function
 def rough_log2(x):
     """log2 of x >= 0 within 0.09; about -1023 for 0, above 1024 for NaN and infinity."""
-    return _bits_of(x) * 2.220446049250313e-16 - 1023.0
+    return _bits_of(x) * 2.220446049250313e-16 - 1023.0  # type: ignore[call-arg]
 
 
 @lane_function
@@ -35,4 +35,5 @@ def rough_exp2(y):
     y = y + 1023.0
     s = y - int(y)
     # the chord of 2**s overshoots it: a parabola takes most of the difference away
-    return _double_of(int((y - 0.3371894346 * s * (1.0 - s)) * 4503599627370496.0))
+    bits = int((y - 0.3371894346 * s * (1.0 - s)) * 4503599627370496.0)
+    return _double_of(bits)  # type: ignore[call-arg]
