@@ -263,6 +263,7 @@ def test_loads_cleanly_and_fits_the_screen(
     browser.log()
     browser.open(page, width, scheme)
     browser.wait("document.querySelectorAll('#front .point').length > 40")
+    assert browser.run("return document.querySelectorAll('#front path.hollow').length;") == 0
     assert browser.log() == []
     assert browser.run("return document.documentElement.scrollWidth;") <= width
     overflow = browser.run(
@@ -316,12 +317,15 @@ def test_hover_shows_and_click_changes_the_panel(browser: Browser, page: Path) -
     first = _panel(browser)
     assert "By direct simulation" in first
     assert browser.run("return document.querySelectorAll('#front-responses svg').length;") == 4
-    points = json.loads(browser.run("return document.getElementById('content').textContent;"))[
-        "front"
-    ]["points"]
+    stored = json.loads(browser.run("return document.getElementById('content').textContent;"))
+    points = stored["front"]["points"]
+    browser.run(
+        "const s = document.getElementById('front-view'); s.value = 'all'; s.dispatchEvent(new Event('change'));"
+    )
+    assert browser.run("return document.querySelectorAll('#front .point').length;") == len(points)
     index = next(k for k, p in enumerate(points) if p["kind"] == "paper" and p["case"] == "robust")
     browser.point(f"[data-index='{index}']", press=False)
-    assert "robust paper alpha" in _panel(browser)
+    browser.wait("document.getElementById('front-panel').innerText.includes('robust paper alpha')")
     assert "By direct simulation" not in _panel(browser)
     browser.point("h1", press=False)
     assert _panel(browser) == first

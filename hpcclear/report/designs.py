@@ -31,6 +31,8 @@ _MARKS = (
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
     """Pareto fronts of all cases, and the designs that were simulated directly (the paper's Fig. 9).
 
+    Left the fronts alone, right with the original and the paper's designs, which lie far off.
+
     Parameters
     ----------
     front : xarray.Dataset
@@ -43,32 +45,45 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
     matplotlib Figure
     """
     cases = [str(case) for case in front["case"].to_numpy()]
-    figure, axes = style.grid(len(cases), 1, 14.0 + 56.0 * len(cases), sharex=True)
-    x = labels.of(front["mean"])
-    y = labels.of(front["deviation"])
-    for panel, case in zip(axes[:, 0], cases, strict=True):
-        one = front.sel(case=case)
-        for k, run in enumerate(front["run"].to_numpy()):
-            row = one.sel(run=run)
-            options: dict[str, Any] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
-            points = (row["mean"].to_numpy() * x.factor, row["deviation"].to_numpy() * y.factor)
-            panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
-        if verification is not None:
-            _verified(panel, verification, case, x, y)
-        panel.set_title(f"case: {labels.literal(case)}")
-        panel.set_ylabel(y.label(r"deviation $\sigma_f$"))
-    axes[-1, 0].set_xlabel(x.label(r"mean $\mu_f$"))
-    handles, words = axes[0, 0].get_legend_handles_labels()
+    columns = 1 if verification is None else 2
+    figure, axes = style.grid(len(cases), columns, 24.0 + 54.0 * len(cases), sharex="col")
+    x, y = labels.of(front["mean"]), labels.of(front["deviation"])
+    for line, case in zip(axes, cases, strict=True):
+        for column, panel in enumerate(line):
+            _runs(panel, front.sel(case=case), x, y)
+            if verification is not None:
+                _verified(panel, verification, case, x, y, all_designs=column == 1)
+        line[0].set_title(f"case: {labels.literal(case)}")
+        line[0].set_ylabel(y.label(r"deviation $\sigma_f$"))
+        line[-1].set_ylabel(y.label(r"deviation $\sigma_f$"))
+    for panel in axes[-1]:
+        panel.set_xlabel(x.label(r"mean $\mu_f$"))
+    handles, words = axes[0, -1].get_legend_handles_labels()
     once = dict(zip(words, handles, strict=True))
     figure.legend(list(once.values()), list(once), loc="outside lower center", ncols=2)
-    style.settle(axes)
+    style.settle(axes, 5 if columns == 1 else 3)
     return figure
 
 
+def _runs(panel: Any, one: xr.Dataset, x: labels.Scale, y: labels.Scale) -> None:
+    """The solutions of every run of a case."""
+    for k, run in enumerate(one["run"].to_numpy()):
+        row = one.sel(run=run)
+        points = (row["mean"].to_numpy() * x.factor, row["deviation"].to_numpy() * y.factor)
+        options: dict[str, Any] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
+        panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
+
+
 def _verified(
-    panel: Any, verification: xr.Dataset, case: str, x: labels.Scale, y: labels.Scale
+    panel: Any,
+    verification: xr.Dataset,
+    case: str,
+    x: labels.Scale,
+    y: labels.Scale,
+    *,
+    all_designs: bool,
 ) -> None:
-    """True mean and deviation of the designs of a case, each joined to the surrogate's."""
+    """True mean and deviation of the designs of a case, ours or all, each joined to the surrogate's."""
     names = [str(name) for name in verification["design"].to_numpy()]
     cases = (
         [str(c) for c in verification["case"].to_numpy()]
@@ -80,6 +95,8 @@ def _verified(
             continue
         one = verification.isel(design=k)
         label, marker = next(row[1:] for row in _MARKS if row[0] in name)
+        if marker != "o" and not all_designs:
+            continue
         at = float(one["mean_true"]) * x.factor, float(one["deviation_true"]) * y.factor
         options: dict[str, Any] = {
             "fmt": marker,
@@ -90,7 +107,14 @@ def _verified(
         }
         bars = _limits(one, "mean", x), _limits(one, "deviation", y)
         panel.errorbar(
-            *at, xerr=bars[0], yerr=bars[1], color="black", elinewidth=0.6, label=label, **options
+            *at,
+            xerr=bars[0],
+            yerr=bars[1],
+            color="black",
+            ecolor=style.PALETTE["grey"],
+            elinewidth=0.5,
+            label=label,
+            **options,
         )
         if "mean_surrogate" in one and "deviation_surrogate" in one:
             guess = (
@@ -99,7 +123,7 @@ def _verified(
             )
             panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
         greek = {f"{case} alpha": "α", f"{case} beta": "β"}.get(name)
-        if greek is not None:
+        if greek is not None and not all_designs:
             options = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": style.SMALL}
             panel.annotate(greek, at, **options)
 

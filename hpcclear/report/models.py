@@ -70,7 +70,10 @@ def _model(row: xr.Dataset) -> Model:
         else np.isfinite(row["length_scale"].to_numpy())
     )
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(row)}
-    inputs = tuple(str(name) for name in row["parameter"].to_numpy()[used])
+    found = [str(name) for name in row["parameter"].to_numpy()]
+    order = str(row["family"].item()).split() if "family" in row else []
+    own = [found[k] for k in np.flatnonzero(used)]
+    inputs = tuple(order if sorted(order) == sorted(own) else own)
     columns = [by_path[name] for name in inputs]
     points = np.column_stack([column.to_numpy() for column in columns])
     values = row["training_output"].to_numpy()
@@ -81,7 +84,7 @@ def _model(row: xr.Dataset) -> Model:
     )
     numbers = ("signal_variance", "noise_variance", "output_mean", "output_scale")
     signal, noise, mean, scale = (float(row[name]) for name in numbers)
-    lengths = row["length_scale"].to_numpy()[used]
+    lengths = row["length_scale"].to_numpy()[[found.index(name) for name in inputs]]
     fit = lengths, signal, noise, mean, scale
     weights = row["weight"].to_numpy()[good]
     return Model(inputs, lower, upper, *fit, points[good], values[good], weights)

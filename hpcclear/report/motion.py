@@ -18,8 +18,15 @@ def turns(response: xr.Dataset) -> Array:
 
 def whole_turns(response: xr.Dataset) -> int:
     """How many whole revolutions, from one passage of crank angle 0 to the last, a response holds."""
+    first, last = _passages(response)
+    return last - first
+
+
+def _passages(response: xr.Dataset) -> tuple[int, int]:
+    """Number of the first and of the last revolution's border; an instant that is missing there is forgiven."""
     angle = turns(response)
-    return int(np.floor(angle[-1] + 1e-6)) - int(np.ceil(angle[0] - 1e-6))
+    slack = min(1.5 * float(np.max(np.diff(angle[:2]), initial=1e-6)), 0.02)
+    return int(np.ceil(angle[0] - slack)), int(np.floor(angle[-1] + slack))
 
 
 def latest(response: xr.Dataset, revolutions: int) -> xr.Dataset:
@@ -49,7 +56,7 @@ def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
         The response holds fewer revolutions.
     """
     angle = turns(response)
-    last = int(np.floor(angle[-1] + 1e-6))
+    last = _passages(response)[1]
     whole = whole_turns(response)
     count = max(1, (whole + 1) // 2) if revolutions is None else revolutions
     if count < 1 or count > whole:
@@ -82,8 +89,8 @@ def eccentricity(response: xr.Dataset) -> Array:
 def objective_by_turn(response: xr.Dataset) -> Array:
     """Objective f of every whole revolution, m, shape (revolutions,): time means over the instants of the file."""
     time, angle = response["time"].to_numpy(), turns(response)
-    first = int(np.ceil(angle[0] - 1e-6))
-    borders = np.arange(first, int(np.floor(angle[-1] + 1e-6)) + 1)
+    first, last = _passages(response)
+    borders = np.arange(first, last + 1)
     gap = np.abs(eccentricity(response) - clearances(response))
     squares = np.zeros(max(len(borders) - 1, 0))
     at = np.interp(borders, angle, time)

@@ -99,7 +99,8 @@
   }
 
   function chart(panel, one, base) {
-    const width = 360, height = 150;
+    const width = Math.max(260, Math.min(640, panel.clientWidth / (panel.clientWidth > 850 ? 2 : 1)));
+    const height = 160;
     const svg = draw(panel, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img" });
     svg.setAttribute("aria-label", `${one.label} over two revolutions`);
     const all = base ? one.y.concat(base.y) : one.y;
@@ -134,7 +135,18 @@
   function front() {
     const place = byId("front");
     if (!place || !content.front.points.length) return;
-    const points = content.front.points, panel = byId("front-panel");
+    const view = byId("front-view");
+    const far = (p) => p.kind === "paper" || p.kind === "original";
+    const near = content.front.points.filter((p) => !far(p));
+    legend(byId("front-legend"));
+    view.addEventListener("change", () => build(place, view.value === "all" ? content.front.points : near));
+    if (!near.length) view.value = "all";
+    build(place, near.length ? near : content.front.points);
+  }
+
+  function build(place, points) {
+    place.replaceChildren();
+    const panel = byId("front-panel");
     /* as wide as there is room for, so that type keeps its size on a phone */
     const width = Math.max(300, Math.min(640, place.clientWidth)), height = Math.max(320, 0.72 * width);
     const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group" });
@@ -192,7 +204,6 @@
       event.preventDefault();
       keys[event.key]();
     });
-    legend(byId("front-legend"));
     const first = points.findIndex((p) => content.responses[p.response] && p.kind === "design");
     choose(first >= 0 ? first : Math.max(0, points.findIndex((p) => p.direct.length)));
   }

@@ -133,7 +133,14 @@ def _front(content: Content) -> Html | None:
         "ones, Enter to show."
     )
     panel = tag("div", class_="panel", id="front-panel", aria_live="polite")
-    left = tag("div", tag("div", id="front"), tag("p", id="front-legend", class_="legend"))
+    views = (tag("option", "the front", value="near"), tag("option", "all designs", value="all"))
+    view = tag("label", "Show", tag("select", *views, id="front-view"))
+    left = tag(
+        "div",
+        tag("div", view, class_="controls"),
+        tag("div", id="front"),
+        tag("p", id="front-legend", class_="legend"),
+    )
     both = tag("div", left, panel, class_="split")
     return join([tag("p", words), _noscript("front"), both, tag("div", id="front-responses")])
 
@@ -156,7 +163,7 @@ def _motion(content: Content) -> Html | None:
     button = tag("button", "Play", id="motion-play", type="button")
     words = (
         "The last two revolutions. Orange: the contact forces on the rod's bearings. The circles are the clearance "
-        "circles."
+        "circles; a journal outside its circle has pressed itself into the bearing, which is drawn larger as well."
     )
     return join(
         [

@@ -149,13 +149,15 @@ def _cloud(axes: "Axes", variable: xr.DataArray, result: xr.DataArray, colour: A
     return drawn
 
 
-def binned(x: Array, y: Array, bins: int = 10) -> tuple[Array, Array]:
-    """Medians in bins of equally many x; fewer bins than asked for if there are few points."""
-    count = min(bins, len(x) // 5)
-    if count < 2:
+def binned(x: Array, y: Array, bins: int = 12) -> tuple[Array, Array]:
+    """Middles of bins of equal width and the median of y in them; bins of fewer than five points are left out."""
+    if len(x) < 10 or not np.ptp(x) > 0.0:
         return np.zeros(0), np.zeros(0)
-    parts = np.array_split(np.argsort(x, kind="stable"), count)
-    return np.array([np.median(x[p]) for p in parts]), np.array([np.median(y[p]) for p in parts])
+    edges = np.linspace(x.min(), x.max(), min(bins, len(x) // 5) + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
+    full = [k for k in range(len(edges) - 1) if (place == k).sum() >= 5]
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return middle[full], np.array([np.median(y[place == k]) for k in full])
 
 
 def _title(samples: xr.Dataset) -> str:

@@ -89,7 +89,7 @@ def _time_words(content: Content) -> list[str]:
     ranks = timing.sizes["rank"]
     return [
         f"{ranks} {'rank' if ranks == 1 else 'ranks'} worked on it, "
-        f"{spent['busy'] / total:.0%} of their time on computing."
+        f"{spent['busy'] / total:.0%} of {'its' if ranks == 1 else 'their'} time on computing."
     ]
 
 
@@ -218,22 +218,16 @@ def readings(content: Content) -> Html | None:
     found = content.get("readings")
     if found is None:
         return None
-    designs_ = [str(name) for name in found["design"].to_numpy()]
-    header = ["reading", *designs_, "distance"]
-    printed = (
-        [
-            quantity(float(v), str(found["mean_paper"].attrs["units"]))
-            for v in found["mean_paper"].to_numpy()
-        ]
-        if "mean_paper" in found
-        else []
-    )
-    rows: list[list[object]] = [["printed in the paper", *printed, Number("–")]] if printed else []
+    scale = labels.of(found["mean"])
+    names = [str(name) for name in found["design"].to_numpy()]
+    header = ["reading", *(scale.label(name) for name in names), "distance"]
+    rows: list[list[object]] = []
+    if "mean_paper" in found:
+        printed = [number(float(value) * scale.factor) for value in found["mean_paper"].to_numpy()]
+        rows.append(["printed in the paper", *printed, Number("–")])
     for k in range(found.sizes["reading"]):
         one = found.isel(reading=k)
-        cells = [
-            quantity(float(v), str(found["mean"].attrs["units"])) for v in one["mean"].to_numpy()
-        ]
+        cells = [number(float(value) * scale.factor) for value in one["mean"].to_numpy()]
         distance = number(float(one["distance"]), 3) if "distance" in one else Number("–")
         rows.append([one["reading"].item(), *cells, distance])
     words = (

@@ -36,7 +36,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
     across = labels.of(sensitivity["clearance"])
     for panel, surface in zip(axes.flat, surfaces, strict=False):
         _sensitivity_panel(panel, sensitivity.sel(surface=surface), across, unit)
-        panel.set_title(f"surface in {labels.literal(surface)}")
+        panel.set_title(f"surface in {_surface(surface)}")
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("slope × range"))
     _finish_grid(axes, len(surfaces), across.label("clearance $C$"))
@@ -69,7 +69,10 @@ def _sensitivity_panel(
         row += 1
     axes.axhline(0.0, color="black", lw=0.5)
     axes.margins(y=0.25)
-    axes.legend(loc="upper left", ncols=4, handlelength=1.4, columnspacing=0.8, borderaxespad=0.1)
+    columns = 3 if row > 4 else row
+    axes.legend(
+        loc="upper left", ncols=columns, handlelength=1.2, columnspacing=0.6, borderaxespad=0.0
+    )
 
 
 @style.drawn
@@ -98,7 +101,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
                 options: dict[str, Any] = {"marker": style.MARKERS[k % 7], "ms": 2.2, "lw": 0.7}
                 panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
             panel.set_ylabel(label)
-        line[0].set_title(f"surface in {labels.literal(surface)}")
+        line[0].set_title(f"surface in {_surface(surface)}")
         lowest = float(sensitivity["r2"].sel(surface=surface).min())
         line[0].set_ylim(
             max(-0.25, min(lowest, 0.75)) - 0.02, 1.03
@@ -109,7 +112,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
     handles, words = axes[0, 0].get_legend_handles_labels()
     title = "length of the interval, share of the whole"
     figure.legend(
-        handles, words, loc="outside lower center", ncols=6, title=title, columnspacing=1.0
+        handles, words, loc="outside lower center", ncols=3, title=title, columnspacing=1.0
     )
     style.settle(axes, 4)
     return figure
@@ -164,7 +167,7 @@ def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def surfaces_figure(kriging: xr.Dataset, levels: int = 12) -> "Figure":
+def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
     Parameters
@@ -208,7 +211,8 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 12) -> "Figure":
         for k, panel in enumerate(line):
             grid = (x * scales[0].factor, y * scales[1].factor, z[k].T * unit.factor)
             drawn = panel.contourf(*grid, levels=limits, cmap=style.COLOURS)
-            panel.contour(*grid, levels=limits, colors="white", linewidths=0.3)
+            lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
+            panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
             panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
             panel.tick_params(labelleft=k == 0)
             panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
@@ -274,8 +278,16 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     return figure
 
 
+def _surface(name: str) -> str:
+    """What a response surface is in."""
+    inputs = name.split()
+    return ", ".join(map(symbol, inputs)) if len(inputs) < 4 else f"{len(inputs)} variables"
+
+
 def symbol(name: str) -> str:
     """A design variable in a formula's letters, or its path shortened."""
+    if name.endswith("_ratio"):
+        return f"{symbol(name.removesuffix('_ratio'))} ratio"
     if len(name) == 2 and name[1].isdigit():
         return f"${name[0]}_{name[1]}$"
     if name == "C":
