@@ -16,16 +16,32 @@ SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.average
 
 def hpcclear(*words, timeout=300, module=False, **more):
     """Run a command in a process of its own."""
-    program = [sys.executable, "-m", "hpcclear"] if module else [str(Path(sys.executable).parent / "hpcclear")]
+    program = (
+        [sys.executable, "-m", "hpcclear"]
+        if module
+        else [str(Path(sys.executable).parent / "hpcclear")]
+    )
     return subprocess.run(
-        [*program, *map(str, words)], capture_output=True, text=True, timeout=timeout, cwd=ROOT, check=False, **more
+        [*program, *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        cwd=ROOT,
+        check=False,
+        **more,
     )
 
 
 def test_check_says_what_would_be_simulated():
     done = hpcclear("check", "jobs/slider_crank.toml", *SHORT)
     assert done.returncode == 0, done.stderr
-    for word in ("effect 1", "lankarani-nikravesh", "8 (positions", "force evaluations", "ms on one core"):
+    for word in (
+        "effect 1",
+        "lankarani-nikravesh",
+        "8 (positions",
+        "force evaluations",
+        "ms on one core",
+    ):
         assert word in done.stdout
     assert "Warning" in done.stdout  # the paper's own rod
     assert "\x1b" not in done.stdout  # no colours in a pipe
@@ -57,12 +73,21 @@ def test_both_entry_points_give_version_and_help():
     [
         (["check", "no_such_file.toml"], "no_such_file.toml"),
         (["check", "jobs/slider_crank.toml", "--set", "drive.spead=1"], "speed"),
-        (["check", "jobs/slider_crank.toml", "--set", "mechanism.rod.length=0.01"], "longer than the crank"),
+        (
+            ["check", "jobs/slider_crank.toml", "--set", "mechanism.rod.length=0.01"],
+            "longer than the crank",
+        ),
         (["simulate", "jobs/slider_crank.toml"], "--output"),
-        (["simulate", "jobs/slider_crank.toml", "-o", "/no/such/directory/x.nc"], "/no/such/directory"),
+        (
+            ["simulate", "jobs/slider_crank.toml", "-o", "/no/such/directory/x.nc"],
+            "/no/such/directory",
+        ),
         (["sample", "jobs/slider_crank.toml", "-o", "results/x.nc"], "study"),
         (["frobnicate"], "No such command"),
-        (["sample", "jobs/quickstart.toml", "-o", "results/x.nc", "--points", "README.md"], "README.md"),
+        (
+            ["sample", "jobs/quickstart.toml", "-o", "results/x.nc", "--points", "README.md"],
+            "README.md",
+        ),
     ],
 )
 def test_bad_input_is_one_message_and_exit_code_2(words, fragment):
@@ -94,7 +119,12 @@ def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
         launcher = [str(mpiexec), "-n", str(ranks)] if ranks else []
         command = [*launcher, str(program), "sample", "jobs/quickstart.toml", "-o", str(out)]
         done = subprocess.run(
-            [*command, "--set", "study.samples=150"], capture_output=True, text=True, timeout=300, cwd=ROOT, check=False
+            [*command, "--set", "study.samples=150"],
+            capture_output=True,
+            text=True,
+            timeout=300,
+            cwd=ROOT,
+            check=False,
         )
         assert done.returncode == 0, done.stderr
         files.append(out.read_bytes())
@@ -103,7 +133,16 @@ def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
 
 def test_repeating_a_finished_command_does_nothing_and_another_scene_is_refused(tmp_path):
     out = tmp_path / "samples.nc"
-    words = ["sample", "jobs/quickstart.toml", "-o", out, "--set", "study.samples=40", "--progress", "quiet"]
+    words = [
+        "sample",
+        "jobs/quickstart.toml",
+        "-o",
+        out,
+        "--set",
+        "study.samples=40",
+        "--progress",
+        "quiet",
+    ]
     assert hpcclear(*words).returncode == 0
     before = (out.read_bytes(), os.stat(out).st_mtime_ns)
     assert hpcclear(*words).returncode == 0

@@ -52,7 +52,9 @@ def test_well_posed_scenes_state_a_small_uncertainty():
 
 
 def test_automatic_average_meets_its_target_or_says_that_it_did_not():
-    scene = load_scene(SCENE, ["numerics.averaged_revolutions=auto", "numerics.objective_tolerance=2e-3"])
+    scene = load_scene(
+        SCENE, ["numerics.averaged_revolutions=auto", "numerics.objective_tolerance=2e-3"]
+    )
     points = latin_hypercube(scene, 32)
     loose = evaluate_records(scene, points)
     assert set(loose["status"]) <= {Status.OK, Status.AVERAGE_CAP}
@@ -93,5 +95,7 @@ def test_an_impact_just_before_the_end_of_a_revolution_is_met():
         ],
     )
     for method in ("auto", "fehlberg"):
-        record = evaluate_records(scene.with_({"numerics.method": method}), as_points(scene, {"m1": 0.3}), 1)
+        record = evaluate_records(
+            scene.with_({"numerics.method": method}), as_points(scene, {"m1": 0.3}), 1
+        )
         assert record["status"] == Status.OK

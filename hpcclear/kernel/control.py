@@ -28,7 +28,7 @@ def choose_step(work, par, torque, W):
         h = work[at.NEXT_STEP * W + i]
         if torque is None:
             left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
-            # Never stretched by more than round-off: a step cut to end at an impact must stay cut, or it is tried for ever.
+            # Stretched by round-off at most: a step cut to end at an impact must stay cut, or is tried for ever.
             ending = 1.0 if h * (1.0 + 1e-12) >= left else 0.0
             h = left if h * (1.0 + 1e-12) >= left else h
             work[at.ENDING * W + i] = ending
@@ -153,10 +153,28 @@ def commit(crank_rod, rod_slider, latched, ledger, work, stages, n, W):
     ended = 0.0
     for i in range(W):
         commit_joint(
-            crank_rod, latched, work, at.GAP_12, at.ACTIVE_12, at.PEAK_12, at.DEEPEST_12, at.ENDED_12, i, W
+            crank_rod,
+            latched,
+            work,
+            at.GAP_12,
+            at.ACTIVE_12,
+            at.PEAK_12,
+            at.DEEPEST_12,
+            at.ENDED_12,
+            i,
+            W,
         )
         commit_joint(
-            rod_slider, latched, work, at.GAP_23, at.ACTIVE_23, at.PEAK_23, at.DEEPEST_23, at.ENDED_23, i, W
+            rod_slider,
+            latched,
+            work,
+            at.GAP_23,
+            at.ACTIVE_23,
+            at.PEAK_23,
+            at.DEEPEST_23,
+            at.ENDED_23,
+            i,
+            W,
         )
         commit_ledger(ledger, work, i, W)
         accept = work[at.ACCEPT * W + i]

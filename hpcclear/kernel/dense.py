@@ -1,4 +1,4 @@
-"""Small dense systems, real and complex, inside one flat buffer: factorised in place with row exchanges, solved in place.
+"""Small dense systems, real and complex, inside one flat buffer: factorised with row exchanges, solved in place.
 
 Too small for LAPACK (n <= 9): its calls would cost more than the arithmetic. Complex numbers are held as real and
 imaginary parts, which keeps their multiplication free of the checks for infinities. Matrices are ``m[a + r n + c]``.

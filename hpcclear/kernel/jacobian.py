@@ -12,7 +12,7 @@ _RELATIVE = 1.5e-8  # square root of the round-off
 
 @scalar_function
 def evaluate_lane(effects, m, par, torque_table, load_table):
-    """Accelerations and rates of one lane at the stage held in its own `m` (WORK rows first) and `par` (PARAMETERS,)."""
+    """Accelerations and rates of one lane at the stage held in its own `m` (WORK rows first) and `par`."""
     lane_motion(
         effects,
         effects.crank_rod,
@@ -32,8 +32,8 @@ def difference_jacobian(effects, size, m, par, torque_table, load_table, start, 
     """Partial derivatives of the accelerations at the stage held in `m`; accelerations and rates there are overwritten.
 
     The length of `size` is the number n of coordinates. Offsets in `m`: `start`, the accelerations at this stage;
-    `least`, sizes of coordinates, then velocities, below which an increment shrinks no further (2 n); `by_q` and `by_v`,
-    where d a_r / d q_k and d a_r / d v_k go (at r n + k).
+    `least`, sizes of coordinates, then velocities, below which an increment shrinks no further (2 n); `by_q`
+    and `by_v`, where d a_r / d q_k and d a_r / d v_k go (at r n + k).
     """
     n = len(size)
     for k in range(2 * n):

@@ -1,4 +1,4 @@
-"""A lane's life, in scalar code run for few lanes at a time: take a sample, stop at impacts, end revolutions, finish."""
+"""A lane's life, in scalar code for few lanes at a time: take a sample, stop at impacts, end revolutions, finish."""
 
 import math
 
@@ -38,7 +38,9 @@ SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 (NEXT_SLOT, SLOTS, FINISHED, RECORDED) = range(4)
 COUNTERS = 4
 
-STATE = 2 * at.MAX_COORDINATES + 4  # of a queued sample: coordinates, velocities, active flags, 1/d'_0
+STATE = (
+    2 * at.MAX_COORDINATES + 4
+)  # of a queued sample: coordinates, velocities, active flags, 1/d'_0
 
 
 @lane_event
@@ -205,7 +207,11 @@ def end_turn_of_free_crank(lane, W, work, settings, last):
         h = work[at.STEP * W + lane]
         before = work[(at.Q + last) * W + lane] - at.TURN
         fraction = impact_fraction(
-            before, h * work[(at.V + last) * W + lane], beyond, h * work[(at.VS + last) * W + lane], 0.0
+            before,
+            h * work[(at.V + last) * W + lane],
+            beyond,
+            h * work[(at.VS + last) * W + lane],
+            0.0,
         )
         work[at.ACCEPT * W + lane] = 0.0
         work[at.NEXT_STEP * W + lane] = fraction * h
@@ -237,7 +243,9 @@ def verdict(lane, W, book, settings):
     shift = mean - book[at.FIRST_F * W + lane]
     total = averaged * shift
     last = book[at.LAST_F * W + lane] - book[at.FIRST_F * W + lane]
-    lag = book[at.LAG_F * W + lane] - shift * (2.0 * total - last) + (averaged - 1.0) * shift * shift
+    lag = (
+        book[at.LAG_F * W + lane] - shift * (2.0 * total - last) + (averaged - 1.0) * shift * shift
+    )
     error = standard_error(averaged, book[at.M2_F * W + lane], lag)
     if error <= settings[OBJECTIVE_TOLERANCE] * mean:
         return OK
@@ -262,7 +270,9 @@ def end_revolution(lane, W, work, book, settings):
         if count == 1.0:
             book[at.FIRST_F * W + lane] = f
         first = book[at.FIRST_F * W + lane]
-        book[at.LAG_F * W + lane] += (f - first) * (book[at.LAST_F * W + lane] - first) * (count > 1.0)
+        book[at.LAG_F * W + lane] += (
+            (f - first) * (book[at.LAST_F * W + lane] - first) * (count > 1.0)
+        )
         book[at.LAST_F * W + lane] = f
         step = f - book[at.MEAN_F * W + lane]
         mean = book[at.MEAN_F * W + lane] + step / count

@@ -175,7 +175,15 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                         start_state(work, n, W)
                     else:
                         any_stage_state(
-                            work, stages, weights, weights[s], A + s * count, AA + s * count, n, s, W
+                            work,
+                            stages,
+                            weights,
+                            weights[s],
+                            A + s * count,
+                            AA + s * count,
+                            n,
+                            s,
+                            W,
                         )
                     begin_stage(work, par, effects.torque, weights[s], W)
                     accelerations(effects, work, par, torque_table, load_table, W)
@@ -195,7 +203,12 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                     effects, size, work, stages, par, torque_table, load_table, memory, settings, W
                 )
             special = judge_step(
-                work, settings[EXPONENT], settings[BETA], settings[MAX_STEPS], settings[SMALLEST_STEP], W
+                work,
+                settings[EXPONENT],
+                settings[BETA],
+                settings[MAX_STEPS],
+                settings[SMALLEST_STEP],
+                W,
             )
             special += flag_gaps(
                 effects.crank_rod, effects.rod_slider, effects.torque, effects.latched,
@@ -208,12 +221,16 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                         if status == OK and work[at.ACCEPT * W + i] == 1.0:
                             impacts(effects.latched, i, W, work, settings)
                             if work[at.ACCEPT * W + i] == 1.0:
-                                status = free_crank_turn(effects.torque, i, W, work, settings, n - 1)
+                                status = free_crank_turn(
+                                    effects.torque, i, W, work, settings, n - 1
+                                )
                             integrate_gap(i, W, work, at.GAP_12)
                             integrate_gap(i, W, work, at.GAP_23)
                         if status != OK:
                             finish(i, W, n, status, work, book, out, finished, counters)
-                            load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
+                            load(
+                                i, W, n, work, par, book, queue_par, queue_state, counters, settings
+                            )
                             running += work[at.RUNNING * W + i] - 1.0
             ended = commit(
                 effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
@@ -222,12 +239,17 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
             full = record_step(record, counters, work, stages, book, n, W)
             if ended > 0.0:
                 for i in range(W):
-                    if work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i] == 1.0:
+                    if (
+                        work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
+                        == 1.0
+                    ):
                         wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
                         status = end_revolution(i, W, work, book, settings)
                         if status != UNFINISHED:
                             finish(i, W, n, status, work, book, out, finished, counters)
-                            load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
+                            load(
+                                i, W, n, work, par, book, queue_par, queue_state, counters, settings
+                            )
                             running += work[at.RUNNING * W + i] - 1.0
             if full:
                 break

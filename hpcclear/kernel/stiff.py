@@ -132,7 +132,14 @@ def take_over(size, lane, W, work, par, m, settings):
 def fetch(effects, size, lane, W, work, stages, m, p, torque_table, load_table, settings):
     """Bring the start of the step into the lane's memory: state, contact state, accelerations, tolerances."""
     n = len(size)
-    for row in (at.TIME, at.STEP, at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+    for row in (
+        at.TIME,
+        at.STEP,
+        at.ACTIVE_12,
+        at.ACTIVE_23,
+        at.INVERSE_IMPACT_12,
+        at.INVERSE_IMPACT_23,
+    ):
         m[row] = work[row * W + lane]
     for k in range(n):
         m[at.Q + k] = work[(at.Q + k) * W + lane]
@@ -410,7 +417,9 @@ def leave(effects, size, lane, W, work, m):
 
 
 @scalar_function
-def implicit_step(effects, size, lane, W, work, stages, par, torque_table, load_table, memory, settings):
+def implicit_step(
+    effects, size, lane, W, work, stages, par, torque_table, load_table, memory, settings
+):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step into its rows."""
     m = memory[lane]
     p = m[PAR : PAR + at.PARAMETERS]
@@ -526,13 +535,25 @@ def settle_methods(memory, settings, work, W):
 
 
 @lane_function
-def take_implicit_steps(effects, size, work, stages, par, torque_table, load_table, memory, settings, W):
+def take_implicit_steps(
+    effects, size, work, stages, par, torque_table, load_table, memory, settings, W
+):
     """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
     if memory is not None:
         for i in range(W):
             if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
                 implicit_step(
-                    effects, size, i, W, work, stages, par, torque_table, load_table, memory, settings
+                    effects,
+                    size,
+                    i,
+                    W,
+                    work,
+                    stages,
+                    par,
+                    torque_table,
+                    load_table,
+                    memory,
+                    settings,
                 )
 
 
@@ -564,4 +585,6 @@ def sense_stiffness(memory, work, stages, weights, last, atol, n, terms, W):
             score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5
             work[at.EDGE_SCORE * W + i] = max(score, 0.0)
             rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
-            work[at.REJECTION_SCORE * W + i] = REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
+            work[at.REJECTION_SCORE * W + i] = (
+                REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
+            )
