@@ -12,7 +12,15 @@ import numpy as np
 import xarray as xr
 
 from . import dataset, storage
-from .checkpoint import INTERVAL, Checkpoint, check_key, fresh_sibling, key_attribute, parts_of
+from .checkpoint import (
+    INTERVAL,
+    Checkpoint,
+    check_key,
+    discard,
+    fresh_sibling,
+    key_attribute,
+    parts_of,
+)
 from .errors import InputError
 from .lock import Lock
 from .progress import Progress, Style
@@ -107,6 +115,7 @@ def run_sample(
         samples = finished(output, key)
         if samples is None:
             samples = _simulate(scene, points, output, key, ranks, interval, style)
+        discard(parts_of(output))  # the run that finished may have been killed before it could
     timing = output.parent / "timing.nc"
     if ranks.stage_seconds or not timing.exists():  # who finds all done keeps what was measured
         dataset.write(timing_of(ranks), timing)
@@ -125,7 +134,7 @@ def _simulate(
     interval: float,
     style: Style,
 ) -> xr.Dataset:
-    """Simulate what is not finished yet, write the dataset, drop the checkpoint."""
+    """Simulate what is not finished yet, and write the dataset."""
     units = dict(zip(points.names, points.units, strict=True))
     chosen, reason = scene, ""
     if scene.numerics.target_error is not None:
@@ -150,7 +159,6 @@ def _simulate(
     )
     with ranks.stage("files"), ranks.writing():
         dataset.write(samples, output)
-        checkpoint.finish()
     return samples
 
 

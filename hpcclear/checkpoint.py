@@ -115,6 +115,26 @@ def fresh_sibling(path: Path) -> Path:
         number += 1
 
 
+def discard(directory: Path) -> None:
+    """Remove what a `Checkpoint` wrote in a directory, and the directory unless more is in it.
+
+    Raises
+    ------
+    InputError, StorageError
+        The disk refuses.
+    """
+    try:
+        if directory.is_symlink() or not directory.is_dir():
+            return
+        for path in sorted(directory.iterdir()):
+            if any(form.fullmatch(path.name) for form in (_PART, _STAGE, storage.TEMPORARY)):
+                path.unlink(missing_ok=True)
+        if not any(directory.iterdir()):
+            directory.rmdir()
+    except OSError as error:
+        raise storage.refused(directory, error) from None
+
+
 @dataclass
 class _Part:
     level: int
@@ -307,14 +327,10 @@ class Checkpoint:
 
     def finish(self) -> None:
         """Remove all that was written here; call it when the final file is in place."""
-        with self._timed(), self._refusing():
-            for path in sorted(self.directory.iterdir()):
-                if any(form.fullmatch(path.name) for form in (_PART, _STAGE, storage.TEMPORARY)):
-                    path.unlink(missing_ok=True)
+        with self._timed():
+            discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
-            if not any(self.directory.iterdir()):
-                self.directory.rmdir()
 
     def _open(self) -> int:
         """Read the parts that are there; the number of the next one."""

@@ -226,7 +226,9 @@ def run(
     required=True,
     help="Directory for accuracy.nc and the figures.",
 )
-@click.option("--quick", is_flag=True, help="A look in about a minute instead of the whole picture.")
+@click.option(
+    "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
+)
 def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) -> int:
     """Show what accuracy costs in time: integration, averaging, surrogates, Monte Carlo, ranks.
 

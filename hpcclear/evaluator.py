@@ -141,7 +141,9 @@ def outcome_records(labels: NDArray[np.int64], rows: Array, par: Array) -> NDArr
         records[name][~valid] = np.nan
     latched = rows[:, [at.OUT_LATCHED_12, at.OUT_LATCHED_23]] == 1.0
     records["latched"] = latched & valid[:, None]
-    flags = int(Flag.LATCHED) * latched.any(axis=1) + int(Flag.BEYOND_HERTZ) * beyond_hertz(rows, par)
+    flags = int(Flag.LATCHED) * latched.any(axis=1) + int(Flag.BEYOND_HERTZ) * beyond_hertz(
+        rows, par
+    )
     flags += int(Flag.STIFF) * (rows[:, at.OUT_STIFF_STEPS] > 0.0)
     records["flags"] = np.where(valid, flags, 0)
     return records

@@ -214,7 +214,9 @@ def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]
     if first or second:
         slider = seen[:, rows[-1]]
     else:
-        rigid = ideal.ideal_response(problem.effects, par, problem.load_table, phi, omega, seen[:, n - 1])
+        rigid = ideal.ideal_response(
+            problem.effects, par, problem.load_table, phi, omega, seen[:, n - 1]
+        )
         slider = rigid[ideal.SLIDER_A]
     m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
     data |= _series(scene, m, par, seen, n, contacts, works)
@@ -242,7 +244,9 @@ def _series(
     rates = seen[:, n:]
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
     gaps = np.where(open_, rates[:, [at.GAP_12, at.GAP_23]], 0.0)
-    stiffness = np.where(open_, par[[at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS]], 0.0)
+    stiffness = np.where(
+        open_, par[[at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS]], 0.0
+    )
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
     elastic = geometry.elastic_energy(gaps, active, stiffness)

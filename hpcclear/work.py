@@ -125,11 +125,16 @@ def sample_points(
         completed = completed[inside]
         completed["sample"] -= first
 
+    refused = False
+
     def keep(records: np.ndarray) -> None:
+        nonlocal refused
         if checkpoint is not None:
             numbered = records.copy()
             numbered["sample"] += first
+            refused = True  # until it was not: a write that fails is not tried again on the way out
             checkpoint.add(numbered, points.values[records["sample"]])
+            refused = False
 
     try:
         records = ranks.run_points(
@@ -142,7 +147,7 @@ def sample_points(
             progress=progress,
         )
     except BaseException:
-        if checkpoint is not None:
+        if checkpoint is not None and not refused:
             with ranks.stage(stage), ranks.writing():
                 checkpoint.flush()
         raise

@@ -256,7 +256,7 @@ AFTER = [
     "call hpcclear.checkpoint:Checkpoint.flush 2",
     "call hpcclear.progress:Progress.add 5",
     "call hpcclear.dataset:samples_dataset 2",
-    "call hpcclear.checkpoint:Checkpoint.finish",
+    "call hpcclear.batch:discard",
     "call hpcclear.batch:timing_of",
     "call hpcclear.describe:describe_samples",
 ]
@@ -304,7 +304,7 @@ def test_a_program_error_at_any_stage_is_reported_once_and_work_is_saved(
 ):
     before, again = fail_and_resume(place, undisturbed, case, rank)
     # What root was told of is saved; a rank may die with what it had not sent yet.
-    limit = 0 if case in BEFORE + AFTER[2:] else 1500
+    limit = 0 if case in BEFORE + AFTER[3:] else 1500
     assert again <= limit, f"{again} of {before} samples were simulated again"
 
 

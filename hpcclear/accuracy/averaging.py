@@ -57,15 +57,17 @@ class Averaging:
 
 def measure(scene: Scene, profile: Profile) -> Averaging:
     """Run the copies and compare short averages with the long one."""
-    gaps, seconds = revolutions_of(scene, profile.copies, profile.revolutions)
-    half = profile.revolutions // 2
-    transient = doubling(half // 2, start=0)
-    averaged = doubling(half // 2, start=1)
+    return analyse(*revolutions_of(scene, profile.copies, profile.revolutions))
+
+
+def analyse(gaps: Array, seconds: float) -> Averaging:
+    """The panel from mean gaps (revolutions, copies, 2 joints); the second half of the run counts as the truth."""
+    half = len(gaps) // 2
+    transient, averaged = doubling(half // 2, start=0), doubling(half // 2, start=1)
     late = objective(gaps[half:].mean(axis=0))  # (copies,)
     truth = late.mean()
     error = np.array([[_error(gaps, t, a, truth) for a in averaged] for t in transient])
-    floor = late.std(ddof=1) / truth
-    return Averaging(transient, averaged, error, float(floor), seconds)
+    return Averaging(transient, averaged, error, float(late.std(ddof=1) / truth), seconds)
 
 
 def doubling(most: int, start: int) -> NDArray[np.int64]:

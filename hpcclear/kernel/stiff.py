@@ -15,9 +15,9 @@ import numpy as np
 
 from ..jit import lane_function, scalar_function
 from . import layout as at
+from .control import count_up
 from .dense import factorise, factorise_complex, solve, solve_complex
 from .jacobian import difference_jacobian, evaluate_lane
-from .control import count_up
 from .lifecycle import ATOL, IMPLICIT, RTOL
 
 _S6 = math.sqrt(6.0)
