@@ -319,7 +319,7 @@ def newton(effects, size, m, p, torque_table, load_table, h):
 
 @scalar_function
 def filtered_error(size, m, h):
-    """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in CHANGE (v, then q).
+    """Error estimate of order 3 in CHANGE (v, then q), filtered by the real system so that stiff parts do not spoil it.
 
     Reads the accelerations at the start and shifts of the velocities there from FORCE on. Returns the sum of the
     scaled squares.
@@ -566,7 +566,6 @@ def sense_stiffness(memory, work, stages, weights, last, atol, n, terms, W):
     """
     if memory is not None:
         for i in range(W):
-            h = work[at.STEP * W + i]
             forces = 0.0
             speeds = 1e-300
             for k in range(n):
