@@ -41,7 +41,7 @@ def test_evaluate_takes_paper_names_and_paths():
 
 def test_evaluate_refuses_what_makes_no_mechanism():
     scene = hpcclear.load_scene(SCENE, SHORT)
-    with pytest.raises(InputError, match="sample 1.*clearance as large"):
+    with pytest.raises(InputError, match=r"sample 1.*clearance as large"):
         hpcclear.evaluate(scene, {"C": [3e-4, 0.05]})
     with pytest.raises(InputError, match="nothing"):
         hpcclear.evaluate(scene, {})
