@@ -29,6 +29,7 @@ class Effects(NamedTuple):
     baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
+    sliding: Any = None  # sliding speeds, for the implicit method
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
@@ -80,7 +81,8 @@ PARAMETERS = 47
 (GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(6, 10)
 (FRICTION_12, FRICTION_23, DRIVE_MOMENT) = range(10, 13)  # for time series only
-RATES = 13
+(SLIDING_12, SLIDING_23) = range(13, 15)  # for the implicit method only
+RATES = 15
 
 # ---- lane state and scratch ---------------------------------------------------------------------
 Q = 0  # coordinates at the start of the step
@@ -120,13 +122,14 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     SPECIAL,  # 1 when this step needs a look by the scalar code
     ENDING,  # 1 when this step ends the revolution
     STIFF,  # 1 while the implicit method runs this lane
+    EDGE_EXCESS,  # positive where the step is at the edge of stability
     EDGE_SCORE,  # of explicit steps at the edge of stability
     REJECTION_SCORE,  # of rejected explicit steps
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 31)
-WORK = INTEGRAL + RATES + 31
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 32)
+WORK = INTEGRAL + RATES + 32
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (

@@ -167,14 +167,15 @@ def joint_force(
     work[(at.RATE_NOW + row) * W + i] = gap
     work[(at.RATE_NOW + row + 1) * W + i] = normal
     work[(at.RATE_NOW + row + 2) * W + i] = rate
-    store_friction(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
+    store_rate(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
+    store_rate(effects.sliding, work, at.SLIDING_12 + row // 3, sliding, i, W)
     return fx, fy, moment_bearing, -moment_journal, loss
 
 
 @lane_function
-def store_friction(series, work, row, tangential, i, W):
-    if series is not None:
-        work[(at.RATE_NOW + row) * W + i] = tangential
+def store_rate(flag, work, row, value, i, W):
+    if flag is not None:
+        work[(at.RATE_NOW + row) * W + i] = value
 
 
 @lane_function
