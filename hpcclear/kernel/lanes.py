@@ -30,8 +30,8 @@ from .lifecycle import (
     STATE,
     TRANSIENT,
 )
-from .stepper import make_stepper
 from .memory import MEMORY
+from .stepper import make_stepper
 from .tableau import Tableau
 
 Array = NDArray[np.float64]
@@ -130,10 +130,14 @@ class Lanes:
         # absent, it keeps the implicit method from being compiled
         self._memory = None if problem.implicit == "never" else np.zeros((width, MEMORY))
         self._effects = problem.effects._replace(sliding=None if self._memory is None else 1)
-        self._tables = [_NO_TABLE if t is None else t for t in (problem.torque_table, problem.load_table)]
+        self._tables = [
+            _NO_TABLE if t is None else t for t in (problem.torque_table, problem.load_table)
+        ]
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
-        self._accept_queue(np.empty((0, at.PARAMETERS)), np.empty((0, STATE)), np.empty(0, np.int64))
+        self._accept_queue(
+            np.empty((0, at.PARAMETERS)), np.empty((0, STATE)), np.empty(0, np.int64)
+        )
 
     def _accept_queue(self, par: Array, state: Array, labels: NDArray[np.int64]) -> None:
         self._queue_par = np.ascontiguousarray(par)
