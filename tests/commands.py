@@ -51,7 +51,7 @@ def start(
     )
 
 
-def finish(job: subprocess.Popen, seconds: float = 120.0) -> tuple[int, str]:
+def finish(job: subprocess.Popen, seconds: float = 400.0) -> tuple[int, str]:
     """Exit code and output; a job that does not end in time is killed and fails the test."""
     try:
         output, _ = job.communicate(timeout=seconds)
