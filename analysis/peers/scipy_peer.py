@@ -53,7 +53,23 @@ def _solver(method: str) -> Callable[[Setup, int], float]:
     return solve
 
 
+_MOST_EVALUATIONS = 200_000  # a contact latched at a small speed is stiff: explicit steps crawl
+
+
+class _TooSlow(Exception):
+    """More evaluations than a revolution is worth."""
+
+
 def _from_event_to_event(setup: Setup, sample: int, method: str) -> float:
+    evaluations = 0
+
+    def rates(t, y, p, active, inverse):
+        nonlocal evaluations
+        evaluations += 1
+        if evaluations > _MOST_EVALUATIONS:
+            raise _TooSlow
+        return _latched_rates(t, y, p, active, inverse)
+
     p, y, t, end = setup.par[sample], start(setup, sample), 0.0, end_time(setup, sample)
     active, inverse = np.zeros(2, bool), np.zeros(2)
     while t < end:
@@ -65,16 +81,19 @@ def _from_event_to_event(setup: Setup, sample: int, method: str) -> float:
 
             event.terminal, event.direction = True, -1.0 if active[j] else 1.0
             events.append(event)
-        result = solve_ivp(
-            _latched_rates,
-            (t, end),
-            y,
-            method,
-            args=(p, active, inverse),
-            events=events,
-            rtol=setup.problem.rtol,
-            atol=tolerances(setup),
-        )
+        try:
+            result = solve_ivp(
+                rates,
+                (t, end),
+                y,
+                method,
+                args=(p, active, inverse),
+                events=events,
+                rtol=setup.problem.rtol,
+                atol=tolerances(setup),
+            )
+        except _TooSlow:
+            return float("nan")
         t, y = float(result.t[-1]), result.y[:, -1]
         if result.status < 0:
             return float("nan")
