@@ -44,6 +44,7 @@ ROWS = 22
 BLOCK = 64
 """Instants side by side, so that the compiler vectorises over them."""
 
+_PANELS = 8  # between two instants
 # nodes and weights on [0, 1] of Gauss's rule with five points, for works between instants
 _NODES, _WEIGHTS = (
     0.5 * (np.polynomial.legendre.leggauss(5)[0] + 1.0),
@@ -173,10 +174,13 @@ def ideal_works(effects: at.Effects, par: Array, load_table: Array | None, angle
     """Works since the first instant at prescribed speed, shape (4, instants), J.
 
     Rows: work of the drive, integral of the size of its power, energy dissipated in the guide, work of the load.
-    `angle` rises. Gauss's rule with five points between instants.
+    `angle` rises. Gauss's rule with five points in each of `_PANELS` panels between instants: with a rod hardly
+    longer than the crank the powers peak sharply near the dead centres.
     """
     step = np.diff(angle)
-    nodes = (angle[:-1, None] + step[:, None] * _NODES).ravel()
+    inside = ((np.arange(_PANELS)[:, None] + _NODES) / _PANELS).ravel()
+    weights = np.tile(_WEIGHTS, _PANELS) / _PANELS
+    nodes = (angle[:-1, None] + step[:, None] * inside).ravel()
     seen = ideal_response(effects, par, load_table, nodes)
     drive = seen[CRANK_MOMENT] * par[at.SPEED]
     powers = [
@@ -185,9 +189,7 @@ def ideal_works(effects: at.Effects, par: Array, load_table: Array | None, angle
         seen[GUIDE_FRICTION] * seen[SLIDER_V],
         seen[LOAD_FORCE] * seen[SLIDER_V],
     ]
-    during = (
-        np.array([p.reshape(-1, len(_NODES)) @ _WEIGHTS for p in powers]) * step / par[at.SPEED]
-    )
+    during = np.array([p.reshape(-1, len(inside)) @ weights for p in powers]) * step / par[at.SPEED]
     return np.concatenate([np.zeros((4, 1)), during.cumsum(axis=1)], axis=1)
 
 
