@@ -70,7 +70,7 @@ def classical_turn(
     work, out, seen = np.zeros(at.WORK), np.empty(len(y)), np.zeros((2, 3))
     stage, total = y.copy(), np.empty(len(y))
     h = par[at.PERIOD] / steps
-    time, peak, count, step, corrections, s = 0.0, 0.0, 0, 0, 0, 0
+    time, peak, count, step, corrections, s, last = 0.0, 0.0, 0, 0, 0, 0, False
     while True:
         c = 0.0 if s == 0 else (1.0 if s == 3 else 0.5)
         derivative(
@@ -91,8 +91,7 @@ def classical_turn(
             if latched and latch(contacts, seen, floor):
                 continue  # the force has jumped: the first stage anew
             peak = max(peak, max(seen[0, FORCE], seen[1, FORCE]))
-            finished = corrections > 0 if free else step >= steps
-            if finished or step >= 1000 * steps or not np.isfinite(out[n]):
+            if last or step >= 1000 * steps or not np.isfinite(out[n]):
                 return time, peak, count
             total[:] = 0.0
         ahead = 0.5 if s < 2 else 1.0
@@ -112,6 +111,7 @@ def classical_turn(
             else:
                 time += h
                 step += 1
+                last = beyond or (step == steps and not free)
                 y[:] = stage
 
 

@@ -214,6 +214,8 @@ def solve_turn(
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
     here, start = Equations(one.problem, one.par, np.zeros(at.WORK)), one.start.copy()
     here.contacts[:] = one.contacts
+    effects = one.problem.effects
+    joints = [j for j, on in enumerate((effects.crank_rod, effects.rod_slider)) if on is not None]
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     end = np.inf if one.free else one.par[at.PERIOD]
     limit = 20.0 * one.par[at.PERIOD] if one.free else end
@@ -222,7 +224,7 @@ def solve_turn(
     t, y, peak, count = 0.0, start, 0.0, 0
     for _ in range(100_000):
         gaps = here.joints(t, y)[:, OPEN].copy()
-        events = [_crossing(here, j, side[j], gaps[j]) for j in range(2)]
+        events = [_crossing(here, j, side[j], gaps[j]) for j in joints]
         if one.free:
             events.append(_full_turn(one.n))
         piece = solve_ivp(
@@ -232,12 +234,14 @@ def solve_turn(
         count += piece.nfev
         peak = max(peak, _largest_force(here, piece))
         t, y = piece.t[-1], piece.y[:, -1].copy()
-        hit = [j for j, when in enumerate(piece.t_events) if len(when)]
+        hit = [k for k, when in enumerate(piece.t_events) if len(when)]
         if piece.status < 0:
             return (np.nan,) * 4, count
-        if piece.status == 0 or 2 in hit:
+        if (
+            piece.status == 0 or len(joints) in hit
+        ):  # the event after those of the joints: a full turn
             return _values(scene, one, y, t, peak), count
-        for j in hit:
+        for j in (joints[k] for k in hit):
             side[j] = -side[j]
             if here.latched:
                 here.contacts[j] = float(side[j] > 0.0)

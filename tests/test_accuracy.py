@@ -1,0 +1,247 @@
+"""What accuracy costs: orders of the methods, the reference, and each panel against closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from hpcclear import dataset
+from hpcclear.accuracy import averaging, integration, random_inputs, surrogate
+from hpcclear.accuracy.methods import LARGEST_STEP, QUANTITIES
+from hpcclear.accuracy.printing import advice, describe, resolution
+from hpcclear.accuracy.profile import FULL, QUICK, Profile
+from hpcclear.accuracy.resting import MAKERS, Resting
+from hpcclear.accuracy.run import measure
+from hpcclear.accuracy.standin import with_case
+from hpcclear.comm import alone
+from hpcclear.errors import InputError
+from hpcclear.report import accuracy_figures, style
+from hpcclear.scene import load_scene
+from hpcclear.surrogate.kriging import fit_kriging
+
+JOBS = Path(__file__).parent.parent / "jobs"
+PAPER = load_scene(JOBS / "slider_crank.toml")
+TWIN = load_scene(JOBS / "hunt_crossley.toml")
+
+# A load that never lets the journals leave their bearings, and friction without a corner: every law is smooth along the
+# whole revolution.
+PRESSED = TWIN.with_(
+    {
+        "drive.speed": "3000 rpm",
+        "effects.slider_load": -6000.0,
+        "effects.friction": {"law": "coulomb", "coefficient": 0.05, "ramp_speed": 1e3},
+        "joints.crank_rod.start_eccentricity": [0.65e-3, 0.0],
+        "joints.rod_slider.start_eccentricity": [-0.65e-3, 0.0],
+    }
+)
+
+TINY = Profile(
+    name="tiny",
+    rungs=(1e-3, 1e-5, 1e-7),
+    designs=1,
+    repeats=1,
+    outside_repeats=1,
+    more_methods=False,
+    revolutions=16,
+    copies=4,
+    training=(20, 40),
+    tests=20,
+    draws=(16, 64),
+    blocks=8,
+    simulations=256,
+    strong_seconds=0.1,
+)
+
+
+def silent(text: str) -> None:
+    """Nothing is told."""
+
+
+# ---- integration ----------------------------------------------------------------------------------
+
+
+def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
+    profile = Profile(**{**vars(TINY), "rungs": tuple(10.0 ** (-k / 2.0) for k in range(14, 22))})
+    found = integration.measure(PRESSED, profile, silent)
+    velocity = found.order[:, QUANTITIES.index("slider_velocity")]
+    order = dict(zip(found.methods, velocity, strict=True))
+    assert order["dormand-prince"] == pytest.approx(5.0, abs=0.6)
+    assert order["dormand-prince, 32 lanes"] == order["dormand-prince"]
+    assert order["fehlberg"] == pytest.approx(4.0, abs=0.5)
+    assert order["RK4, fixed steps"] == pytest.approx(4.0, abs=0.5)
+    assert order["DOP853 (scipy)"] == pytest.approx(8.0, abs=0.8)
+
+
+def test_the_slope_of_a_known_power_is_found_and_what_is_not_resolved_is_left_out():
+    work = 100.0 * 2.0 ** np.arange(8)
+    errors = 1e-2 * (work / work[0]) ** -3.0
+    assert integration.observed_order(work, errors, 0.0) == pytest.approx(3.0)
+    stalled = np.maximum(errors, 1e-6)
+    assert integration.observed_order(work, stalled, 2e-6) == pytest.approx(3.0)
+    assert np.isnan(integration.observed_order(work, errors, 1.0))
+
+
+def test_the_reference_is_the_published_one_and_two_ways_to_it_agree():
+    """Two independent prototypes and Exudyn, after one revolution: slider position, velocity, objective."""
+    reference = integration.reference_of(PAPER, 1)
+    position, velocity, _, objective = reference.values[0]
+    assert position == pytest.approx(0.170909697445, abs=1e-9)
+    assert velocity == pytest.approx(0.553755970, abs=1e-5)
+    assert objective == pytest.approx(0.28753013e-3, rel=1e-6)
+    assert (reference.error < 1e-9).all()
+
+
+def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better():
+    found = integration.measure(TWIN, TINY, silent)
+    best = found.error[0, :, :]  # dormand-prince
+    assert (best[0] > best[2]).all()
+    position = QUANTITIES.index("slider_position")
+    assert best[1, position] < 1e-2 * best[0, position] < 1e-3
+    assert (
+        found.error[:, :, position] >= integration.MARGIN * found.reference_error[position]
+    ).all()
+    np.testing.assert_array_equal(
+        found.error[0], found.error[1]
+    )  # single and in lanes: the same bits
+    assert found.setting[list(found.methods).index("RK4, fixed steps"), 0] == LARGEST_STEP / 4
+
+
+# ---- averaging ------------------------------------------------------------------------------------
+
+
+def test_a_transient_that_decays_and_copies_that_settle_apart():
+    turn = np.arange(64.0)[:, None, None]
+    apart = np.array([-3e-3, 0.0, 3e-3])[None, :, None]
+    gaps = 2e-4 * (1.0 + 0.1 * 0.5**turn + apart) * np.ones(2)
+    found = averaging.analyse(gaps, 0.0)
+    assert found.floor == pytest.approx(3e-3)  # standard deviation of -3, 0, 3
+    late = list(found.transient).index(16)
+    np.testing.assert_allclose(found.error[late], np.sqrt(2.0 / 3.0) * 3e-3, rtol=1e-3)
+    first = found.error[0] ** 2 - (2.0 / 3.0) * 3e-3**2
+    share = [0.1 * (2.0 - 2.0 ** (1 - a)) / a for a in found.averaged.astype(float)]
+    np.testing.assert_allclose(np.sqrt(first), share, rtol=1e-2)
+
+
+# ---- surrogates and random inputs -----------------------------------------------------------------
+
+
+def test_leave_one_out_is_what_a_model_without_the_point_predicts():
+    rng = np.random.default_rng(3)
+    points = rng.random((15, 2))
+    values = np.sin(3.0 * points[:, 0]) + points[:, 1] ** 2
+    model = fit_kriging(points, values, np.array([[0.0, 1.0]] * 2), rng=rng)
+    unit = points / model.length_scales
+    squares = np.square(unit[:, None] - unit[None]).sum(axis=2)
+    smooth = model.signal_variance * np.exp(-0.5 * squares)
+    matrix, y = smooth + model.noise_variance * np.eye(15), values - model.mean
+    expected = []
+    for k in range(15):
+        rest = np.arange(15) != k
+        expected.append(
+            y[k] - smooth[k, rest] @ np.linalg.solve(matrix[np.ix_(rest, rest)], y[rest])
+        )
+    np.testing.assert_allclose(surrogate.leave_one_out(model), expected, rtol=1e-5, atol=1e-9)
+
+
+def test_limits_of_a_root_mean_square_hold_as_often_as_they_say():
+    rng = np.random.default_rng(4)
+    errors = 0.3 * rng.standard_normal((12, 4000))
+    middle, lower, upper = random_inputs.root_mean_square(errors, 0)
+    assert np.mean((lower < 0.3) & (upper > 0.3)) == pytest.approx(0.95, abs=0.012)
+    assert np.mean(middle**2) == pytest.approx(0.09, rel=0.02)
+    one = random_inputs.root_mean_square(errors, 1)
+    np.testing.assert_allclose(one[2] / one[0], np.sqrt(11 / chi2.ppf(0.025, 11)))
+
+
+def test_a_scene_without_a_case_gets_one_about_its_own_values():
+    made, case, where = with_case(PAPER)
+    assert made.study.case(case).random == ("m2", "m3", "C")
+    assert "no study" in where
+    middle = np.mean(made.study.variables[0].range)
+    assert middle == pytest.approx(PAPER.number("mechanism.rod.mass"))
+    bare = PAPER.with_({"study": {"variables": {"m2": {"range": [0.1, 0.4]}}}})
+    made, case, where = with_case(bare)
+    assert made.study.random_input("m2").half_width == pytest.approx(0.05 * 0.3)
+    study = load_scene(JOBS / "robust_slider_crank.toml")
+    assert with_case(study)[1] == "robust"
+
+
+def test_clearances_that_differ_are_varied_apart():
+    made, _, _ = with_case(PAPER.with_({"joints.crank_rod.clearance": "0.4 mm"}))
+    assert [v.name for v in made.study.variables] == ["m2", "m3", "C12", "C23"]
+
+
+# ---- all of it ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return measure(TWIN, alone(MAKERS), TINY)
+
+
+def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
+    dataset.write(measured, tmp_path / "accuracy.nc")
+    again = dataset.read(tmp_path / "accuracy.nc", "accuracy")
+    assert again.identical(measured)
+    for name in ("processor", "versions", "repeats", "profile", "study", "scene"):
+        assert again.attrs[name]
+    closed = abs(measured["closed_form"])
+    assert float(closed.sel(moment="mean")) < 1e-8
+    assert (
+        float(closed.sel(moment="deviation")) < 1e-2
+    )  # small beside the mean: digits cancel in both ways
+    r2 = measured["r2"].sel(surrogate="Kriging")
+    assert float(r2[-1]) > 0.9
+    assert (measured["moment_error"].sel(moment="mean") < 0.05).all()
+    assert float(measured["strong_seconds"][0]) > 0.0
+
+
+def test_monte_carlo_on_the_surrogate_converges_as_theory_says(measured):
+    error = measured["moment_error"].sel(estimate="surrogate", moment="mean").to_numpy()
+    assert error[0] / error[1] == pytest.approx(
+        2.0, rel=0.8
+    )  # four times the draws, 8 samples each
+
+
+def test_figures_and_tables(measured, tmp_path, capsys):
+    for name, draw in accuracy_figures.FIGURES.items():
+        assert style.save(draw(measured), tmp_path / f"{name}.png").stat().st_size > 10_000
+    describe(measured, {"accuracy": tmp_path})
+    shown = capsys.readouterr().out
+    for word in (
+        "dormand-prince",
+        "Kriging",
+        "floor",
+        "speed-up",
+        str(measured.attrs["processor"]),
+    ):
+        assert word in shown
+    assert len(advice(measured)) == 5
+
+
+def test_the_panel_says_when_the_reference_is_not_good_enough(measured):
+    assert "all errors shown" in resolution(measured, "slider_position")
+    spoilt = measured.copy(deep=True)
+    spoilt["reference_error"][:] = 1e-3
+    assert "not resolved" in resolution(spoilt, "slider_position")
+
+
+def test_without_clearance_there_is_nothing_to_measure():
+    ideal = {key: {"kind": "ideal"} for key in ("joints.crank_rod", "joints.rod_slider")}
+    scene = PAPER.with_({**ideal, "effects.contact": None, "effects.friction": {"law": "none"}})
+    with pytest.raises(InputError, match="without clearance"):
+        measure(scene, alone(MAKERS), TINY)
+
+
+def test_a_resting_rank_takes_no_samples():
+    rest = Resting()
+    assert rest.pending > 10**9
+    assert rest.advance(0.0).size == 0
+    with pytest.raises(AssertionError):
+        rest.submit(np.arange(1), np.zeros((1, 1)))
+
+
+def test_profiles_differ_in_size_only():
+    assert set(vars(QUICK)) == set(vars(FULL))
+    assert set(QUICK.rungs) < set(FULL.rungs) | {1e-11}

@@ -1,0 +1,112 @@
+"""The plan: cost measured on samples, the job that follows from it."""
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from hpcclear.accuracy.resting import MAKERS
+from hpcclear.batch import design
+from hpcclear.cli import cli
+from hpcclear.comm import alone
+from hpcclear.errors import InputError
+from hpcclear.plan import RESERVE, Plan, Row, describe, measure, simulations_of, slurm
+from hpcclear.scene import load_scene
+from hpcclear.status import OUTCOME
+from hpcclear.work import sample_points
+
+JOBS = Path(__file__).parent.parent / "jobs"
+SCENE = load_scene(JOBS / "hunt_crossley.toml").with_(
+    {
+        "study": {
+            "samples": 512,
+            "variables": {
+                "m2": {"range": [0.105, 0.42]},
+                "C": {"range": ["0.3 mm", "1 mm"]},
+            },
+        },
+        "numerics.transient_revolutions": 1,
+        "numerics.averaged_revolutions": 1,
+    }
+)
+
+
+@pytest.fixture
+def made() -> Plan:
+    rows = (Row(None, SCENE, 2e-3, ""), Row(1e-3, SCENE, 1e-3, "because"))
+    return Plan(rows, 100_000, None, 3.0, 400e6, 5)
+
+
+def test_core_seconds_and_wall_time_add_up(made: Plan):
+    assert made.core_seconds(made.rows[0], 100_000, 2) == pytest.approx(200.0 + 6.0)
+    assert made.wall_seconds(made.rows[0], 100_000, 1) == pytest.approx(203.0)
+    assert 100.0 + 3.0 < made.wall_seconds(made.rows[0], 100_000, 2) < 110.0 + 3.0
+    assert made.disk(1000) > 1000 * (OUTCOME.itemsize + 40)
+
+
+def test_the_job_asks_for_enough(made: Plan):
+    lines = "\n".join(slurm(made, made.rows[0], 100_000, 2))
+    hours, minutes, seconds = map(int, re.search(r"--time=(\d+):(\d+):(\d+)", lines).groups())
+    asked = 3600 * hours + 60 * minutes + seconds
+    assert asked >= RESERVE * made.wall_seconds(made.rows[0], 100_000, 2)
+    assert asked <= 3.0 * made.wall_seconds(made.rows[0], 100_000, 2) + 180.0
+    assert "--ntasks=2" in lines
+    memory = int(re.search(r"--mem-per-cpu=(\d+)M", lines).group(1))
+    assert 1.2 * 400e6 < memory * 2**20 < 3 * 400e6
+
+
+def test_what_is_printed_is_the_row_that_was_asked_for(made: Plan, capsys):
+    describe(made, "jobs/x.toml", 1e-3, 2)
+    shown = capsys.readouterr().out
+    assert "--set numerics.target_error=0.001" in shown
+    assert "because" in shown
+    assert "hpcclear sample jobs/x.toml" in shown
+    describe(made, "jobs/x.toml", None, 2)
+    assert "target_error" not in capsys.readouterr().out
+
+
+def test_simulations_of_a_study_are_counted():
+    assert simulations_of(SCENE) is None
+    study = load_scene(JOBS / "robust_slider_crank.toml")
+    count = simulations_of(study)
+    assert count > 2 * (2 + study.study.verification.designs + 1) * study.study.verification.samples
+    fewer = simulations_of(study.with_({"study.verification.samples": 10}))
+    cut = study.study.verification.samples - 10
+    assert count - fewer == 2 * (3 + study.study.verification.designs) * cut
+
+
+def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
+    found = measure(SCENE, alone(MAKERS), (1e-2, 1e-5))
+    assert [row.error for row in found.rows] == [None, 1e-2, 1e-5]
+    file, loose, strict = found.rows
+    assert file.scene == SCENE
+    assert loose.scene.numerics.rtol > strict.scene.numerics.rtol
+    assert "target_error" in strict.reason
+    assert found.samples == SCENE.study.samples
+    assert all(row.seconds > 0.0 for row in found.rows)
+    assert 50e6 < found.memory < 20e9
+
+
+def test_a_scene_without_a_study_is_refused_with_a_remedy():
+    with pytest.raises(InputError, match="study"):
+        measure(load_scene(JOBS / "hunt_crossley.toml"), alone(MAKERS))
+
+
+def test_the_command_refuses_an_error_that_is_none():
+    result = CliRunner().invoke(cli, ["plan", str(JOBS / "quickstart.toml"), "--error", "0"])
+    assert result.exit_code == 2
+    assert "--error" in result.output
+
+
+@pytest.mark.full
+def test_core_seconds_of_a_long_run_are_predicted():
+    """A minute on this process; the machine should have nothing else to do."""
+    scene = SCENE.with_({"numerics.transient_revolutions": 20})
+    plan = measure(scene, alone(MAKERS), ())
+    count = int(60.0 / plan.rows[0].seconds)
+    points = design(scene.with_({"study.samples": count}), None)
+    ranks = alone(MAKERS)
+    sample_points(scene, points, ranks, stage="long")
+    busy = ranks.stage_seconds["long"][0, 0]
+    assert plan.rows[0].seconds * count == pytest.approx(busy, rel=0.2)
