@@ -82,10 +82,10 @@ def test_both_entry_points_give_version_and_help():
             ["simulate", "jobs/slider_crank.toml", "-o", "/no/such/directory/x.nc"],
             "/no/such/directory",
         ),
-        (["sample", "jobs/slider_crank.toml", "-o", "results/x.nc"], "study"),
+        (["sample", "jobs/slider_crank.toml", "-o", "x.nc"], "study"),
         (["frobnicate"], "No such command"),
         (
-            ["sample", "jobs/quickstart.toml", "-o", "results/x.nc", "--points", "README.md"],
+            ["sample", "jobs/quickstart.toml", "-o", "x.nc", "--points", "README.md"],
             "README.md",
         ),
     ],

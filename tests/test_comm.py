@@ -219,7 +219,8 @@ def test_a_signal_to_one_rank_only_stops_the_job(tmp_path):
     assert output.count("SIGTERM was received on rank 1") == 1
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
+# Two ranks in the long profile: on a crowded machine half a second may end before the first record.
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.full)])
 def test_a_time_limit_stops_the_run(ranks, tmp_path):
     began = time.time()
     code, output = finish(start(ranks, "stopping.py", "limited", tmp_path, 0.5))

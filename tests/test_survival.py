@@ -123,7 +123,9 @@ def check_repeated(log: Path, kills: list[float], window: float) -> int:
     return max(lost.values(), default=0)
 
 
-@pytest.mark.parametrize("kills", [5, pytest.param(50, marks=pytest.mark.full)])
+# In the long profile: what one interval holds is judged by rates, which a crowded machine upsets.
+@pytest.mark.full
+@pytest.mark.parametrize("kills", [5, 50])
 @pytest.mark.timeout(3600)
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
     dice, done, lost, states = random.Random(kills), 0, 0, defaultdict(int)

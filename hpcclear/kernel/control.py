@@ -29,8 +29,8 @@ def choose_step(work, par, torque, W):
         if torque is None:
             left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
             # Stretched by round-off at most: a step cut to end at an impact must stay cut, or is tried for ever.
-            ending = 1.0 if h * (1.0 + 1e-12) >= left else 0.0
-            h = left if h * (1.0 + 1e-12) >= left else h
+            ending = 1.0 if h * (1.0 + 1e-8) >= left else 0.0
+            h = left if h * (1.0 + 1e-8) >= left else h
             work[at.ENDING * W + i] = ending
         work[at.STEP * W + i] = h
 

@@ -147,6 +147,8 @@ def meet_impact(lane, W, work, settings, gap, active, inverse):
     if abs(d1) <= tolerance and m1 > 0.0:
         return 1.0
     fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
+    if 1.0 - 1e-7 < fraction < 1.0 and m1 > 0.0:
+        return 1.0  # as good as the end of the step, which may be stretched by round-off to end a revolution
     if fraction == 0.0:
         speed = max(work[(at.RATE_OLD + gap + 2) * W + lane], settings[IMPACT_FLOOR])
         work[active * W + lane] = 1.0

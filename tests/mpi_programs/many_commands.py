@@ -4,6 +4,7 @@ In:  {"words": [...], "user": number or null}     Out: {"code": exit code, "outp
 """
 
 import json
+import multiprocessing.synchronize  # noqa: F401 - nobody may not read it later
 import os
 import signal
 import sys
@@ -13,7 +14,7 @@ import time
 import numpy  # noqa: F401
 import xarray  # noqa: F401
 
-from hpcclear import cli, comm, dataset, describe, evaluator, scene  # noqa: F401
+from hpcclear import batch, cli, comm, dataset, describe, evaluator, scene  # noqa: F401
 
 PATIENCE = 30.0  # s
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from hpcclear import dataset
+from hpcclear.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 FOLDER = Path(sys.argv[1])
@@ -88,8 +89,8 @@ def array() -> None:
     """Two scenes side by side in one array, with one rank each."""
     scenes = [FOLDER / f"scene_{k}.toml" for k in (0, 1)]
     for k, scene in enumerate(scenes):
-        text = (ROOT / SCENE).read_text().replace("samples = 512", f"samples = {200 + k}")
-        scene.write_text(text.replace("rtol = 1e-6", "rtol = 1e-6\nmax_steps = 20000"))
+        small = load_scene(ROOT / SCENE, (f"study.samples={200 + k}", "numerics.max_steps=20000"))
+        scene.write_text(small.to_toml())
     options = ("--array=0-1", "--ntasks-per-node=1", f"--export=ALL,RESULTS={FOLDER / 'array'}")
     job = submit("scene_array.slurm", "array.log", *map(str, scenes), options=options)
     for k, scene in enumerate(scenes):
