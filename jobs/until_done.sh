@@ -11,6 +11,12 @@
 set -u
 most_turns=${MOST_TURNS:-100} # a job that never gets anywhere is not requeued for ever
 
+# Steps of a requeued job are numbered from 0 again, and MPICH names its shared memory after job and step: what a killed
+# turn left behind would be taken for this one's. So each turn begins at a step of its own.
+for ((step = 0; step < ${SLURM_RESTART_COUNT:-0}; step++)); do
+    srun --nodes=1 --ntasks=1 true
+done
+
 "$@" &
 child=$!
 out_of_time=no

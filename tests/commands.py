@@ -96,6 +96,20 @@ def ranks_of(job: subprocess.Popen) -> dict[int, int]:
     return found
 
 
+def remove_orphans() -> None:
+    """Remove shared memory that killed ranks of MPICH left behind: nobody's, and a minute old."""
+    used = set()
+    for maps in Path("/proc").glob("[0-9]*/maps"):
+        with contextlib.suppress(OSError):
+            used |= {
+                line.split()[-1] for line in maps.read_text().splitlines() if "/dev/shm" in line
+            }
+    for path in Path("/dev/shm").glob("mpich_shm_*"):
+        with contextlib.suppress(OSError):
+            if str(path) not in used and time.time() - path.stat().st_mtime > 60.0:
+                path.unlink()
+
+
 def result_files(folder: Path) -> list[Path]:
     """Every NetCDF file in a results folder, checkpoints included."""
     return sorted(path for path in folder.rglob("*.nc"))

@@ -8,7 +8,7 @@ import sys
 import time
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from commands import (
     kill,
     overrides,
     ranks_of,
+    remove_orphans,
     result_files,
     run,
     sample,
@@ -73,7 +74,7 @@ def study_words(folder: Path) -> list[str]:
 
 
 @pytest.fixture(scope="module", params=["sample", "run"])
-def undisturbed(request, tmp_path_factory) -> Undisturbed:
+def undisturbed(request, tmp_path_factory) -> Iterator[Undisturbed]:
     """Each of the two commands that resume."""
     words = {"sample": sample_words, "run": study_words}[request.param]
     place = tmp_path_factory.mktemp("undisturbed")
@@ -83,7 +84,8 @@ def undisturbed(request, tmp_path_factory) -> Undisturbed:
         code, output = run(words(place / name))
         assert code == 0, output
     interval = INTERVAL if request.param == "sample" else CHECKPOINT_INTERVAL
-    return Undisturbed(words, interval, time.time() - began, files(place / "results"))
+    yield Undisturbed(words, interval, time.time() - began, files(place / "results"))
+    remove_orphans()
 
 
 @pytest.fixture

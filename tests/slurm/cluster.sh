@@ -8,6 +8,9 @@ start_cluster() {
     (umask 077 && head -c 1024 /dev/urandom >"$folder/munge.key")
     cat >"$folder/slurm.conf" <<CONF
 ClusterName=test
+# MPICH names its shared memory after job and step: never those of an earlier cluster on this machine.
+FirstJobId=$((RANDOM * 1000 + 1))
+MaxJobId=60000000
 SlurmctldHost=$(hostname -s)
 SlurmUser=root
 SlurmctldPort=16817
