@@ -21,9 +21,6 @@ from hpcclear.scene.paths import flatten
 NOBODY = 65534
 TEXT = SCENE.read_text()
 ROBUST = SCENE.with_name("robust_slider_crank.toml").read_text()
-# In the long profile as a whole: its commands share one warm process, to be proved on a quiet machine first.
-pytestmark = pytest.mark.full
-
 FULL = pytest.mark.full
 
 
