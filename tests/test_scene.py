@@ -156,6 +156,7 @@ def test_with_validates_and_keeps_the_original(scene: Scene) -> None:
     assert scene.joints.crank_rod.clearance == 3e-4
     assert changed.with_({"joints.crank_rod.clearance": "0.3 mm"}) == scene
     assert scene.with_({"effects.friction": None}).effects.friction.law == "none"
+    assert scene.with_({"effects.friction": "none"}).effects.friction.law == "none"
     with pytest.raises(InputError, match="bearing radius"):
         scene.with_({"joints.crank_rod.clearance": 0.03})
     with pytest.raises(InputError, match="not a dotted path"):
@@ -586,6 +587,15 @@ def test_schema_accepts_what_is_shipped(path: Path) -> None:
     validator.check_schema(scene_schema())
     assert list(validator.iter_errors(tomllib.loads(path.read_text()))) == []
     assert list(validator.iter_errors(load_scene(path).resolved())) == []
+
+
+def test_schema_knows_the_word_that_switches_off() -> None:
+    validator = Draft202012Validator(scene_schema())
+    content = tomllib.loads(JOBS[0].read_text())
+    content["effects"] |= {"friction": "none", "guide_friction": "none", "slider_load": "none"}
+    assert list(validator.iter_errors(content)) == []
+    content["effects"]["friction"] = "nine"
+    assert list(validator.iter_errors(content))
 
 
 @pytest.mark.parametrize(

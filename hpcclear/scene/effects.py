@@ -111,7 +111,8 @@ class Friction(Table):
             ):
                 raise problem(
                     'the law "none" has no parameters, and a parameter says that friction is meant',
-                    'Set law = "coulomb", or remove the parameters',
+                    'Write friction = "none" (--set effects.friction=none) to switch it off, '
+                    'or set law = "coulomb"',
                     key="law",
                     value="none",
                 )
@@ -164,14 +165,14 @@ class Effects(Table):
     contact: Contact | None = None
     """Normal contact force; needed as soon as a joint has clearance."""
     friction: Friction = Friction()
-    """Friction in the clearance joints."""
+    """Friction in the clearance joints; "none" or left out is off."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """m/s2, towards -y; 0 is off."""
     slider_load: Annotated[Curve, CurveOf("N")] | None = None
     """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or
     left out is off."""
     guide_friction: GuideFriction | None = None
-    """Friction of the slider in its guide; left out is off."""
+    """Friction of the slider in its guide; "none" or left out is off."""
 
     @model_validator(mode="before")
     @classmethod
@@ -180,6 +181,6 @@ class Effects(Table):
             return {
                 key: value
                 for key, value in data.items()
-                if not (key in ("slider_load", "guide_friction") and value == "none")
+                if not (key in ("friction", "slider_load", "guide_friction") and value == "none")
             }
         return data

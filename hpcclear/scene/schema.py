@@ -29,6 +29,12 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**bounds, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"] = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+    effects = definitions["Effects"]["properties"]
+    for key in ("friction", "guide_friction"):  # one word switches them off
+        entry = effects[key]
+        choices = entry.get("anyOf", [{"$ref": entry.get("$ref")}])
+        kept = {word: entry[word] for word in ("description", "default") if word in entry}
+        effects[key] = {"anyOf": [*choices, {"const": "none"}], **kept}
     case = {"anyOf": [{"$ref": "#/$defs/Case"}, definitions["Case"]["properties"]["random"]]}
     definitions["Study"]["properties"]["cases"]["additionalProperties"] = case
     return {
