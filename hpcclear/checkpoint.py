@@ -210,29 +210,28 @@ class Checkpoint:
     # -- samples --------------------------------------------------------------------------------
 
     def add(self, records: np.ndarray, values: ArrayLike | None = None) -> None:
-        """Take finished samples; write what has gathered when the interval is over.
+        """Take finished samples into memory; the flushes write them.
 
-        Parameters
-        ----------
-        records : array of `hpcclear.status.OUTCOME`, shape (n,)
-        values : array, shape (n, k), optional
-            Their designs, a column for each of `names`.
-
-        Raises
-        ------
-        InputError, StorageError
-            The disk refuses; the samples stay in memory, a later `flush` tries again.
+        `records` are of `hpcclear.status.OUTCOME`, shape (n,); `values`, shape (n, k), their
+        designs, a column for each of `names`.
         """
         columns = np.empty((len(records), 0)) if values is None else np.asarray(values, float)
         if columns.shape != (len(records), len(self.names)):
             raise ValueError(f"designs have shape {columns.shape}, names are {self.names}")
         if len(records):
             self._buffer.append((records.astype(OUTCOME), columns.copy()))
+
+    def flush_when_due(self) -> None:
+        """Write what has gathered when the interval is over; raises as `flush`."""
         if self._clock() - self._written >= self.interval:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has gathered, now; nothing happens when nothing has. Raises as `add`."""
+        """Write what has gathered, now; nothing happens when nothing has.
+
+        Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory,
+        and a later call tries again.
+        """
         if not self._buffer:
             self._written = self._clock()
             return
@@ -279,7 +278,7 @@ class Checkpoint:
     # -- stages ---------------------------------------------------------------------------------
 
     def save_stage(self, name: str, data: Mapping[str, ArrayLike]) -> None:
-        """Write the results of a stage: arrays, numbers, truth values, text; raises as `add`.
+        """Write the results of a stage: arrays, numbers, truth values, text; raises as `flush`.
 
         Parameters
         ----------

@@ -135,6 +135,7 @@ class Ranks:
         stage: str | None = None,
         completed: np.ndarray | None = None,
         on_records: Callable[[np.ndarray], object] | None = None,
+        save: Callable[[], object] | None = None,
         progress: Progress | None = None,
         dtype: np.dtype = OUTCOME,
         keep: bool = True,
@@ -155,6 +156,9 @@ class Ranks:
             Records of samples finished before; they are not simulated again.
         on_records : callable, optional
             Gets every batch of newly finished records, on root, as they arrive.
+        save : callable, optional
+            Called after each batch, to write what has gathered; not again once anything has failed,
+            while `on_records` still gets what the ranks had finished by then.
         progress : Progress, optional
             Shown meanwhile.
         dtype : dtype, optional
@@ -170,7 +174,7 @@ class Ranks:
         Raises
         ------
         Stopped
-            If asked to end early; `on_records` got everything that was finished.
+            If asked to end early; `on_records` got everything that was finished, `save` may be due.
         RankFailed, InputError
             If another rank failed; likewise.
         """
@@ -178,7 +182,7 @@ class Ranks:
         progress = Progress("", style="quiet") if progress is None else progress
         name = kind if stage is None else stage
         run = _Run(self, HandOut(len(points), earlier["sample"], self.size), points, progress)
-        run.on_records, run.kept = on_records, [earlier] if keep else None
+        run.on_records, run.save, run.kept = on_records, save, [earlier] if keep else None
         progress.start(len(points), earlier)
         with contextlib.closing(progress), self._timed(name) as spent:
             if not run.book.done:
@@ -283,8 +287,10 @@ class _Run:
         self._progress = progress
         self._present = set(range(1, ranks.size))  # ranks that will still say DONE
         self._closing = False
+        self._failed = False
         self.book = book
         self.on_records: Callable[[np.ndarray], object] | None = None
+        self.save: Callable[[], object] | None = None
         self.kept: list[np.ndarray] | None = None
 
     def work(self, name: str, kind: str, payload: object, spent: np.ndarray) -> None:
@@ -294,7 +300,8 @@ class _Run:
         self._mail.tell_others(Tag.STAGE, (name, kind, payload))
         try:
             self._hand_out(kind, payload)
-        except BaseException:
+        except BaseException as error:
+            self._failed = not isinstance(error, Stopped)
             self._gather(until=time.monotonic() + 1.2)
             raise
         self._gather(until=None)
@@ -359,15 +366,18 @@ class _Run:
             self._ranks._heed(message)
 
     def _accept(self, records: np.ndarray | None) -> None:
-        """Book finished records, keep them, and hand them on."""
+        """Book finished records and hand them on; after a failure, do no more than keep them."""
         if records is None or records.size == 0:
             return
         self.book.accept(records)
-        self._progress.add(records)
         if self.kept is not None:
             self.kept.append(records)
-        if self.on_records is not None:
-            callback, self.on_records = self.on_records, None  # one that fails is not called again
-            with self._ranks.writing():
+        with self._ranks.writing():
+            if self.on_records is not None:
+                callback, self.on_records = self.on_records, None  # one that fails gets no more
                 callback(records)
-            self.on_records = callback
+                self.on_records = callback
+            if self.save is not None and not self._failed:
+                self.save()
+        if not self._failed:
+            self._progress.add(records)

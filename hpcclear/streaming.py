@@ -21,7 +21,7 @@ from .scene.paths import flatten
 from .scene.points import Points
 from .statistics import BINS, BLOCK, ROWS, Accumulator, Remaining, Summary
 from .status import JOINTS, OUTCOME, Flag, Status
-from .work import KIND, payload_of
+from .work import KIND, payload_of, saving
 
 STAGE = "statistics"
 
@@ -171,23 +171,26 @@ def _accumulate(
     saved = time.monotonic()
 
     def take(records: np.ndarray) -> None:
-        nonlocal saved
         numbered = records.astype(OUTCOME)
         numbered["sample"] = left.samples(records["sample"])
         sums.add(numbered)
-        if time.monotonic() - saved > checkpoint.interval:
-            checkpoint.save_stage(STAGE, sums.state())
-            saved = time.monotonic()
 
-    progress = Progress("samples", style)
-    try:
-        ranks.run_points(
-            KIND, payload_of(scene, points.page(0)), _Left(points, left),
-            stage=STAGE, on_records=take, progress=progress, keep=False,
-        )  # fmt: skip
-    finally:
+    def save() -> None:
+        nonlocal saved
         with ranks.writing():
             checkpoint.save_stage(STAGE, sums.state())
+        saved = time.monotonic()
+
+    def save_when_due() -> None:
+        if time.monotonic() - saved > checkpoint.interval:
+            save()
+
+    progress = Progress("samples", style)
+    with saving(save):
+        ranks.run_points(
+            KIND, payload_of(scene, points.page(0)), _Left(points, left),
+            stage=STAGE, on_records=take, save=save_when_due, progress=progress, keep=False,
+        )  # fmt: skip
     content = statistics_dataset(sums, attributes)
     with ranks.writing():
         dataset.write(content, output)

@@ -5,13 +5,15 @@ that fails on one rank ends them all.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .progress import Progress
 from .ranks import Maker, Ranks
+from .stopping import Stopped
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
@@ -80,6 +82,25 @@ def run_key(scene: "Scene", command: str, lanes: int | None = None) -> dict[str,
     return {"command": command, "lanes": str(lanes), **made_by, **entries}
 
 
+@contextmanager
+def saving(save: Callable[[], object]) -> Iterator[None]:
+    """Save what is finished when an exception ends the block, even if a save itself was what failed.
+
+    A fault may be gone a moment later. When the last save fails as well, its own error says so after
+    a stop, for which all was to be saved; after an error, that error is what the caller hears of.
+    """
+    try:
+        yield
+    except Stopped:
+        save()
+        raise
+    except BaseException as error:  # noqa: BLE001 - raised again
+        try:
+            save()
+        finally:
+            raise error from error.__cause__  # without the context: it is the failed save, if any
+
+
 def sample_points(
     scene: "Scene",
     points: "Points",
@@ -101,7 +122,7 @@ def sample_points(
         Made with `MAKERS`.
     checkpoint : Checkpoint, optional
         Knows the samples finished earlier, and gets each new one; its names are those of `points`.
-        Everything finished is on disk when this raises.
+        When this raises, everything finished is on disk, unless the disk refused it twice.
     progress : Progress, optional
     stage : str
         Name for reports and timing.
@@ -117,38 +138,26 @@ def sample_points(
     ------
     Stopped, RankFailed, InputError
         As `Ranks.run_points`.
+    StorageError
+        The disk refuses.
     """
-    completed = None
-    if checkpoint is not None:
-        completed = checkpoint.completed()
-        inside = (completed["sample"] >= first) & (completed["sample"] < first + len(points))
-        completed = completed[inside]
-        completed["sample"] -= first
+    how: dict[str, Any] = {"stage": stage, "progress": progress}
+    if checkpoint is None:
+        return ranks.run_points(KIND, payload_of(scene, points), points.values, **how)
+    completed = checkpoint.completed()
+    inside = (completed["sample"] >= first) & (completed["sample"] < first + len(points))
+    completed = completed[inside]
+    completed["sample"] -= first
 
-    refused = False
+    def take(records: np.ndarray) -> None:
+        numbered = records.copy()
+        numbered["sample"] += first
+        checkpoint.add(numbered, points.values[records["sample"]])
 
-    def keep(records: np.ndarray) -> None:
-        nonlocal refused
-        if checkpoint is not None:
-            numbered = records.copy()
-            numbered["sample"] += first
-            refused = True  # until it was not: a write that fails is not tried again on the way out
-            checkpoint.add(numbered, points.values[records["sample"]])
-            refused = False
+    def save() -> None:
+        with ranks.stage(stage), ranks.writing():
+            checkpoint.flush()
 
-    try:
-        records = ranks.run_points(
-            KIND,
-            payload_of(scene, points),
-            points.values,
-            stage=stage,
-            completed=completed,
-            on_records=keep,
-            progress=progress,
-        )
-    except BaseException:
-        if checkpoint is not None and not refused:
-            with ranks.stage(stage), ranks.writing():
-                checkpoint.flush()
-        raise
-    return records
+    how |= {"completed": completed, "on_records": take, "save": checkpoint.flush_when_due}
+    with saving(save):
+        return ranks.run_points(KIND, payload_of(scene, points), points.values, **how)

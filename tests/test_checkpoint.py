@@ -50,6 +50,12 @@ class Clock:
         return self.now
 
 
+def add(checkpoint: Checkpoint, *arguments: np.ndarray) -> None:
+    """What a run does with every batch of samples."""
+    checkpoint.add(*arguments)
+    checkpoint.flush_when_due()
+
+
 def parts(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.glob("part-*.nc"))
 
@@ -60,16 +66,16 @@ def parts(folder: Path) -> list[str]:
 def test_samples_reach_disk_when_the_interval_is_over_and_not_before(tmp_path):
     clock = Clock()
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=5.0, clock=clock)
-    checkpoint.add(outcomes(0, 3))
+    add(checkpoint, outcomes(0, 3))
     clock.now += 4.9
-    checkpoint.add(outcomes(3, 3))
+    add(checkpoint, outcomes(3, 3))
     assert parts(tmp_path / "c") == []
     clock.now += 0.2
-    checkpoint.add(outcomes(6, 1))
+    add(checkpoint, outcomes(6, 1))
     assert len(parts(tmp_path / "c")) == 1
-    checkpoint.add(outcomes(7, 1))
+    add(checkpoint, outcomes(7, 1))
     clock.now += 4.0
-    checkpoint.add(outcomes(8, 1))
+    add(checkpoint, outcomes(8, 1))
     assert len(parts(tmp_path / "c")) == 1
     checkpoint.flush()
     assert len(parts(tmp_path / "c")) == 2
@@ -82,7 +88,7 @@ def test_any_order_of_samples_gives_the_same_records(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
     order = np.random.default_rng(0).permutation(50)
     for start in range(0, 50, 6):
-        checkpoint.add(outcomes(0, 50)[order[start : start + 6]])
+        add(checkpoint, outcomes(0, 50)[order[start : start + 6]])
     assert checkpoint.completed().tobytes() == outcomes(0, 50).tobytes()
     assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 50).tobytes()
 
@@ -91,7 +97,7 @@ def test_the_number_of_files_grows_with_the_logarithm_only(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
     most = 0
     for sample in range(80):
-        checkpoint.add(outcomes(sample, 1))
+        add(checkpoint, outcomes(sample, 1))
         most = max(most, len(parts(tmp_path / "c")))
     assert most <= 7 * 3 + 1  # 80 < 8**3
     assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 80).tobytes()
@@ -106,7 +112,7 @@ def test_parts_are_datasets_of_their_own(tmp_path):
         attributes=dataset.provenance("[mechanism]", "ab" * 32),
     )
     values = np.arange(8.0).reshape(4, 2)
-    checkpoint.add(outcomes(0, 4), values)
+    add(checkpoint, outcomes(0, 4), values)
     checkpoint.flush()
     (part,) = parts(tmp_path / "c")
     with xr.open_dataset(tmp_path / "c" / part, engine="h5netcdf") as found:
@@ -114,7 +120,7 @@ def test_parts_are_datasets_of_their_own(tmp_path):
         assert found["mechanism_rod_length"].attrs["units"] == "m"
         np.testing.assert_array_equal(found["objective"], outcomes(0, 4)["objective"])
     with pytest.raises(ValueError, match="shape"):
-        checkpoint.add(outcomes(4, 1))
+        add(checkpoint, outcomes(4, 1))
     again = Checkpoint(tmp_path / "c", KEY, names=("mechanism.rod.length", "m2"))
     assert again.completed().tobytes() == outcomes(0, 4).tobytes()
 
@@ -122,8 +128,8 @@ def test_parts_are_datasets_of_their_own(tmp_path):
 def test_unreadable_parts_and_leftovers_are_reported_and_done_again(tmp_path):
     folder = tmp_path / "c"
     checkpoint = Checkpoint(folder, KEY, interval=0.0)
-    checkpoint.add(outcomes(0, 4))
-    checkpoint.add(outcomes(4, 4))
+    add(checkpoint, outcomes(0, 4))
+    add(checkpoint, outcomes(4, 4))
     first = folder / parts(folder)[0]
     first.write_bytes(first.read_bytes()[:-1000])
     (folder / ".hpcclear-0123456789abcdef.tmp").write_bytes(b"half")
@@ -132,7 +138,7 @@ def test_unreadable_parts_and_leftovers_are_reported_and_done_again(tmp_path):
     assert again.completed().tobytes() == outcomes(4, 4).tobytes()
     assert len(again.problems) == 2
     assert any(first.name in problem for problem in again.problems)
-    again.add(outcomes(0, 4))
+    add(again, outcomes(0, 4))
     assert Checkpoint(folder, KEY).completed().tobytes() == outcomes(0, 8).tobytes()
     assert first.name in parts(folder)  # never over what could not be read
     again.finish()
@@ -143,20 +149,20 @@ def test_a_kill_between_merging_and_removing_leaves_nothing_twice(tmp_path, monk
     folder = tmp_path / "c"
     checkpoint = Checkpoint(folder, KEY, interval=0.0)
     for sample in range(7):
-        checkpoint.add(outcomes(sample, 1))
+        add(checkpoint, outcomes(sample, 1))
     with monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", lambda self, missing_ok=False: None)
-        checkpoint.add(outcomes(7, 1))
+        add(checkpoint, outcomes(7, 1))
     assert len(parts(folder)) == 9
     again = Checkpoint(folder, KEY, interval=0.0)
     assert again.completed().tobytes() == outcomes(0, 8).tobytes()
-    again.add(outcomes(8, 1))
+    add(again, outcomes(8, 1))
     assert Checkpoint(folder, KEY).completed().tobytes() == outcomes(0, 9).tobytes()
 
 
 def test_finish_removes_what_was_written_here(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
-    checkpoint.add(outcomes(0, 3))
+    add(checkpoint, outcomes(0, 3))
     checkpoint.save_stage("fit", {"x": [1.0]})
     checkpoint.finish()
     assert not (tmp_path / "c").exists()
@@ -167,7 +173,7 @@ def test_time_in_calls_is_measured(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=5.0, clock=clock)
     opened = checkpoint.seconds
     assert opened > 0
-    checkpoint.add(outcomes(0, 3))
+    add(checkpoint, outcomes(0, 3))
     assert checkpoint.seconds == opened
     checkpoint.flush()
     assert checkpoint.seconds > opened
@@ -175,7 +181,7 @@ def test_time_in_calls_is_measured(tmp_path):
 
 def test_a_full_disk_keeps_samples_in_memory_and_the_last_parts_on_disk(tmp_path, monkeypatch):
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
-    checkpoint.add(outcomes(0, 3))
+    add(checkpoint, outcomes(0, 3))
 
     def full(*args: object) -> int:
         raise OSError(errno.ENOSPC, "")
@@ -183,7 +189,7 @@ def test_a_full_disk_keeps_samples_in_memory_and_the_last_parts_on_disk(tmp_path
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", full)
         with pytest.raises(StorageError, match="No space left"):
-            checkpoint.add(outcomes(3, 3))
+            add(checkpoint, outcomes(3, 3))
     assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 3).tobytes()
     checkpoint.flush()
     assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 6).tobytes()
@@ -194,7 +200,7 @@ def test_a_full_disk_keeps_samples_in_memory_and_the_last_parts_on_disk(tmp_path
 
 def test_another_run_is_refused_with_the_differing_keys(tmp_path):
     checkpoint = Checkpoint(tmp_path / "c", KEY)
-    checkpoint.add(outcomes(0, 3))
+    add(checkpoint, outcomes(0, 3))
     checkpoint.flush()
     before = {path: path.read_bytes() for path in (tmp_path / "c").iterdir()}
     other = {**KEY, "seed": "1", "scene.effects.gravity": "9.81"}
@@ -298,7 +304,7 @@ def work(folder: str, safe: Connection) -> None:
     done = len(checkpoint.completed())
     while True:
         safe.send_bytes(b"%d" % done)
-        checkpoint.add(outcomes(done, 4), np.ones((4, 1)))
+        add(checkpoint, outcomes(done, 4), np.ones((4, 1)))
         done += 4
         final = checkpoint.completed()
         content = dataset.samples_dataset(["m2"], np.ones((len(final), 1)), {}, final)
