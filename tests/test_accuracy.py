@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from hpcclear import dataset
-from hpcclear.accuracy import averaging, integration, random_inputs, surrogate
+from hpcclear.accuracy import averaging, integration, methods, random_inputs, surrogate
 from hpcclear.accuracy.methods import LARGEST_STEP, QUANTITIES
 from hpcclear.accuracy.printing import advice, describe, resolution
 from hpcclear.accuracy.profile import FULL, QUICK, Profile
@@ -245,3 +245,11 @@ def test_a_resting_rank_takes_no_samples():
 def test_profiles_differ_in_size_only():
     assert set(vars(QUICK)) == set(vars(FULL))
     assert set(QUICK.rungs) < set(FULL.rungs) | {1e-11}
+
+
+def test_an_event_has_one_value_at_one_time():
+    # The interpolant of a step differs by rounding from the states at its ends: here by enough to hide the change of sign.
+    event = methods._event(lambda time, y: float(y[0]), 1.0)
+    assert event(1.0, np.array([1e-17])) == event(1.0, np.array([-1e-17])) == 1e-17
+    assert event.terminal
+    assert event(2.0, np.array([-3.0])) == -3.0

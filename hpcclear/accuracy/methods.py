@@ -38,6 +38,7 @@ class Outcome:
 
 
 Run = Callable[[], Outcome]
+Event = Callable[[float, Array], float]
 
 
 @dataclass(frozen=True)
@@ -250,25 +251,31 @@ def solve_turn(
     return (np.nan,) * 4, count
 
 
-def _crossing(
-    one: Equations, joint: int, side: float, at_start: float
-) -> Callable[[float, Array], float]:
+def _crossing(one: Equations, joint: int, side: float, at_start: float) -> Event:
     """The event that a gap leaves its side of zero; right after the last event it is taken to be on it."""
     shift = 2.0 * at_start if side * at_start < 0.0 else 0.0
-
-    def gap(time: float, y: Array) -> float:
-        return float(one.joints(time, y)[joint, OPEN]) - shift
-
-    gap.terminal, gap.direction = True, -side  # type: ignore[attr-defined]
-    return gap
+    return _event(lambda time, y: float(one.joints(time, y)[joint, OPEN]) - shift, -side)
 
 
-def _full_turn(n: int) -> Callable[[float, Array], float]:
-    def beyond(time: float, y: Array) -> float:
-        return float(y[n - 1] - at.TURN)
+def _full_turn(n: int) -> Event:
+    return _event(lambda time, y: float(y[n - 1] - at.TURN), 1.0)
 
-    beyond.terminal, beyond.direction = True, 1.0  # type: ignore[attr-defined]
-    return beyond
+
+def _event(value: Event, direction: float) -> Event:
+    """A terminal event of scipy that has one value at one time.
+
+    scipy finds a change of sign in the states at both ends of a step, then asks the interpolant there, which differs by
+    rounding: where the change is that small, it would find none and stop with an error.
+    """
+    known: dict[float, float] = {}
+
+    def event(time: float, y: Array) -> float:
+        if time not in known:
+            known[time] = value(time, y)
+        return known[time]
+
+    event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
+    return event
 
 
 def _largest_force(one: Equations, piece: object) -> float:
