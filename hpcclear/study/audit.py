@@ -85,13 +85,9 @@ def evaluate(run: Run) -> Result:
     dict of arrays
         The data variables of readings.nc, of shape (readings, designs).
     """
-    designs = printed_designs(run.scene)
-    rows = []
-    for reading in readings(run):
-        if reading.over_steps:
-            rows.append([_over_steps(run, reading, one) for one in designs])
-        else:
-            rows.append(_over_time(run, reading, designs))
+    rows = [
+        run.part(f"{STAGE}-{k}", _row, reading)["row"] for k, reading in enumerate(readings(run))
+    ]
     table = np.array(rows)
     result = {name: table[..., k] for k, name in enumerate((*_COLUMNS, "objective_smallest"))}
     result["failed"] = result["failed"].astype(np.int64)
@@ -110,6 +106,14 @@ def write(run: Run, result: Result) -> None:
     data["case"] = np.array([choice.case for choice in designs])
     data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed[:, 0]) ** 2, axis=1))
     run.write(dataset.dataset("readings", coords, data), "readings.nc")
+
+
+def _row(run: Run, reading: Reading) -> dict[str, Array]:
+    """Moments and f at the smallest clearance of all printed designs in one reading."""
+    designs = printed_designs(run.scene)
+    if reading.over_steps:
+        return {"row": np.array([_over_steps(run, reading, one) for one in designs])}
+    return {"row": np.array(_over_time(run, reading, designs))}
 
 
 def _over_time(run: Run, reading: Reading, designs: Sequence[Choice]) -> list[tuple[float, ...]]:

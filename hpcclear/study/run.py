@@ -1,6 +1,7 @@
 """One run of a study: what its stages share, and how each is done once and kept."""
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,9 +61,24 @@ class Run:
         Either way the samples that follow are numbered alike, so that a run that was interrupted
         ends like one that was not.
         """
+        return self._kept(name, self.ranks.stage(name), work, arguments)
+
+    def part(
+        self, name: str, work: Callable[..., Mapping[str, ArrayLike]], *arguments: object
+    ) -> Result:
+        """The same for a part of a stage, kept by itself: long stages lose a part at most."""
+        return self._kept(name, nullcontext(), work, arguments)
+
+    def _kept(
+        self,
+        name: str,
+        context: AbstractContextManager[None],
+        work: Callable[..., Mapping[str, ArrayLike]],
+        arguments: tuple[object, ...],
+    ) -> Result:
         found = self.checkpoint.load_stage(name)
         if found is None:
-            with self.ranks.stage(name):
+            with context:
                 self.ranks.raise_if_stopped()
                 result = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
                 result["next_sample"] = np.asarray(self.simulations.next)

@@ -132,6 +132,8 @@ class Simulations:
             stage=f"{stage}: simulations",
             first=self.next,
         )
+        with self._ranks.writing():  # a long fit may follow
+            self._checkpoint.flush()
         self.next += len(points)
         _refuse_if_all_failed(records, stage)
         return records

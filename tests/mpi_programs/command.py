@@ -1,6 +1,6 @@
 """The real command, watched or sabotaged: command.py ARGUMENTS OF hpcclear; settings in the environment.
 
-TEST_LOG    file that gets a line "seconds rank sample" for every sample that a rank finishes
+TEST_LOG    file that gets a line for all that matters to finished samples, see `note`
 TEST_BEGAN  file that root touches when it begins
 TEST_FAIL   what fails, see `sabotage`
 TEST_RANK   on which rank
@@ -15,11 +15,17 @@ import os
 import pathlib
 import sys
 import time
+import zlib
+from collections.abc import Iterable
 
-from hpcclear import cli, launcher, work
+import numpy as np
 
+from hpcclear import checkpoint, cli, launcher, ranks, work
+
+RANK = launcher.launched_rank() or 0
+LOG = os.open(os.environ.get("TEST_LOG", os.devnull), os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 FAIL = os.environ.get("TEST_FAIL", "")
-HERE = (launcher.launched_rank() or 0) == int(os.environ.get("TEST_RANK", "0"))
+HERE = int(os.environ.get("TEST_RANK", "0")) == RANK
 
 
 def fail(*arguments: object, **options: object) -> None:
@@ -37,47 +43,94 @@ class NoImport(importlib.abc.MetaPathFinder):
             fail()
 
 
+def note(event: str, samples: Iterable[str] = ()) -> None:
+    """Log what happened, in one write: seconds, rank, event, and the samples it concerns.
+
+    ``finished`` by a rank's worker, each time it has advanced; ``received`` by root; ``saving`` and
+    ``saved``: root begins and has done a write of what it received; ``opened``: the checkpoint.
+    """
+    line = "\t".join([f"{time.monotonic():.6f}", str(RANK), event, *samples])
+    os.write(LOG, f"{line}\n".encode())
+
+
+def names(stage: str, samples: np.ndarray, points: np.ndarray) -> list[str]:
+    """What tells a sample from every other of a run: stage, number and design."""
+    return [
+        f"{stage}#{n}:{zlib.crc32(row.tobytes()):08x}"
+        for n, row in zip(samples, points, strict=True)
+    ]
+
+
 class Watched:
     """A worker that logs what it finishes, and may fail after that."""
 
-    def __init__(self, worker: object) -> None:
-        self._worker = worker
-        self._log = open(os.environ.get("TEST_LOG", os.devnull), "a")  # noqa: SIM115
+    def __init__(self, worker: object, stage: str) -> None:
+        self._worker, self._stage = worker, stage
+        self._names: dict[int, str] = {}
         self._finished = 0
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._worker, name)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        self._names |= zip(index.tolist(), names(self._stage, index, points), strict=True)
+        self._worker.submit(index, points)
 
     def advance(self, seconds: float) -> object:
         if FAIL == "simulation" and HERE and self._finished > 100:
             fail()
         records = self._worker.advance(seconds)
         self._finished += records.size
-        now, rank = time.time(), launcher.launched_rank() or 0
-        self._log.write("".join(f"{now:.3f} {rank} {sample}\n" for sample in records["sample"]))
-        self._log.flush()
+        note("finished", [self._names[sample] for sample in records["sample"].tolist()])
         return records
 
 
 def watch() -> None:
-    make = work.MAKERS[work.KIND]
+    make, run_points = work.MAKERS[work.KIND], ranks.Ranks.run_points
 
-    def made(payload: object, ranks: object) -> Watched:
+    def made(payload: object, ranks: ranks.Ranks) -> Watched:
         if FAIL == "maker" and HERE:
             fail()
-        return Watched(make(payload, ranks))
+        return Watched(make(payload, ranks), ranks.where.split("'")[1])
+
+    def watched_run_points(self, kind, payload, points, *, on_records=None, **options):
+        def receive(records: np.ndarray) -> None:
+            note("received", names(options["stage"], records["sample"], points[records["sample"]]))
+            if on_records is not None:
+                on_records(records)
+
+        watched = receive if kind == work.KIND else on_records
+        return run_points(self, kind, payload, points, on_records=watched, **options)
 
     work.MAKERS[work.KIND] = made  # type: ignore[index]
+    ranks.Ranks.run_points = watched_run_points  # type: ignore[method-assign]
+    bracket(checkpoint.Checkpoint, "__init__", "", "opened")
+    bracket(checkpoint.Checkpoint, "flush", "saving", "saved")
+    bracket(checkpoint.Checkpoint, "save_stage", "saving", "saved")
+
+
+def bracket(owner: type, name: str, before: str, after: str) -> None:
+    """Log the begin and the end of a method."""
+    original = getattr(owner, name)
+
+    def noted(*arguments: object, **options: object) -> None:
+        if before:
+            note(before)
+        original(*arguments, **options)
+        note(after)
+
+    setattr(owner, name, noted)
 
 
 def sabotage() -> None:
     """Let FAIL happen: "maker", "simulation", "import MODULE", "call MODULE:NAME" or, from the n-th call
-    on, "call MODULE:NAME n"; with "sleep" in place of "call" it does not return, for a minute."""
+    on, "call MODULE:NAME n"; "once" in place of "call": this call only; "sleep": it does not return, for
+    a minute."""
     if not HERE:
         return
     if FAIL.startswith("import "):
         sys.meta_path.insert(0, NoImport())
-    if FAIL.startswith(("call ", "sleep ")):
+    if FAIL.startswith(("call ", "once ", "sleep ")):
         what, place, *count = FAIL.split()
         module, _, path = place.partition(":")
         owner: object = importlib.import_module(module)
@@ -85,10 +138,12 @@ def sabotage() -> None:
         for step in above:
             owner = getattr(owner, step)
         original, calls = getattr(owner, name), iter(range(1, 10**9))
+        first = int(count[0] if count else 1)
 
         def replaced(*arguments: object, **options: object) -> object:
-            if next(calls) >= int(count[0] if count else 1):
-                fail() if what == "call" else time.sleep(60.0)
+            call = next(calls)
+            if call == first or (call > first and what != "once"):
+                time.sleep(60.0) if what == "sleep" else fail()
             return original(*arguments, **options)
 
         setattr(owner, name, replaced)

@@ -1,0 +1,118 @@
+"""What a run that was ended early lost, from the log of mpi_programs/command.py, and whether it had to.
+
+No rate and no speed of a machine enters: what was saved is told from what was received, and what was
+received from what a rank still had.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from hpcclear.ranks import FLUSH_INTERVAL
+
+UNSAVED = "readings: simulations"
+"""The stage whose samples are kept a reading at a time."""
+
+DELIVERY = 10
+"""Turns of root within which a message that was sent is received: MPI needs some polls for a long one."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A line of the log."""
+
+    time: float
+    rank: int
+    what: str
+    samples: frozenset[str]
+
+
+def read(log: Path) -> list[Event]:
+    """Events of one run; those of a rank in their order."""
+    lines = [line.split("\t") for line in log.read_text().splitlines()] if log.exists() else []
+    return [Event(float(t), int(rank), what, frozenset(rest)) for t, rank, what, *rest in lines]
+
+
+def samples(events: list[Event], what: str) -> set[str]:
+    """All samples that something happened to."""
+    return set().union(*(event.samples for event in events if event.what == what))
+
+
+def saved_and_waiting(events: list[Event]) -> tuple[set[str], set[str]]:
+    """Samples in completed saves, and those received since the last of these began."""
+    saved, waiting, writing = set[str](), set[str](), set[str]()
+    for event in events:
+        if event.what == "received":
+            waiting |= event.samples
+        elif event.what == "saving":
+            writing = set(waiting)
+        elif event.what == "saved":
+            saved |= writing
+            waiting -= writing
+    return saved, waiting
+
+
+def check_interval_kept(events: list[Event], interval: float) -> None:
+    """Assert that root saved at the first batch of samples after the interval, each time."""
+    root = [event for event in events if event.rank == 0 and event.what != "finished"]
+    since = 0.0
+    for event, following in pairwise(root):
+        if event.what in ("opened", "saved"):
+            since = event.time
+        kept_otherwise = all(sample.startswith(UNSAVED) for sample in event.samples)
+        if event.what == "received" and not kept_otherwise and event.time - since >= interval:
+            assert following.what == "saving", (event.time - since, following)
+
+
+def check_sent_in_time(events: list[Event], lost: set[str]) -> None:
+    """Assert that lost samples which root never received had not been on their way for long."""
+    turns = {
+        rank: [e.time for e in events if (e.rank, e.what) == (rank, "finished")]
+        for rank in {0} | {e.rank for e in events}
+    }
+    missing = lost - samples(events, "received")
+    for event in events:
+        if event.what != "finished" or not event.samples & missing:
+            continue
+        own = turns[event.rank]
+        if event.rank == 0:
+            assert event.time == own[-1]
+            continue
+        later = bisect_right(own, event.time + FLUSH_INTERVAL)
+        if later + 1 < len(own):  # the turn after which it was sent was followed by another
+            assert len(turns[0]) - bisect_right(turns[0], own[later + 1]) <= DELIVERY
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What one run lost: samples done again later, and seconds since the save before its end began."""
+
+    samples: int
+    seconds: float
+
+
+def loss_of(log: Path, later: list[Path], interval: float | None) -> Loss:
+    """Assert that a run which was killed lost no more than it may; how much it lost.
+
+    Parameters
+    ----------
+    log : Path
+        Of that run.
+    later : list of Path
+        Of those that went on from it.
+    interval : float, optional
+        Seconds between two saves; None if saves were made to fail.
+    """
+    events, again = read(log), set[str]()
+    for other in later:
+        again |= samples(read(other), "finished")
+    lost = samples(events, "finished") & again
+    saved, waiting = saved_and_waiting(events)
+    assert not lost & saved, "what was saved was done again"
+    assert waiting - samples(events, "finished") == set()
+    check_sent_in_time(events, lost)
+    if interval is not None:
+        check_interval_kept(events, interval)
+    begun = [event.time for event in events if event.what in ("opened", "saving")]
+    return Loss(len(lost), events[-1].time - begun[-1] if lost else 0.0)
