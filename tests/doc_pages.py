@@ -1,0 +1,125 @@
+"""Code blocks of the documentation, found by a Markdown parser, and a reader who runs them in the order of the page."""
+
+import copy
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from markdown_it import MarkdownIt
+
+from hpcclear.scene import load_scene
+from hpcclear.scene.writing import to_toml
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+READ_ONLY = ("text", "singularity")
+"""Languages of blocks that are there to be read: what a command prints, a diagram, a recipe for another program."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block and the words after its language."""
+
+    page: str
+    line: int
+    language: str
+    title: str | None
+    no_run: str | None  # the reason
+    slow: bool
+    text: str
+
+    @property
+    def runs(self) -> bool:
+        """Whether it is there to be run, and can be run here."""
+        return self.language not in READ_ONLY and self.no_run is None
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def tokens(page: Path) -> list[Any]:
+    return MarkdownIt("commonmark").enable("table").parse(page.read_text(encoding="utf-8"))
+
+
+def blocks(page: Path) -> list[Block]:
+    """Every fence of a page."""
+    found = []
+    for token in tokens(page):
+        if token.type == "fence":
+            language, _, rest = token.info.partition(" ")
+            title = rest.split('"')[1] if rest.startswith("title=") else None
+            no_run = rest.removeprefix("no-run:").strip() if rest.startswith("no-run:") else None
+            name, line = str(page.relative_to(ROOT)), token.map[0] + 1
+            slow = rest.startswith("slow:")
+            found.append(Block(name, line, language, title, no_run, slow, token.content))
+    return found
+
+
+class Reader:
+    """Somebody with a fresh checkout who does what a page says."""
+
+    def __init__(self, place: Path) -> None:
+        ignored = shutil.ignore_patterns(".*", "results", "site", "__pycache__", "*.egg-info")
+        shutil.copytree(ROOT, place, ignore=ignored)
+        self.place = place
+        self.names: dict[str, Any] = {"__name__": "__main__"}
+
+    def do(self, block: Block) -> None:
+        """Run or load one block; AssertionError or the block's own error when that fails."""
+        if block.language == "bash":
+            self._shell(block)
+        elif block.language == "python":
+            exec(compile(block.text, str(block), "exec"), self.names)
+        elif block.language == "toml":
+            self._scene(block)
+        else:
+            assert block.language in ("csv", *READ_ONLY), f"{block}: unknown language"
+            if block.title is not None:
+                (self.place / block.title).write_text(block.text, encoding="utf-8")
+
+    def _shell(self, block: Block) -> None:
+        binaries = str(Path(sys.executable).parent)
+        here = {"PATH": binaries + os.pathsep + os.environ["PATH"], "MPLBACKEND": "Agg"}
+        done = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", block.text],
+            cwd=self.place,
+            env=os.environ | here,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=1800 if block.slow else 300,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
+        assert "Traceback" not in done.stderr, f"{block}\n{done.stderr}"
+
+    def _scene(self, block: Block) -> None:
+        """A whole scene is loaded; a part takes the place of what stands in the named file, or in a shipped scene."""
+        part = tomllib.loads(block.text)
+        file = self.place / block.title if block.title else None
+        if not {"mechanism", "drive", "joints"} <= part.keys():
+            shipped = "quickstart" if "study" in part else "slider_crank"
+            base = file or self.place / "jobs" / f"{shipped}.toml"
+            part = replaced(tomllib.loads(base.read_text(encoding="utf-8")), part)
+        elif file is not None and file.exists():
+            part = replaced(tomllib.loads(file.read_text(encoding="utf-8")), part)
+        target = file or self.place / "block.toml"
+        target.write_text(to_toml(part), encoding="utf-8")
+        load_scene(target)
+
+
+def replaced(scene: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
+    """A scene with the entries of the second level, such as mechanism.rod, taken from a part."""
+    made = copy.deepcopy(scene)
+    for key, value in part.items():
+        if isinstance(value, dict) and isinstance(made.get(key), dict):
+            whole = made[key] if key != "drive" else {}  # a drive is of one kind
+            made[key] = {**whole, **value}
+        else:
+            made[key] = value
+    return made

@@ -1,0 +1,204 @@
+"""Documentation: every block of code and every command on its pages runs, what they name exists, and the site builds."""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import click
+import matplotlib.pyplot as plt
+import pytest
+from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
+
+from hpcclear.cli import cli
+from hpcclear.names import KINDS
+from hpcclear.scene import load_scene
+
+NOT_RUN = [
+    ("CONTRIBUTING.md", "it runs these tests"),
+    ("README.md", "it runs these tests"),
+    ("docs/how-to/cluster.md", "installs Slurm on this machine"),
+    ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
+    ("docs/how-to/cluster.md", "needs a cluster"),
+    ("docs/how-to/cluster.md", "needs a cluster"),
+    ("docs/how-to/cluster.md", "the end of a batch script"),
+]
+"""Page and reason of every block that no test runs. A longer list needs a better reason."""
+
+BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
+RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
+SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
+INFO = re.compile(r'(bash|python|toml|csv|text|singularity)( title="[^"]+"| (no-run|slow): \S.*)?')
+
+
+def follow(todo: list[Block], place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Do what a page says, from top to bottom."""
+    reader = Reader(place)
+    monkeypatch.chdir(place)
+    for block in todo:
+        reader.do(block)
+    plt.close("all")
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_blocks_of_a_page_run_in_their_order(name, tmp_path, monkeypatch):
+    todo = [block for block in BLOCKS[name] if block.runs and not block.slow]
+    follow(todo, tmp_path / "checkout", monkeypatch)
+
+
+@pytest.mark.full
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("name", SLOW)
+def test_slow_blocks_run_too(name, tmp_path, monkeypatch):
+    follow([b for b in BLOCKS[name] if b.runs], tmp_path / "checkout", monkeypatch)
+
+
+def test_only_these_blocks_are_not_run():
+    found = [(b.page, b.no_run) for page in BLOCKS.values() for b in page if b.no_run is not None]
+    assert sorted(found) == NOT_RUN
+
+
+def test_blocks_that_are_only_read_hide_no_commands():
+    for block in (b for page in BLOCKS.values() for b in page if b.language == "text"):
+        assert not re.search(r"^\s*(hpcclear|mpiexec|bash|python|pip) ", block.text, re.M), block
+
+
+@pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
+def test_all_code_is_fenced_and_says_what_it_is(page):
+    for token in tokens(page):
+        assert token.type != "code_block", f"{page}:{token.map[0] + 1}: indented code"
+        if token.type == "fence":
+            assert INFO.fullmatch(token.info), f"{page}:{token.map[0] + 1}: {token.info!r}"
+
+
+def inline(page: Path) -> list[str]:
+    """Code within sentences and tables."""
+    return [
+        child.content
+        for token in tokens(page)
+        for child in token.children or ()
+        if child.type == "code_inline"
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
+def test_files_that_are_named_exist(page):
+    text = " ".join(inline(page) + [b.text for b in blocks(page) if b.language == "bash"])
+    for name in re.findall(r"(?<![\w./-])(?:tests|analysis|jobs|docs|hpcclear)/[\w./-]+\w", text):
+        assert (ROOT / name).exists(), f"{page} names {name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
+def test_commands_and_options_that_are_named_exist(page):
+    options = {
+        word
+        for command in (cli, *cli.commands.values())
+        for parameter in command.params
+        if isinstance(parameter, click.Option)
+        for word in parameter.opts
+    }
+    for text in inline(page):
+        if found := re.match(r"(?:mpiexec -n \S+ )?hpcclear ([a-z]+)", text):
+            command = cli.commands[found[1]]
+            known = {word for p in command.params for word in p.opts} | {"--help", "-h"}
+            used = {word for word in text.split() if word.startswith("-") and word != "-n"}
+            assert used <= known, f"{page}: {text}"
+        elif re.fullmatch(r"--[a-z-]+( \S+)?", text) and "sbatch" not in text:
+            assert text.split()[0] in options | FOREIGN, f"{page}: {text}"
+
+
+FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind", "--full"}
+"""Options of other programs: srun, apptainer, tests/run.sh."""
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub makes them."""
+    found = tokens(page)
+    headings = [
+        found[k + 1].content for k, token in enumerate(found) if token.type == "heading_open"
+    ]
+    return {re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
+def test_links_lead_somewhere(page):
+    for token in tokens(page):
+        for child in token.children or ():
+            target = child.attrs.get("href") or child.attrs.get("src") or ""
+            path, _, anchor = str(target).partition("#")
+            if not target or re.match(r"https?:", path):
+                continue
+            place = (page.parent / path).resolve() if path else page
+            assert place.exists(), f"{page} links to {target}"
+            if anchor and "reference" not in place.parts:  # headings there are made by the site
+                assert anchor in anchors(place), f"{page} links to {target}"
+
+
+class Site(HTMLParser):
+    """What a page of the site loads, and its text."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.text = ""
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        known = dict(attrs)
+        if tag in ("script", "img") and known.get("src"):
+            self.loads.append(str(known["src"]))
+        if tag == "link" and known.get("rel") == "stylesheet":
+            self.loads.append(str(known["href"]))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built with every warning an error."""
+    place = tmp_path_factory.mktemp("site")
+    program = str(Path(sys.executable).with_name("mkdocs"))
+    done = subprocess.run(
+        [program, "build", "--strict", "-f", ROOT / "docs/mkdocs/mkdocs.yml", "-d", place],
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return place
+
+
+def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
+    made = {str(path.relative_to(site).parent) for path in site.rglob("index.html")}
+    pages = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in PAGES[2:]}
+    assert made == (pages - {"index"}) | {"."}
+    for path in site.rglob("*.html"):
+        for address in Site(path).loads:
+            assert not re.match(r"(https?:)?//", address), f"{path} loads {address}"
+
+
+def test_the_reference_is_complete(site):
+    commands = Site(site / "reference/commands/index.html").text
+    for name, command in cli.commands.items():
+        for parameter in command.params:
+            assert all(word in commands for word in parameter.opts if word[0] == "-"), name
+    files = Site(site / "reference/files/index.html").text
+    assert all(name in files for kind in KINDS.values() for name in (*kind.coords, *kind.data))
+    scene = Site(site / "reference/scene/index.html").text
+    for path in load_scene(ROOT / "jobs/robust_slider_crank.toml").numeric_paths():
+        assert path.rpartition(".")[2] in scene, path
+    python = Site(site / "reference/python/index.html").text
+    assert all(f"{name}" in python for name in ("load_scene", "simulate", "evaluate", "InputError"))
+
+
+def test_no_code_of_ours_is_left_in_the_pages(site):
+    for path in site.rglob("*.html"):
+        text = Site(path).text
+        assert "no-run:" not in text, path
+        assert " slow:" not in text, path
+        assert "<!--" not in text, path
