@@ -56,7 +56,7 @@ def fit_all(run: Run) -> Result:
             max_depth=settings.cuts,
             restarts=settings.restarts,
         )
-        result |= _packed(k, model) | _checked(run, k, model)
+        result |= _packed(k, model) | _checked(run, k, model, STAGE)
     return result
 
 
@@ -93,7 +93,7 @@ def grow(run: Run, before: Result, coordinates: Array, stage: str) -> Result:
         leaves.append(_refitted(run, leaf, coordinates[here], values[here], rng))
     k = len(models) - 1
     grown = PiecewiseKriging(tuple(leaves), model.r2, model.rmae, model.accepted)
-    return {**before, **_packed(k, grown), **_checked(run, k, grown)}
+    return {**before, **_packed(k, grown), **_checked(run, k, grown, stage)}
 
 
 def _refitted(
@@ -115,13 +115,13 @@ def _packed(k: int, model: PiecewiseKriging) -> Result:
     return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
 
 
-def _checked(run: Run, k: int, model: PiecewiseKriging) -> Result:
+def _checked(run: Run, k: int, model: PiecewiseKriging, stage: str) -> Result:
     """Accuracy over the whole domain on fresh points, which decided nothing."""
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
     unit = unit_lhs(max(run.study.test_samples, 2), len(names), rng)
     points = model.lower + unit * (model.upper - model.lower)
-    truth = run.simulations.values(names, points, f"{STAGE} check")
+    truth = run.simulations.values(names, points, f"{stage} check")
     reached = accuracy(truth, model.predict(points))
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
 
