@@ -130,7 +130,7 @@ class Wiring:
         }
 
     def corners(self, group: Group) -> dict[str, np.ndarray]:
-        """The corners of a group's box of random inputs, as draws."""
+        """The corners of a group's box of random inputs, as draws: an array of shape (corners,) for each input."""
         ends = [np.array([self.random[name].distribution.support]) for name in group.sources]
         return dict(zip(group.sources, tensor(ends), strict=True))
 
@@ -158,7 +158,7 @@ class Wiring:
 
 
 def tensor(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Node arrays ``(n or 1, N_k)`` of several axes over their tensor, last axis fastest."""
+    """Node arrays of shape ``(n or 1, N_k)`` of several axes over their tensor, last axis fastest."""
     out = []
     for k, axis in enumerate(axes):
         after = int(np.prod([other.shape[1] for other in axes[k + 1 :]], dtype=int))

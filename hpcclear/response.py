@@ -39,7 +39,7 @@ class Steps:
 
 
 def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
-    """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,)."""
+    """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
     problem = problem_of(scene, ledger=True, series=True)
     par = parameters(scene)
     state = start_states(scene, par)
@@ -129,7 +129,7 @@ def _works_between(steps: Steps, powers: Array, k: NDArray[np.intp], s: Array) -
 
 
 def instants(scene: Scene, steps: Steps) -> Array:
-    """Times of the output, s: evenly spaced over each revolution, or every accepted step."""
+    """Times of the output, s, shape (times,): evenly spaced over each revolution, or every accepted step."""
     count = scene.output.instants_per_revolution
     if count == 0:
         return steps.time

@@ -50,6 +50,11 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
     values : (n, s) array
         s samples of each of n quantities.
 
+    Raises
+    ------
+    InputError
+        Fewer than four samples.
+
     Notes
     -----
     The variance of the variance estimate is (m4 - s^4 (s - 3) / (s - 1)) / s, m4 the fourth central

@@ -142,7 +142,7 @@ class HandOut:
         return self.remaining == 0 and self.outstanding == 0
 
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
-        """Samples for the rank that asks (none when nothing is left), and when to ask again."""
+        """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
         size, ask_below = allot(self.remaining, self._ranks, need)
         index = self._queue[self._next : self._next + size]
         self._next += size
@@ -198,7 +198,7 @@ class Desk:
         return sorted(self._in_hand) if self._inside else []
 
     def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
-        """Queue a block; an empty one says that there is no more."""
+        """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""
         self._ask_below = ask_below
         if index.size == 0:
             self.exhausted = True
@@ -209,7 +209,7 @@ class Desk:
         self._inside = False
 
     def work(self, seconds: float = QUANTUM) -> np.ndarray:
-        """Let the worker advance; return what it finished.
+        """Let the worker advance; return the records it finished.
 
         Raises
         ------

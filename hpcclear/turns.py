@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def objective(gaps: Array) -> Array:
-    """f (eq. 13) from mean gaps of both joints, last axis."""
+    """f (eq. 13), m, from mean gaps of both joints, m: shape (..., 2) to (...)."""
     return np.hypot(gaps[..., 0], gaps[..., 1])
 
 

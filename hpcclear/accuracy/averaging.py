@@ -71,7 +71,7 @@ def analyse(gaps: Array, seconds: float) -> Averaging:
 
 
 def doubling(most: int, start: int) -> NDArray[np.int64]:
-    """`start`, then powers of two up to `most`."""
+    """`start`, then powers of two up to `most`, shape (n,)."""
     powers = 2 ** np.arange(1 + int(np.log2(max(most, 1))))
     return np.unique(np.append(start, powers)).astype(np.int64)
 

@@ -65,7 +65,7 @@ def reference_of(scene: Scene, designs: int) -> Reference:
 
 
 def rms(errors: Array) -> Array:
-    """Root mean square over the first axis."""
+    """Root mean square over the first axis of any shape."""
     return np.sqrt(np.mean(np.square(errors), axis=0))
 
 
@@ -107,7 +107,8 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
 
 
 def observed_order(evaluations: Array, errors: Array, floor: float) -> float:
-    """Slope of error against force evaluations, both logarithmic: the median over all pairs of rungs (Theil and Sen).
+    """Slope of error against force evaluations (shape (rungs,) each), both logarithmic: the median over all
+    pairs of rungs (Theil and Sen).
 
     Rungs count whose error lies above `floor` and below a tenth, and that are at least twice as dear as one another.
 

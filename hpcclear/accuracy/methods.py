@@ -88,7 +88,7 @@ def neighbours(scene: Scene, count: int) -> Points:
 def slider_of(
     scene: Scene, par: Array, q: Array, v: Array, phi: float = at.TURN
 ) -> tuple[float, float]:
-    """Slider position and velocity at the end of a revolution from coordinates and velocities."""
+    """Slider position (m) and velocity (m/s) at the end of a revolution, from coordinates and velocities of shape (n,)."""
     first, second, free = topology(scene)
     if scene.numerics.formulation == "baumgarte":
         return float(q[_SLIDER_9]), float(v[_SLIDER_9])

@@ -114,7 +114,7 @@ def measure(
 
 
 def root_mean_square(errors: Array, known: int) -> tuple[Array, Array, Array]:
-    """Root mean square over the first axis, with 95 % limits for normal errors.
+    """Root mean square over the first axis of any shape, with 95 % limits for normal errors.
 
     `known` is 1 if the truth the errors are about was taken from the same values, which hides a share of them.
     """

@@ -23,11 +23,11 @@ class Resting:
     pending = 1 << 40  # never hungry
 
     def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
-        """Nothing is ever submitted to it."""
+        """Nothing is ever submitted to it: no index, no points."""
         raise AssertionError("a resting rank was given samples")
 
     def advance(self, seconds: float) -> NDArray[np.void]:
-        """Rest."""
+        """Rest; no records."""
         time.sleep(seconds)
         return np.zeros(0, OUTCOME)
 

@@ -83,14 +83,17 @@ def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
 
 
 def simulated(scene: Scene, region: Box, coordinates: Array, ranks: Ranks) -> tuple[Array, float]:
-    """The study's objective at points in sampling coordinates, NaN where failed; core-seconds of one of them."""
+    """The study's objective, shape (n,), SI, NaN where failed, at points in sampling coordinates, shape (n, d).
+
+    With the core-seconds of one of them.
+    """
     paths = tuple(study_of(scene).variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
     return objectives(scene, points, ranks, "surrogate: simulations")
 
 
 def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:
-    """The study's objective at points, NaN where failed, and core-seconds of one of them."""
+    """The study's objective at points, shape (n,), SI, NaN where failed, and core-seconds of one of them."""
     records = sample_points(scene, points, ranks, stage=stage)
     values = objective_of(scene)[1](records)
     busy = float(ranks.stage_seconds[stage][:, 0].sum())

@@ -36,7 +36,7 @@ def pretty(units: str) -> str:
 
 
 def scale(units: str, values: ArrayLike) -> Scale:
-    """A unit in which the largest of the values reads as 1 to 999.
+    """A unit in which the largest of the values (of any shape) reads as 1 to 999.
 
     Only a unit that begins with m, N, J, W, Pa or s takes a prefix (its power counts); masses stay in kg, inertias
     go to kg mm^2, and lengths from a tenth of a millimetre on to mm, as drawings have them.

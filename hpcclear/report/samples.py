@@ -150,7 +150,10 @@ def _cloud(axes: "Axes", variable: xr.DataArray, result: xr.DataArray, colour: A
 
 
 def binned(x: Array, y: Array, bins: int = 12) -> tuple[Array, Array]:
-    """Middles of bins of equal width and the median of y in them; bins of fewer than five points are left out."""
+    """Middles of bins of equal width and the median of y in them, from x and y of shape (n,).
+
+    Bins of fewer than five points are left out.
+    """
     if len(x) < 10 or not np.ptp(x) > 0.0:
         return np.zeros(0), np.zeros(0)
     edges = np.linspace(x.min(), x.max(), min(bins, len(x) // 5) + 1)

@@ -57,7 +57,7 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
 
 
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """A scene with the entries at dotted paths replaced (None removes); see `Scene.with_`."""
+    """A scene with the entries at dotted paths replaced (None removes); InputError as `Scene.with_`."""
     content = scene.resolved()
     for path, value in changes.items():
         if not isinstance(path, str) or not _KEY.fullmatch(path) or path.count(".") >= DEEPEST:

@@ -57,11 +57,11 @@ class Compiled:
         return len(self._waiting)
 
     def submit(self, index: np.ndarray, points: np.ndarray) -> None:
-        """Queue samples."""
+        """Queue samples: indices of shape (n,), points of shape (n, d)."""
         self._waiting += index.tolist()
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Return all samples."""
+        """Return the records of all samples."""
         records = np.zeros(self.pending, OUTCOME)
         records["sample"] = self._waiting
         self._waiting.clear()

@@ -90,7 +90,13 @@ class Simulations:
         return self.filled(names, to_physical(self.scene, names, coordinates))
 
     def filled(self, names: Sequence[str], values: Array) -> Points:
-        """The same from values in SI, shape (n, d)."""
+        """The same from values in SI, shape (n, d); the other variables as in the scene.
+
+        Raises
+        ------
+        InputError
+            If a variable that is left out drives entries that differ in the scene.
+        """
         columns = []
         for variable in self._variables:
             if variable.name in names:

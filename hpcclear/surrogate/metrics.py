@@ -147,7 +147,7 @@ def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> NDArray[np.floa
 
 
 def check_confidence(confidence: float) -> None:
-    """Refuse a confidence that is not in (0, 1)."""
+    """Refuse a confidence that is not in (0, 1), by an InputError."""
     if not 0.0 < confidence < 1.0:
         raise InputError("confidence", confidence, "not a probability", "take 0.99, for example")
 
