@@ -24,7 +24,7 @@ SHAPELESS = {"lanes.Problem.settings"}
 
 ARRAY = re.compile(r"\b(Array|NDArray|ndarray|ArrayLike)\b")
 SHAPE = re.compile(
-    r"shape|scalar|records?\b|rows?\b|ind(ex|ices)|columns?\b|\(\w+(, ?[\w+ ]+)*,?\)"
+    r"shape|scalar|records?\b|rows?\b|[Ii]nd(ex|ices)|columns?\b|\(\w+(, ?[\w+ ]+)*,?\)"
 )
 PHYSICAL = (
     "api",
