@@ -39,18 +39,18 @@ def samples(events: list[Event], what: str) -> set[str]:
     return set().union(*(event.samples for event in events if event.what == what))
 
 
-def saved_and_waiting(events: list[Event]) -> tuple[set[str], set[str]]:
-    """Samples in completed saves, and those received since the last of these began."""
-    saved, waiting, writing = set[str](), set[str](), set[str]()
+def saved_and_since(events: list[Event]) -> tuple[set[str], float]:
+    """Samples in completed saves, and when the last of these began."""
+    saved, received, writing = set[str](), set[str](), set[str]()
+    since = began = events[0].time if events else 0.0
     for event in events:
         if event.what == "received":
-            waiting |= event.samples
+            received |= event.samples
         elif event.what == "saving":
-            writing = set(waiting)
+            writing, began = set(received), event.time
         elif event.what == "saved":
-            saved |= writing
-            waiting -= writing
-    return saved, waiting
+            saved, since = writing, began
+    return saved, since
 
 
 def check_interval_kept(events: list[Event], interval: float) -> None:
@@ -86,10 +86,11 @@ def check_sent_in_time(events: list[Event], lost: set[str]) -> None:
 
 @dataclass(frozen=True)
 class Loss:
-    """What one run lost: samples done again later, and seconds since the save before its end began."""
+    """What one run lost: samples done again, seconds since the last good save began; and in which stage."""
 
     samples: int
     seconds: float
+    stage: str
 
 
 def loss_of(log: Path, later: list[Path], interval: float | None) -> Loss:
@@ -108,11 +109,11 @@ def loss_of(log: Path, later: list[Path], interval: float | None) -> Loss:
     for other in later:
         again |= samples(read(other), "finished")
     lost = samples(events, "finished") & again
-    saved, waiting = saved_and_waiting(events)
+    saved, since = saved_and_since(events)
     assert not lost & saved, "what was saved was done again"
-    assert waiting - samples(events, "finished") == set()
     check_sent_in_time(events, lost)
     if interval is not None:
         check_interval_kept(events, interval)
-    begun = [event.time for event in events if event.what in ("opened", "saving")]
-    return Loss(len(lost), events[-1].time - begun[-1] if lost else 0.0)
+    stages = [event for event in events if event.what == "stage"]
+    stage = min(stages[-1].samples) if stages else "start"
+    return Loss(len(lost), max(e.time for e in events) - since if lost else 0.0, stage)

@@ -101,7 +101,8 @@ only_sample = pytest.mark.parametrize("undisturbed", ["sample"], indirect=True)
 # -- kills --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kills", [10, pytest.param(50, marks=pytest.mark.full)])
+# of each of the two commands
+@pytest.mark.parametrize("kills", [5, pytest.param(50, marks=pytest.mark.full)])
 @pytest.mark.timeout(3600)
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
     dice, done, states = random.Random(kills), 0, Counter()
@@ -122,7 +123,7 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
                 break
             states["amid a write"] += any(folder.rglob(".hpcclear-*.tmp"))
             kill(ranks[dice.choice(sorted(ranks))])
-            code, output = finish(job, 20.0)
+            code, output = finish(job, 60.0)
             states["too late"] += code == 0
             check_readable(folder)
             done += 1
@@ -137,7 +138,8 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
     lost, seconds = (max(getattr(loss, name) for loss in losses) for name in ("samples", "seconds"))
     print(
         f"{done} kills, each cost {lost} samples and {seconds:.1f} s at most; {dict(states)}; "
-        f"{sum(loss.samples > 0 for loss in losses)} runs lost samples"
+        f"samples were lost by {sum(loss.samples > 0 for loss in losses)}; "
+        f"last begun: {dict(Counter(loss.stage for loss in losses))}"
     )
 
 

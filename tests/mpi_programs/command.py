@@ -47,7 +47,8 @@ def note(event: str, samples: Iterable[str] = ()) -> None:
     """Log what happened, in one write: seconds, rank, event, and the samples it concerns.
 
     ``finished`` by a rank's worker, each time it has advanced; ``received`` by root; ``saving`` and
-    ``saved``: root begins and has done a write of what it received; ``opened``: the checkpoint.
+    ``saved``: root begins and has done a write of what it received; ``opened``: the checkpoint;
+    ``stage``: root begins one, which stands for a sample here.
     """
     line = "\t".join([f"{time.monotonic():.6f}", str(RANK), event, *samples])
     os.write(LOG, f"{line}\n".encode())
@@ -87,6 +88,7 @@ class Watched:
 
 def watch() -> None:
     make, run_points = work.MAKERS[work.KIND], ranks.Ranks.run_points
+    stage = ranks.Ranks.stage
 
     def made(payload: object, ranks: ranks.Ranks) -> Watched:
         if FAIL == "maker" and HERE:
@@ -94,6 +96,8 @@ def watch() -> None:
         return Watched(make(payload, ranks), ranks.where.split("'")[1])
 
     def watched_run_points(self, kind, payload, points, *, on_records=None, **options):
+        note("stage", [options.get("stage") or kind])
+
         def receive(records: np.ndarray) -> None:
             note("received", names(options["stage"], records["sample"], points[records["sample"]]))
             if on_records is not None:
@@ -102,7 +106,12 @@ def watch() -> None:
         watched = receive if kind == work.KIND else on_records
         return run_points(self, kind, payload, points, on_records=watched, **options)
 
+    def watched_stage(self: ranks.Ranks, name: str) -> object:
+        note("stage", [name])
+        return stage(self, name)
+
     work.MAKERS[work.KIND] = made  # type: ignore[index]
+    ranks.Ranks.stage = watched_stage  # type: ignore[method-assign]
     ranks.Ranks.run_points = watched_run_points  # type: ignore[method-assign]
     bracket(checkpoint.Checkpoint, "__init__", "", "opened")
     bracket(checkpoint.Checkpoint, "flush", "saving", "saved")

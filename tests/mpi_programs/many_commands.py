@@ -17,7 +17,7 @@ import xarray  # noqa: F401
 
 from hpcclear import batch, cli, comm, dataset, describe, evaluator, scene  # noqa: F401
 
-PATIENCE = 30.0  # s
+PATIENCE = 120.0  # s; a hang lasts for ever, a crowded machine does not
 
 
 def child(words: list[str], user: int | None, output: int) -> None:
