@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goes on from there).
 """
 
+import contextlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -72,6 +73,15 @@ def _scene(file: Path, overrides: tuple[str, ...]) -> "Scene":
     return load_scene(file, overrides)
 
 
+def _place(output: Path) -> Path:
+    """The place for results; one directory on the way to it is made, more are taken for a slip of the pen."""
+    parent = output.parent
+    if parent.parent.is_dir() and not parent.exists():
+        with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
+            parent.mkdir()
+    return output
+
+
 def _is_root() -> bool:
     return launched_rank() in (0, None)
 
@@ -122,7 +132,7 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     from .response import simulate as simulate_scene
 
     scene = _scene(file, overrides)
-    storage.probe(output)
+    storage.probe(_place(output))
     response = simulate_scene(scene)
     dataset.write(response, output)
     describe_response(response, output)
@@ -164,7 +174,7 @@ def sample(
 
         return run_sample(
             _scene(file, overrides),
-            output,
+            _place(output),
             ranks,
             table=points,
             fresh=fresh,
@@ -206,7 +216,7 @@ def run(
 
         return run_study(
             _scene(file, overrides),
-            output,
+            _place(output),
             ranks,
             fresh=fresh,
             progress_style=progress,
@@ -240,7 +250,7 @@ def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) 
         from .accuracy.run import run_accuracy
 
         profile = PROFILES["quick" if quick else "full"]
-        return run_accuracy(_scene(file, overrides), output, ranks, profile)
+        return run_accuracy(_scene(file, overrides), _place(output), ranks, profile)
 
     return _on_ranks(program)
 

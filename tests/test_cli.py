@@ -59,6 +59,16 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     assert dataset.read(out, "response")["status"] == 0
 
 
+def test_one_directory_on_the_way_to_the_results_is_made(tmp_path):
+    words = ["simulate", "jobs/slider_crank.toml", *SHORT, "-o"]
+    assert hpcclear(*words, tmp_path / "results" / "response.nc").returncode == 0
+    assert (tmp_path / "results" / "response.nc").is_file()
+    done = hpcclear(*words, tmp_path / "resluts" / "more" / "response.nc")
+    assert done.returncode == 2
+    assert "Make the directory" in done.stderr
+    assert not (tmp_path / "resluts").exists()
+
+
 def test_both_entry_points_give_version_and_help():
     for module in (False, True):
         assert "0.1.0" in hpcclear("--version", module=module).stdout

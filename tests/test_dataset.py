@@ -8,9 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cf_xarray.units
 import h5py
 import numpy as np
 import pint
+import pint_xarray  # noqa: F401
 import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
@@ -633,7 +635,6 @@ def test_what_a_file_cannot_hold_is_refused_when_writing():
 # -- conventions --------------------------------------------------------------------------------
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_cf_checker_finds_no_error(tmp_path, kind):
     path, report = tmp_path / "x.nc", tmp_path / "report.json"
@@ -648,3 +649,22 @@ def test_cf_checker_finds_no_error(tmp_path, kind):
     unexpected = [text for text in messages if "should have standard_name='time'" not in text]
     assert unexpected == []
     assert kind == "response" or messages == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, kind):
+    registry = pint.UnitRegistry()
+    dataset.write(example(kind), tmp_path / "x.nc")
+    with xr.open_dataset(tmp_path / "x.nc", decode_timedelta=False) as found:
+        measured = [n for n, v in found.data_vars.items() if "units" in v.attrs]
+        for name in measured:
+            plain = registry.parse_units(found[name].attrs["units"])
+            udunits = cf_xarray.units.units.parse_units(found[name].attrs["units"])
+            assert plain.dimensionality == udunits.dimensionality, name
+        quantities = found[measured].reset_coords(drop=True).pint.quantify()
+        assert all(quantities[name].pint.units is not None for name in measured)
+        flags = [name for name, variable in found.data_vars.items() if variable.cf.is_flag_variable]
+        codes = [n for n, v in found.data_vars.items() if v.dtype == np.int8]
+        assert sorted(flags) == sorted(codes)
+        if "status" in found:
+            np.testing.assert_array_equal(found["status"].cf == "ok", found["status"] == Status.OK)
