@@ -54,10 +54,11 @@ def note(event: str, samples: Iterable[str] = ()) -> None:
     os.write(LOG, f"{line}\n".encode())
 
 
-def names(stage: str, samples: np.ndarray, points: np.ndarray) -> list[str]:
-    """What tells a sample from every other of a run: stage, number and design."""
+def names(stage: str, payload: object, samples: np.ndarray, points: np.ndarray) -> list[str]:
+    """What tells a sample from every other of a run: stage, number, scene and design."""
+    scene = zlib.crc32(repr(payload).encode())
     return [
-        f"{stage}#{n}:{zlib.crc32(row.tobytes()):08x}"
+        f"{stage}#{n}:{zlib.crc32(row.tobytes(), scene):08x}"
         for n, row in zip(samples, points, strict=True)
     ]
 
@@ -65,8 +66,8 @@ def names(stage: str, samples: np.ndarray, points: np.ndarray) -> list[str]:
 class Watched:
     """A worker that logs what it finishes, and may fail after that."""
 
-    def __init__(self, worker: object, stage: str) -> None:
-        self._worker, self._stage = worker, stage
+    def __init__(self, worker: object, stage: str, payload: object) -> None:
+        self._worker, self._stage, self._payload = worker, stage, payload
         self._names: dict[int, str] = {}
         self._finished = 0
 
@@ -74,7 +75,8 @@ class Watched:
         return getattr(self._worker, name)
 
     def submit(self, index: np.ndarray, points: np.ndarray) -> None:
-        self._names |= zip(index.tolist(), names(self._stage, index, points), strict=True)
+        known = names(self._stage, self._payload, index, points)
+        self._names |= zip(index.tolist(), known, strict=True)
         self._worker.submit(index, points)
 
     def advance(self, seconds: float) -> object:
@@ -93,13 +95,14 @@ def watch() -> None:
     def made(payload: object, ranks: ranks.Ranks) -> Watched:
         if FAIL == "maker" and HERE:
             fail()
-        return Watched(make(payload, ranks), ranks.where.split("'")[1])
+        return Watched(make(payload, ranks), ranks.where.split("'")[1], payload)
 
     def watched_run_points(self, kind, payload, points, *, on_records=None, **options):
         note("stage", [options.get("stage") or kind])
 
         def receive(records: np.ndarray) -> None:
-            note("received", names(options["stage"], records["sample"], points[records["sample"]]))
+            known = records["sample"]
+            note("received", names(options["stage"], payload, known, points[known]))
             if on_records is not None:
                 on_records(records)
 
