@@ -1,0 +1,105 @@
+"""What is released: wheel and source distribution are complete, and work in an empty environment."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "hpcclear"
+DATA = {"hpcclear/py.typed", "hpcclear/report/page.css", "hpcclear/report/page.js"}
+
+
+def run(*words: object, place: Path, patience: float = 600.0) -> str:
+    """Output of a program that sees nothing of this checkout; it must succeed."""
+    clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(
+        [str(word) for word in words],
+        cwd=place,
+        env=clean,
+        capture_output=True,
+        text=True,
+        timeout=patience,
+        check=False,
+    )
+    assert done.returncode == 0, f"{words}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory with the source distribution and, made from that, the wheel."""
+    place = tmp_path_factory.mktemp("release")
+    ignored = shutil.ignore_patterns(".*", "results", "site", "build", "*.egg-info", "__pycache__")
+    shutil.copytree(ROOT, place / "source", ignore=ignored)
+    run(sys.executable, "-m", "build", "--outdir", place / "dist", place / "source", place=place)
+    return place / "dist"
+
+
+@pytest.fixture(scope="module")
+def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Programs of an environment that holds the wheel and what it asks for, nothing else."""
+    place = tmp_path_factory.mktemp("environment")
+    venv.create(place, with_pip=True)
+    wheel = next(built.glob("*.whl"))
+    pip = (
+        place / "bin" / "python",
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    )
+    run(*pip, f"{wheel}[mpich,analysis]", place=place)
+    return place / "bin"
+
+
+def test_wheel_and_source_hold_every_module_and_the_data(built):
+    modules = {str(path.relative_to(ROOT)) for path in PACKAGE.rglob("*.py")}
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        names = set(wheel.namelist())
+    inside = {name for name in names if ".dist-info/" not in name}
+    assert inside == modules | DATA
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    with tarfile.open(next(built.glob("*.tar.gz"))) as source:
+        kept = {name.partition("/")[2] for name in source.getnames()}
+    assert modules | DATA | {"LICENSE", "README.md", "pyproject.toml"} <= kept
+
+
+def test_a_job_runs_from_the_wheel_alone(installed, tmp_path):
+    for name in ("quickstart", "slider_crank"):
+        shutil.copy(ROOT / "jobs" / f"{name}.toml", tmp_path)
+    home = run(
+        installed / "python", "-c", "import hpcclear; print(hpcclear.__file__)", place=tmp_path
+    )
+    assert home.startswith(str(installed.parent))
+    results = tmp_path / "results"
+    sample = (
+        "sample",
+        "quickstart.toml",
+        "-o",
+        results / "samples.nc",
+        "--set",
+        "study.samples=32",
+    )
+    run(installed / "mpiexec", "-n", "2", installed / "hpcclear", *sample, place=tmp_path)
+    assert "report.html" in run(installed / "hpcclear", "report", results, place=tmp_path)
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert "32 designs" in page
+    assert "<style>" in page
+    assert "data:image/png;base64," in page
+
+
+@pytest.mark.full
+def test_the_quickstart_runs_from_the_wheel_alone(installed, tmp_path):
+    shutil.copy(ROOT / "jobs" / "quickstart.toml", tmp_path)
+    study = ("run", "quickstart.toml", "-o", tmp_path / "study")
+    run(installed / "mpiexec", "-n", "2", installed / "hpcclear", *study, place=tmp_path)
+    run(installed / "hpcclear", "report", tmp_path / "study", place=tmp_path)
+    assert (tmp_path / "study" / "report.html").stat().st_size > 100_000
