@@ -219,13 +219,13 @@ def test_a_signal_to_one_rank_only_stops_the_job(tmp_path):
     assert output.count("SIGTERM was received on rank 1") == 1
 
 
-# Two ranks in the long profile: on a crowded machine half a second may end before the first record.
-@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.full)])
+@pytest.mark.parametrize("ranks", [0, 2])
 def test_a_time_limit_stops_the_run(ranks, tmp_path):
+    limit = 4.0  # s, from the start of the program: the first records come within it on a crowded machine as well
     began = time.time()
-    code, output = finish(start(ranks, "stopping.py", "limited", tmp_path, 0.5))
+    code, output = finish(start(ranks, "stopping.py", "limited", tmp_path, limit))
     assert code == 3, output
-    assert time.time() - began < 6.5
+    assert limit < time.time() - began < limit + 6.0
     assert "the time limit was reached" in output
     assert (tmp_path / "records").stat().st_size > 0
 

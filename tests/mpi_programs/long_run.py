@@ -53,8 +53,9 @@ def program(ranks: Ranks) -> None:
     path = FOLDER / "records"
     completed = np.frombuffer(path.read_bytes() if path.exists() else b"", OUTCOME)
     payload = {"cost": 4e-3, "lanes": 2}
+    points = design(100_000 if WHERE == "limited" else 800)
     result = ranks.run_points(
-        "sleep", payload, design(800), completed=completed, on_records=save, stage="sampling"
+        "sleep", payload, points, completed=completed, on_records=save, stage="sampling"
     )
     np.save(FOLDER / "result.npy", result)
 
