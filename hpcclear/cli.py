@@ -97,7 +97,7 @@ def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None
     return run_on_ranks(program, MAKERS, stop)
 
 
-@cli.command()
+@cli.command(short_help="Say what a file would simulate, at what cost.")
 @_FILE
 @_SET
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
@@ -114,7 +114,7 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
     return Exit.DONE
 
 
-@cli.command()
+@cli.command(short_help="Simulate one response.")
 @_FILE
 @_SET
 @click.option(
@@ -139,7 +139,7 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     return Exit.DONE
 
 
-@cli.command()
+@cli.command(short_help="Simulate many designs.")
 @_FILE
 @_SET
 @click.option(
@@ -185,7 +185,7 @@ def sample(
     return _on_ranks(program, time_limit)
 
 
-@cli.command()
+@cli.command(short_help="Carry a whole study.")
 @_FILE
 @_SET
 @click.option(
@@ -226,7 +226,7 @@ def run(
     return _on_ranks(program, time_limit)
 
 
-@cli.command()
+@cli.command(short_help="Show what accuracy costs in time.")
 @_FILE
 @_SET
 @click.option(
@@ -255,7 +255,7 @@ def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) 
     return _on_ranks(program)
 
 
-@cli.command()
+@cli.command(short_help="Say what a run will cost.")
 @_FILE
 @_SET
 @click.option(
@@ -286,7 +286,7 @@ def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: i
     return _on_ranks(program)
 
 
-@cli.command()
+@cli.command(short_help="Write figures and an HTML page.")
 @click.argument("directory", type=click.Path(path_type=Path))
 def report(directory: Path) -> int:
     """Write figures and a self-contained HTML page about a directory of results.

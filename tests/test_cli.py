@@ -59,6 +59,12 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     assert dataset.read(out, "response")["status"] == 0
 
 
+def test_the_list_of_commands_is_not_cut_off():
+    listed = hpcclear("--help").stdout.partition("Commands:")[2]
+    assert "..." not in listed
+    assert len(listed.split()) > 20
+
+
 def test_one_directory_on_the_way_to_the_results_is_made(tmp_path):
     words = ["simulate", "jobs/slider_crank.toml", *SHORT, "-o"]
     assert hpcclear(*words, tmp_path / "results" / "response.nc").returncode == 0

@@ -589,6 +589,20 @@ def test_schema_accepts_what_is_shipped(path: Path) -> None:
     assert list(validator.iter_errors(load_scene(path).resolved())) == []
 
 
+def test_a_key_of_a_table_given_alone_is_sent_there() -> None:
+    with pytest.raises(InputError, match=r"belongs to \[effects\].*Write effects.gravity"):
+        load_scene(JOBS[0], ["gravity=9.81"])
+    with pytest.raises(InputError, match=r'or "none"'):
+        load_scene(JOBS[0], ["effects.friction=off"])
+
+
+def test_a_study_that_leaves_out_the_scene_itself_is_worth_a_warning() -> None:
+    path = next(path for path in JOBS if path.stem == "quickstart")
+    assert not any("outside" in text for text in load_scene(path).warnings)
+    heavy = load_scene(path, ["mechanism.rod.mass=0.55"])
+    assert any("0.105 to 0.42 kg" in text and "0.55" in text for text in heavy.warnings)
+
+
 def test_schema_knows_the_word_that_switches_off() -> None:
     validator = Draft202012Validator(scene_schema())
     content = tomllib.loads(JOBS[0].read_text())

@@ -52,7 +52,7 @@ def read(directory: str | Path) -> Content:
     """
     place = Path(directory)
     if not place.is_dir():
-        reason = "there is no such directory"
+        reason = "this is a file" if place.exists() else "there is no such directory"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
     paths = [*sorted(place.glob("*.nc")), *sorted((place / "responses").glob("*.nc"))]
     files: dict[str, xr.Dataset] = {}

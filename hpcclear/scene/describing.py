@@ -68,6 +68,16 @@ def warnings(scene: "Scene") -> Iterator[str]:
                 f"joints.{name}.start_eccentricity lies outside the clearance, "
                 "so the run starts in contact"
             )
+    for variable in scene.study.variables if scene.study is not None else ():
+        own = [scene.number(path) for path in variable.paths]
+        if variable.range is not None and not all(
+            variable.range[0] <= value <= variable.range[1] for value in own
+        ):
+            yield (
+                f"study.variables.{variable.name} runs from {variable.range[0]:g} to "
+                f"{variable.range[1]:g} {variable.unit}, and the scene's own value {own[0]:g} "
+                "lies outside"
+            )
 
 
 def differences(first: "Scene", second: "Scene") -> list[str]:

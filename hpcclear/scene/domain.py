@@ -35,7 +35,10 @@ def study_of(scene: "Scene") -> Study:
     """The study of a scene; InputError if it has none."""
     if scene.study is None:
         raise InputError(
-            "study", None, "the scene has no study", "Add [study] and [study.variables]"
+            "study",
+            None,
+            "the scene has no study",
+            "Add [study] and [study.variables], as in jobs/quickstart.toml",
         )
     return scene.study
 

@@ -177,10 +177,16 @@ class Effects(Table):
     @model_validator(mode="before")
     @classmethod
     def _none_is_off(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            return {
-                key: value
-                for key, value in data.items()
-                if not (key in ("friction", "slider_load", "guide_friction") and value == "none")
-            }
-        return data
+        if not isinstance(data, Mapping):
+            return data
+        for key in ("friction", "guide_friction"):
+            if isinstance(data.get(key), str) and data[key] != "none":
+                raise problem(
+                    'a table is expected here, or "none"',
+                    'Write "none" to switch it off, or a table such as { coefficient = 0.01 }'
+                    + (' with law = "coulomb"' if key == "friction" else ""),
+                    key=key,
+                    value=data[key],
+                )
+        words = ("friction", "slider_load", "guide_friction")
+        return {key: value for key, value in data.items() if not (key in words and value == "none")}

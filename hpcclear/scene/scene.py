@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr, ValidationError, field_validator, model_validator
 
@@ -33,6 +33,12 @@ class Scene(Table):
     numerics: Numerics = Numerics()
     output: Output = Output()
     study: Study | None = None
+
+    elsewhere: ClassVar = {
+        key: (f"belongs to [{part}]", f"Write {part}.{key}")
+        for part, table in (("numerics", Numerics), ("effects", Effects), ("study", Study))
+        for key in table.model_fields
+    }
 
     _text: str = PrivateAttr("")
     _known_numbers: dict[str, float] | None = PrivateAttr(None)

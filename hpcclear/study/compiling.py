@@ -4,6 +4,7 @@ Compilation takes longer than many a study's simulations. What one rank has comp
 its node load from disk.
 """
 
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -103,6 +104,13 @@ def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> N
     style : str
         How progress is shown.
     """
-    progress = Progress("compiling", style=style)
+    # One sample that takes as long as the compilers do: its rate would say nothing.
+    progress = Progress("compiling", style="quiet")
+    if style != "quiet":
+        print(
+            "compiling what this study needs: up to a minute the first time",
+            file=sys.stderr,
+            flush=True,
+        )
     nothing = np.zeros((1, 1))  # a stage needs a sample
     ranks.run_points(COMPILE, payload_of(scene, points), nothing, progress=progress)
