@@ -112,6 +112,7 @@ def run_sample(
     points = design(scene, table)
     key = sample_key(scene, points)
     with Lock(output.parent, f".{output.name}.lock"):
+        storage.remove_leftovers(output.parent)
         samples = finished(output, key)
         if samples is None:
             samples = _simulate(scene, points, output, key, ranks, interval, style)

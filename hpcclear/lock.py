@@ -225,7 +225,7 @@ class Lock:
 
     def _bury(self, text: bytes) -> None:
         """Remove a dead run's lock where there is no flock; of several who try, one succeeds."""
-        grave = self.path.with_name(f".hpcclear-{secrets.token_hex(8)}.tmp")
+        grave = self.path.with_name(f".hpcclear-lock-{secrets.token_hex(8)}.tmp")
         try:
             os.rename(self.path, grave)
         except FileNotFoundError:

@@ -6,6 +6,7 @@ the HDF5 end of file, where every reader of NetCDF ignores it; `load` verifies i
 library sees a byte, so truncation, bit rot and tampering end in a message, never in a parser.
 """
 
+import contextlib
 import errno
 import hashlib
 import io
@@ -25,6 +26,8 @@ from .errors import InputError, StorageError
 
 TEMPORARY = re.compile(r"\.hpcclear-[0-9a-f]{16}\.tmp")
 """Names of files that were being written; what is left of them after a kill is rubbish."""
+
+_ATTEMPTS = 5  # of writing a file whose temporary a run that starts takes for such a leftover
 
 _SEAL = b"\nhpcclear seal sha256:"
 _SEAL_LENGTH = len(_SEAL) + 64 + 1
@@ -81,24 +84,42 @@ def write_bytes(path: Path, content: bytes) -> None:
     StorageError
         The disk is full or fails, or a file size limit is met.
     """
-    temporary = f".hpcclear-{secrets.token_hex(8)}.tmp"
     try:
         directory = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         raise refused(path, error) from None
     # Everything goes through the open directory: a link swapped in meanwhile cannot lead elsewhere.
     try:
-        try:
-            _write_whole(temporary, content, directory)
-            os.rename(temporary, path.name, src_dir_fd=directory, dst_dir_fd=directory)
-        except BaseException:
-            _unlink(temporary, directory)
-            raise
+        if not any(_replaced(path.name, content, directory) for _ in range(_ATTEMPTS)):
+            raise OSError(errno.EIO, "temporary files are removed at once")
         fsync_directory(directory)
     except OSError as error:
         raise refused(path, error) from None
     finally:
         os.close(directory)
+
+
+def _replaced(name: str, content: bytes, directory: int) -> bool:
+    """Write aside and rename; False if somebody removed the temporary in between."""
+    temporary = f".hpcclear-{secrets.token_hex(8)}.tmp"
+    try:
+        _write_whole(temporary, content, directory)
+        try:
+            os.rename(temporary, name, src_dir_fd=directory, dst_dir_fd=directory)
+        except FileNotFoundError:
+            return False
+    except BaseException:
+        _unlink(temporary, directory)
+        raise
+    return True
+
+
+def remove_leftovers(directory: Path) -> None:
+    """Remove what killed runs were writing in a directory; who is writing there now tries again."""
+    for path in directory.glob(".hpcclear-*.tmp"):
+        if TEMPORARY.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+            with contextlib.suppress(OSError):  # somebody else's, or gone
+                path.unlink()
 
 
 def _write_whole(name: str, content: bytes, directory: int) -> None:

@@ -129,6 +129,7 @@ def run_statistics(
     layout = f"{len(points)} in blocks of {BLOCK}, {BINS} bins"
     key = {**entries, "hpcclear version": __version__, "statistics": layout}
     with Lock(output.parent, f".{output.name}.lock"):
+        storage.remove_leftovers(output.parent)
         if output.exists():
             content = dataset.read(output, "statistics")
             check_key(content, key, output)

@@ -195,6 +195,25 @@ def test_a_full_disk_keeps_samples_in_memory_and_the_last_parts_on_disk(tmp_path
     assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 6).tobytes()
 
 
+def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp_path, monkeypatch):
+    leftover, kept = ".hpcclear-0123456789abcdef.tmp", (".hpcclear-notes.tmp", "part.tmp")
+    for name in (leftover, *kept):
+        (tmp_path / name).touch()
+    rename, removed = os.rename, []
+
+    def rename_after_a_clean_up(source: str, target: str, **options: int) -> None:
+        if not removed:
+            removed.append(source)
+            storage.remove_leftovers(tmp_path)
+        rename(source, target, **options)
+
+    monkeypatch.setattr(os, "rename", rename_after_a_clean_up)
+    storage.write_bytes(tmp_path / "x", b"content")
+    assert len(removed) == 1
+    assert (tmp_path / "x").read_bytes() == b"content"
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "x"])
+
+
 # -- keys, stages, places -----------------------------------------------------------------------
 
 

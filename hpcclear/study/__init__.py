@@ -89,6 +89,8 @@ def run_study(
     place = _made(Path(directory), fresh, tell)
     key = run_key(scene, "run")
     with Lock(place):
+        for folder in (place, place / "responses"):
+            storage.remove_leftovers(folder)
         if _finished(place, key, scene):
             tell(f"{place} holds the finished study.")
             return None
