@@ -74,11 +74,11 @@ def _scene(file: Path, overrides: tuple[str, ...]) -> "Scene":
 
 
 def _place(output: Path) -> Path:
-    """The place for results; one directory on the way to it is made, more are taken for a slip of the pen."""
+    """The place for results, made if it lies below here or beside what is there; else a slip of the pen is likelier."""
     parent = output.parent
-    if parent.parent.is_dir() and not parent.exists():
+    if not output.is_absolute() or parent.parent.is_dir():
         with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
-            parent.mkdir()
+            parent.mkdir(parents=True, exist_ok=True)
     return output
 
 

@@ -65,7 +65,7 @@ def test_the_list_of_commands_is_not_cut_off():
     assert len(listed.split()) > 20
 
 
-def test_one_directory_on_the_way_to_the_results_is_made(tmp_path):
+def test_the_directory_of_the_results_is_made_unless_it_looks_misspelt(tmp_path):
     words = ["simulate", "jobs/slider_crank.toml", *SHORT, "-o"]
     assert hpcclear(*words, tmp_path / "results" / "response.nc").returncode == 0
     assert (tmp_path / "results" / "response.nc").is_file()
