@@ -17,12 +17,11 @@ from .checkpoint import (
     Checkpoint,
     check_key,
     discard,
-    fresh_sibling,
     key_attribute,
-    parts_of,
 )
 from .errors import InputError
 from .lock import Lock
+from .places import fresh_sibling, parts_of
 from .progress import Progress, Style
 from .ranks import COLUMNS, Ranks
 from .sampling import latin_hypercube, monte_carlo, read_points

@@ -7,7 +7,6 @@ files of plain arrays. Every file carries the key of its run, and only the same 
 """
 
 import json
-import os
 import re
 import time
 from collections import Counter
@@ -33,6 +32,7 @@ KEY = "run_key"
 _FANOUT = 8
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
+_DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
 
 
 def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
@@ -86,37 +86,16 @@ def _short(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def parts_of(output: Path) -> Path:
-    """Where the finished samples of a single result file are kept until it is written."""
-    return output.with_name(f".{output.name}.parts")
-
-
-def fresh_sibling(path: Path) -> Path:
-    """The first free name beside `path`: DIR-2, DIR-3, ... or OUT-2.nc, OUT-3.nc, ...
-
-    A directory is made at once, so that two runs never get the same one; for a file (a name with
-    a suffix) the lock of the run decides.
-    """
-    path = path.absolute()  # "." has no name
-    number = 2
-    while True:
-        sibling = path.with_name(f"{path.stem}-{number}{path.suffix}")
-        if path.is_dir() or path.suffix == "":
-            sibling = path.with_name(f"{path.name}-{number}")
-            try:
-                sibling.mkdir()
-                return sibling
-            except FileExistsError:
-                pass
-            except OSError as error:
-                raise storage.refused(sibling, error) from None
-        elif not any(os.path.lexists(place) for place in (sibling, parts_of(sibling))):
-            return sibling
-        number += 1
+def unfinished(directory: Path) -> bool:
+    """Whether a directory holds work to go on from: files of a `Checkpoint` that was not finished."""
+    names = [path.name for path in directory.glob("*.nc")]
+    return _DONE not in names and any(_PART.fullmatch(n) or _STAGE.fullmatch(n) for n in names)
 
 
 def discard(directory: Path) -> None:
     """Remove what a `Checkpoint` wrote in a directory, and the directory unless more is in it.
+
+    The mark of `Checkpoint.finish` goes last: half of what was there is never taken for all of it.
 
     Raises
     ------
@@ -129,6 +108,7 @@ def discard(directory: Path) -> None:
         for path in sorted(directory.iterdir()):
             if any(form.fullmatch(path.name) for form in (_PART, _STAGE, storage.TEMPORARY)):
                 path.unlink(missing_ok=True)
+        (directory / _DONE).unlink(missing_ok=True)
         if not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:
@@ -325,14 +305,17 @@ class Checkpoint:
     # -- opening and closing --------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Remove all that was written here; call it when the final file is in place."""
+        """Remove all that was written here; call it when the final files are in place."""
         with self._timed():
+            storage.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
 
     def _open(self) -> int:
         """Read the parts that are there; the number of the next one."""
+        if (self.directory / _DONE).exists():
+            discard(self.directory)
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
             reason = "it is a symbolic link"

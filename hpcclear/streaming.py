@@ -10,9 +10,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from . import __version__, dataset, storage
-from .checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from .checkpoint import Checkpoint, check_key, key_attribute
 from .errors import InputError
 from .lock import Lock
+from .places import fresh_sibling
 from .progress import Progress, Style
 from .ranks import Ranks
 from .sampling import monte_carlo

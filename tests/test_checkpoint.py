@@ -20,9 +20,10 @@ import pytest
 import xarray as xr
 
 from hpcclear import dataset, storage
-from hpcclear.checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from hpcclear.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
 from hpcclear.errors import InputError, StorageError
 from hpcclear.lock import Holder, Lock
+from hpcclear.places import fresh_sibling
 from hpcclear.status import OUTCOME, Status, failed
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
@@ -166,6 +167,33 @@ def test_finish_removes_what_was_written_here(tmp_path):
     checkpoint.save_stage("fit", {"x": [1.0]})
     checkpoint.finish()
     assert not (tmp_path / "c").exists()
+
+
+def test_a_kill_while_all_is_removed_leaves_nothing_to_go_on_from(tmp_path, monkeypatch):
+    folder, unlink, left = tmp_path / "c", Path.unlink, iter(range(2))
+
+    def removing(path: Path, missing_ok: bool = False) -> None:
+        if path.name.startswith(("part", "stage")) and next(left, None) is None:
+            raise KeyboardInterrupt
+        unlink(path, missing_ok)
+
+    checkpoint = Checkpoint(folder, KEY, interval=0.0)
+    assert not unfinished(folder)
+    for sample in range(4):
+        add(checkpoint, outcomes(sample, 1))
+    checkpoint.save_stage("fit", {"x": [1.0]})
+    assert unfinished(folder)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", removing)
+        with pytest.raises(KeyboardInterrupt):
+            checkpoint.finish()
+    assert len(parts(folder)) == 2
+    assert not unfinished(folder)
+    again = Checkpoint(folder, KEY)
+    assert again.completed().size == 0
+    assert again.load_stage("fit") is None
+    discard(folder)
+    assert not folder.exists()
 
 
 def test_time_in_calls_is_measured(tmp_path):

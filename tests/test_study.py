@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hpcclear import dataset
+from hpcclear.checkpoint import Checkpoint
 from hpcclear.comm import alone
 from hpcclear.errors import InputError
 from hpcclear.scene import load_scene
@@ -211,6 +212,23 @@ def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_p
     stages = formula.run_in_pieces(scene_of(), place, alone(MAKERS))
     assert stages == 7
     assert contents(place) == contents(results)
+
+
+def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):
+    place = tmp_path / "damaged"
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "finish", _interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+    part = min((place / "checkpoint").glob("part-*.nc"))
+    part.write_bytes(part.read_bytes()[:-1])
+    (place / "claims.nc").unlink()
+    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+    assert contents(place) == contents(results)
+
+
+def _interrupt(checkpoint: Checkpoint) -> None:
+    raise KeyboardInterrupt
 
 
 def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):

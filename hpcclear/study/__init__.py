@@ -24,9 +24,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import dataset, storage
-from ..checkpoint import Checkpoint, check_key, fresh_sibling, key_attribute
+from ..checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
 from ..errors import InputError
 from ..lock import Lock
+from ..places import fresh_sibling
 from ..progress import Style
 from ..ranks import COLUMNS, Ranks
 from ..scene import Scene
@@ -92,6 +93,7 @@ def run_study(
         for folder in (place, place / "responses"):
             storage.remove_leftovers(folder)
         if _finished(place, key, scene):
+            discard(place / "checkpoint")  # the run that finished may have been killed over it
             tell(f"{place} holds the finished study.")
             return None
         attributes = {**dataset.provenance(scene.text, scene.hash), **key_attribute(key)}
@@ -220,4 +222,4 @@ def _finished(place: Path, key: dict[str, str], scene: Scene) -> bool:
     there = [place / name for name in names if (place / name).exists()]
     for path in there:
         check_key(dataset.read(path), key, path)
-    return len(there) == len(names) and not (place / "checkpoint").exists()
+    return len(there) == len(names) and not unfinished(place / "checkpoint")

@@ -77,7 +77,7 @@ class Run:
         arguments: tuple[object, ...],
     ) -> Result:
         found = self.checkpoint.load_stage(name)
-        if found is None:
+        if found is None or not self._has_samples(int(found["next_sample"])):
             with context:
                 self.ranks.raise_if_stopped()
                 result = {key: np.asarray(value) for key, value in work(self, *arguments).items()}
@@ -89,6 +89,10 @@ class Run:
         found = dict(found)
         self.simulations.next = int(found.pop("next_sample"))
         return found
+
+    def _has_samples(self, count: int) -> bool:
+        """Whether the samples that a kept stage stands on are there; a file of them may be damaged."""
+        return np.count_nonzero(self.checkpoint.completed()["sample"] < count) == count
 
     def write(self, content: xr.Dataset, name: str) -> None:
         """Write a result file, with what made it."""
