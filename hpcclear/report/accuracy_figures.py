@@ -110,10 +110,11 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
     panel, error = axes[0, 0], found["averaging_error"]
     for k, transient in enumerate(found["transient"].to_numpy()):
         y = error.sel(transient=transient).to_numpy()
-        look = k % len(style.CYCLE)
+        again, look = divmod(k, len(style.CYCLE))  # the second round has hollow marks
         panel.loglog(
             found["averaged"], y, color=style.CYCLE[look], ls=style.DASHES[look],
             marker=style.MARKERS[look], label=str(transient),
+            **({"mfc": "white"} if again else {}),
         )  # fmt: skip
     floor = float(found["averaging_floor"])
     if floor > 0.0:
