@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The job scripts on a real Slurm of this one machine: finished, out of time and requeued to the end, cancelled and
-# resumed by hand. About five minutes on two cores. Needs root and Debian's slurm-wlm and munge:
+# resumed by hand. Five to ten minutes on two cores. Needs root and Debian's slurm-wlm and munge:
 #     apt-get update && apt-get install -y slurm-wlm munge
 #     bash tests/slurm/run.sh
 set -euo pipefail
