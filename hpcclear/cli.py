@@ -303,7 +303,10 @@ def report(directory: Path) -> int:
 
 @cli.command()
 def schema() -> int:
-    """Print the JSON schema of scene files, for editors."""
+    """Print the JSON schema of scene files, for editors.
+
+    Example: hpcclear schema > hpcclear.schema.json
+    """
     import json
 
     from .scene import scene_schema

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from hpcclear import dataset
+from hpcclear.cli import cli
 
 ROOT = Path(__file__).resolve().parent.parent
 SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.averaged_revolutions=1"]
@@ -59,6 +60,16 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     assert dataset.read(out, "response")["status"] == 0
 
 
+def test_the_shell_completes_commands_and_options():
+    def completed(words):
+        asked = {"_HPCCLEAR_COMPLETE": "bash_complete", "COMP_WORDS": words}
+        place = {"COMP_CWORD": str(len(words.split()) - 1)}
+        return hpcclear(env=os.environ | asked | place).stdout.split()
+
+    assert completed("hpcclear si") == ["plain,simulate"]
+    assert completed("hpcclear run --f") == ["plain,--fresh"]
+
+
 def test_the_list_of_commands_is_not_cut_off():
     listed = hpcclear("--help").stdout.partition("Commands:")[2]
     assert "..." not in listed
@@ -78,7 +89,7 @@ def test_the_directory_of_the_results_is_made_unless_it_looks_misspelt(tmp_path)
 def test_both_entry_points_give_version_and_help():
     for module in (False, True):
         assert "0.1.0" in hpcclear("--version", module=module).stdout
-    for command in ("check", "simulate", "sample", "run", "report"):
+    for command in cli.commands:
         done = hpcclear(command, "--help")
         assert done.returncode == 0
         assert "Example" in done.stdout
