@@ -4,4 +4,5 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh mpich,analysis
-exec mpiexec -n "${RANKS:-$(nproc)}" hpcclear run "${1:-jobs/robust_slider_crank.toml}" -o "${2:-results/robust_slider_crank}"
+cores=$(env -u OMP_NUM_THREADS nproc) # with it, nproc answers 1
+exec mpiexec -n "${RANKS:-$cores}" hpcclear run "${1:-jobs/robust_slider_crank.toml}" -o "${2:-results/robust_slider_crank}"

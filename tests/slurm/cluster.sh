@@ -6,6 +6,7 @@ start_cluster() {
     folder=$1
     mkdir -p "$folder/spool" "$folder/state"
     (umask 077 && head -c 1024 /dev/urandom >"$folder/munge.key")
+    cores=$(env -u OMP_NUM_THREADS nproc) # which otherwise answers 1
     cat >"$folder/slurm.conf" <<CONF
 ClusterName=test
 # MPICH names its shared memory after job and step: never those of an earlier cluster on this machine.
@@ -33,7 +34,7 @@ ReturnToService=2
 InactiveLimit=0
 KillWait=10
 SchedulerParameters=sched_interval=2,batch_sched_delay=1
-NodeName=$(hostname -s) CPUs=$(nproc) State=UNKNOWN
+NodeName=$(hostname -s) CPUs=$cores State=UNKNOWN
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 CONF
     export SLURM_CONF=$folder/slurm.conf
@@ -56,7 +57,12 @@ stop_cluster() {
     scancel --quiet --user=root || true
     for daemon in slurmd slurmctld munged; do
         if [ -s "$folder/$daemon.pid" ]; then
-            kill "$(cat "$folder/$daemon.pid")" || true
+            process=$(cat "$folder/$daemon.pid")
+            kill "$process" || true
+            for _ in $(seq 100); do # it still writes into the folder
+                kill -0 "$process" 2>/dev/null || break
+                sleep 0.2
+            done
         fi
     done
 }
