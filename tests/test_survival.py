@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import losses
 import numpy as np
 import pytest
 from commands import (
@@ -29,7 +30,7 @@ from commands import (
     start,
     wait_until,
 )
-from losses import Loss, loss_of
+from losses import Loss
 
 from hpcclear import dataset
 from hpcclear.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
@@ -52,6 +53,8 @@ class Undisturbed:
     """Words that put the results into a folder."""
     interval: float
     wall: float = 0.0
+    work: float = 0.0
+    """Seconds of it from the opened checkpoint on."""
     files: dict[str, bytes] = field(default_factory=dict)
 
 
@@ -80,10 +83,12 @@ def undisturbed(request, tmp_path_factory) -> Iterator[Undisturbed]:
     for name in ("compiling", "results"):
         (place / name).mkdir()
         began = time.time()
-        code, output = run(words(place / name))
+        code, output = run(words(place / name), TEST_LOG=str(place / f"{name}.log"))
         assert code == 0, output
+    wall, log = time.time() - began, losses.read(place / "results.log")
+    work = log[-1].time - min(event.time for event in log if event.what == "opened")
     interval = INTERVAL if request.param == "sample" else CHECKPOINT_INTERVAL
-    yield Undisturbed(words, interval, time.time() - began, files(place / "results"))
+    yield Undisturbed(words, interval, wall, work, files(place / "results"))
     remove_orphans()
 
 
@@ -106,7 +111,7 @@ only_sample = pytest.mark.parametrize("undisturbed", ["sample"], indirect=True)
 @pytest.mark.timeout(3600)
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
     dice, done, states = random.Random(kills), 0, Counter()
-    losses: list[Loss] = []
+    found: list[Loss] = []
     for turn in itertools.count():
         if done >= kills:
             break
@@ -116,7 +121,10 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
         for number in range(4):  # up to four kills of one run
             logs.append(tmp_path / f"{turn}-{number}.log")
             job = start(words, TEST_LOG=str(logs[-1]))
-            moment = time.time() + dice.uniform(0.3, undisturbed.wall)
+            early = dice.random() < 0.2
+            while not early and job.poll() is None and not logs[-1].exists():
+                time.sleep(0.02)  # the checkpoint is opened
+            moment = time.time() + dice.uniform(0.0, 1.0) * (1.0 if early else undisturbed.work)
             wait_until(job, moment, folder, writing=dice.random() < 0.3)
             ranks = ranks_of(job)
             if job.poll() is not None or not ranks:
@@ -132,14 +140,15 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
         code, output = run(words, TEST_LOG=str(logs[-1]))
         assert code == 0, output
         assert files(folder) == undisturbed.files
-        losses += [
-            loss_of(log, logs[k + 1 :], undisturbed.interval) for k, log in enumerate(logs[:-1])
+        found += [
+            losses.loss_of(log, logs[k + 1 :], undisturbed.interval)
+            for k, log in enumerate(logs[:-1])
         ]
-    lost, seconds = (max(getattr(loss, name) for loss in losses) for name in ("samples", "seconds"))
+    lost, seconds = (max(getattr(loss, name) for loss in found) for name in ("samples", "seconds"))
     print(
         f"{done} kills, each cost {lost} samples and {seconds:.1f} s at most; {dict(states)}; "
-        f"samples were lost by {sum(loss.samples > 0 for loss in losses)}; "
-        f"last begun: {dict(Counter(loss.stage for loss in losses))}"
+        f"samples were lost by {sum(loss.samples > 0 for loss in found)}; "
+        f"last begun: {dict(Counter(loss.stage for loss in found))}"
     )
 
 
@@ -288,7 +297,7 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
     check_readable(place)
     assert run(words, TEST_LOG=str(after))[0] == 0
     assert files(place) == undisturbed.files
-    return loss_of(before, [after], None).samples
+    return losses.loss_of(before, [after], None).samples
 
 
 @only_sample

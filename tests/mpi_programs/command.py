@@ -23,7 +23,6 @@ import numpy as np
 from hpcclear import checkpoint, cli, launcher, ranks, work
 
 RANK = launcher.launched_rank() or 0
-LOG = os.open(os.environ.get("TEST_LOG", os.devnull), os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 FAIL = os.environ.get("TEST_FAIL", "")
 HERE = int(os.environ.get("TEST_RANK", "0")) == RANK
 
@@ -51,7 +50,8 @@ def note(event: str, samples: Iterable[str] = ()) -> None:
     ``stage``: root begins one, which stands for a sample here.
     """
     line = "\t".join([f"{time.monotonic():.6f}", str(RANK), event, *samples])
-    os.write(LOG, f"{line}\n".encode())
+    with open(os.environ.get("TEST_LOG", os.devnull), "ab", buffering=0) as log:
+        log.write(f"{line}\n".encode())
 
 
 def names(stage: str, payload: object, samples: np.ndarray, points: np.ndarray) -> list[str]:
