@@ -32,19 +32,33 @@ def commands() -> Iterator[str]:
 
 
 def scene_entries() -> Iterator[str]:
-    """A table for each part of a scene file, from its JSON schema."""
+    """A table for each part of a scene file, from its JSON schema, in the order in which they are named."""
     schema = scene_schema()
-    for name, part in {"Scene": schema, **schema["$defs"]}.items():
-        if "properties" not in part:
-            continue
+    parts = {"Scene": schema, **schema["$defs"]}
+    for name in _in_order(parts):
+        part = parts[name]
         yield from (f"## {name}", "", _cell(part.get("description", "")), "")
         yield from ("| entry | value | default | meaning |", "| --- | --- | --- | --- |")
         for entry, field in part["properties"].items():
             required = entry in part.get("required", ())
             default = "needed" if required else _default(field)
-            meaning = _cell(field.get("description", ""))
+            meaning = _cell(field.get("description") or _first_meaning(field, parts))
             yield f"| `{entry}` | {_value(field)} | {default} | {meaning} |"
         yield ""
+
+
+def _in_order(parts: dict[str, Any]) -> list[str]:
+    found = ["Scene"]
+    for name in found:
+        named = re.findall(r"#/\$defs/(\w+)", str(parts[name]["properties"]))
+        found += [part for part in dict.fromkeys(named) if part not in found]
+    return found
+
+
+def _first_meaning(field: dict[str, Any], parts: dict[str, Any]) -> str:
+    """What the part that a field refers to is."""
+    named = re.findall(r"#/\$defs/(\w+)", str(field))
+    return str(parts[named[0]].get("description", "")) if len(named) == 1 else ""
 
 
 def _default(field: dict[str, Any]) -> str:
