@@ -52,9 +52,8 @@ class Undisturbed:
     words: Callable[[Path], list[str]]
     """Words that put the results into a folder."""
     interval: float
-    wall: float = 0.0
     work: float = 0.0
-    """Seconds of it from the opened checkpoint on."""
+    """Seconds from the opened checkpoint on."""
     files: dict[str, bytes] = field(default_factory=dict)
 
 
@@ -82,13 +81,12 @@ def undisturbed(request, tmp_path_factory) -> Iterator[Undisturbed]:
     place = tmp_path_factory.mktemp("undisturbed")
     for name in ("compiling", "results"):
         (place / name).mkdir()
-        began = time.time()
         code, output = run(words(place / name), TEST_LOG=str(place / f"{name}.log"))
         assert code == 0, output
-    wall, log = time.time() - began, losses.read(place / "results.log")
+    log = losses.read(place / "results.log")
     work = log[-1].time - min(event.time for event in log if event.what == "opened")
     interval = INTERVAL if request.param == "sample" else CHECKPOINT_INTERVAL
-    yield Undisturbed(words, interval, wall, work, files(place / "results"))
+    yield Undisturbed(words, interval, work, files(place / "results"))
     remove_orphans()
 
 
@@ -163,13 +161,16 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
     for moment in range(moments):
         folder = tmp_path / str(moment) / "results"
         folder.mkdir(parents=True)
-        words, delay = undisturbed.words(folder), dice.uniform(0.8, undisturbed.wall)
+        words, delay = undisturbed.words(folder), dice.uniform(0.05, 1.0 + undisturbed.work)
+        began = [folder.parent / f"began{rank}" for rank in (0, 1)]
+        settings = {"TEST_BEGAN": str(folder.parent / "began")}
         if how == "time limit":
-            began = folder.parent / "began.log"
-            code, output = run([*words, "--time-limit", str(delay)], TEST_BEGAN=str(began))
-            told = began.stat().st_mtime + delay
+            code, output = run([*words, "--time-limit", str(delay)], **settings)
+            told = began[0].stat().st_mtime + delay
         else:
-            job = start(words)
+            job = start(words, **settings)
+            while job.poll() is None and not all(mark.exists() for mark in began):
+                time.sleep(0.02)  # a signal before that ends it as it would any program
             wait_until(job, time.time() + delay, folder)
             told = time.time()
             kill(job.pid, signal.Signals[how])

@@ -1,7 +1,7 @@
 """The real command, watched or sabotaged: command.py ARGUMENTS OF hpcclear; settings in the environment.
 
 TEST_LOG    file that gets a line for all that matters to finished samples, see `note`
-TEST_BEGAN  file that root touches when it begins
+TEST_BEGAN  file that a rank touches when it listens to signals; the rank is added to the name
 TEST_FAIL   what fails, see `sabotage`
 TEST_RANK   on which rank
 TEST_MARK   file that is touched when it does
@@ -20,7 +20,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hpcclear import checkpoint, cli, launcher, ranks, work
+from hpcclear import checkpoint, cli, launcher, ranks, stopping, work
 
 RANK = launcher.launched_rank() or 0
 FAIL = os.environ.get("TEST_FAIL", "")
@@ -86,6 +86,17 @@ class Watched:
         self._finished += records.size
         note("finished", [self._names[sample] for sample in records["sample"].tolist()])
         return records
+
+
+def tell_when_it_listens(mark: pathlib.Path) -> None:
+    enter = stopping.StopSwitch.__enter__
+
+    def entered(switch: stopping.StopSwitch) -> stopping.StopSwitch:
+        enter(switch)
+        mark.touch()
+        return switch
+
+    stopping.StopSwitch.__enter__ = entered  # type: ignore[method-assign]
 
 
 def watch() -> None:
@@ -162,8 +173,8 @@ def sabotage() -> None:
 
 
 if __name__ == "__main__":
-    if launcher.launched_rank() in (0, None) and "TEST_BEGAN" in os.environ:
-        pathlib.Path(os.environ["TEST_BEGAN"]).touch()
+    if "TEST_BEGAN" in os.environ:
+        tell_when_it_listens(pathlib.Path(f"{os.environ['TEST_BEGAN']}{RANK}"))
     watch()
     sabotage()
     cli.main()
