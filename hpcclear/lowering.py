@@ -19,6 +19,10 @@ LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""
 
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
+STIFF_RAMP = 100.0
+"""Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
+STIFF_DAMPING = 10.0
+"""Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""
 """Methods that may take implicit steps, and when.
 
 Not yet "auto": the implicit steps' energy balance is looser than the explicit method's at the same tolerance.
@@ -96,7 +100,8 @@ def tableau_of(scene: Scene) -> Tableau:
 def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
 
-    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s.
+    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the crank pin moves
+    slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
     """
     first, second, free = topology(scene)
     a = scene.numerics.absolute_tolerance
@@ -110,7 +115,10 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
         lengths = []
     lengths += [False] * free
     coordinates = [a if length else 10.0 * a for length in lengths]
-    velocities = [1e3 * a if length else 5e4 * a for length in lengths]
+    drive = scene.drive
+    speed = drive.initial_speed if drive.kind == "torque" else drive.speed
+    rate = 1e3 * min(1.0, scene.mechanism.crank.length * abs(speed) / 25.0)
+    velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
     return (*coordinates, *velocities)
 
 
@@ -137,6 +145,30 @@ def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = CELLS) -
     return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
 
 
+def implicit_method(scene: Scene) -> str:
+    """When the kernel takes implicit steps: "never", "stiff" (where a lane's motion calls for it), "always".
+
+    The automatic choice goes by the scene's numbers, so that a scene that is not stiff pays nothing for the other method.
+    It is the same for a single response and for an ensemble.
+    """
+    method = scene.numerics.method
+    if method != "auto" or not scene.clearance_joints():
+        return IMPLICIT_METHODS.get(method, "never")
+    par = parameters(scene)[0]
+    joints = {"crank_rod": at.JOINT_12, "rod_slider": at.JOINT_23}
+    friction, contact_law = (
+        scene.effects.friction.law,
+        getattr(scene.effects.contact, "law", "hertz"),
+    )
+    for joint in scene.clearance_joints():
+        p = par[joints[joint] :]
+        ramp = p[at.FRICTION] * p[at.INVERSE_RAMP] if friction != "none" else 0.0
+        damping = p[at.DAMPING] if contact_law != "hertz" else 0.0
+        if ramp >= STIFF_RAMP or damping >= STIFF_DAMPING:
+            return "stiff"
+    return "never"
+
+
 def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
@@ -157,7 +189,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         max_steps=scene.numerics.max_steps,
         torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,  # type: ignore[arg-type]
         load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,  # type: ignore[arg-type]
-        implicit=IMPLICIT_METHODS.get(scene.numerics.method, "never"),
+        implicit=implicit_method(scene),
     )
 
 

@@ -30,9 +30,9 @@ LONG_AT_TIGHT_TOLERANCE = (
     "friction_05_ramp_1e-4",
     "friction_05_ramp_1e-6",
 )
-# Measured 1.35e-7 over four revolutions, 1.0e-7 over ten: undamped and memory-free, no impact is located, and nothing
-# forgets what is lost at the kinks of the force.
-MEASURED_ABOVE = {("hunt_crossley_undamped", 1e-8): 2e-7}
+# Measured 5.3e-7 over ten revolutions: a jam that tears loose, at penetrations of three clearances, with more kinks than steps
+# are cut for.
+MEASURED_ABOVE = {("friction_05_ramp_1e-4", 1e-8): 1e-6}
 BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}  # on the energy residual, over ten revolutions
 NUMBERS = ("objective", "mean_gap", "peak_contact_force")
 BAD = (math.nan, math.inf, -math.inf)

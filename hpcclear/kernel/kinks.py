@@ -1,8 +1,8 @@
 """Kinks of the forces: where sliding leaves or enters the friction ramp, and where damping stops a contact's force.
 
 Across a kink the solution is hardly more than once differentiable and Newton's iteration with one Jacobian for all
-stages does not converge, so an implicit step is cut to end just beyond the first kink its first guess shows. Each kink is the
-zero of a smooth function: damping factor, sliding speed at one side of the ramp, at the other.
+stages does not converge, so an implicit step is cut to end just beyond the first kink its first guess shows, or its
+solution. Each kink is the zero of a smooth function: damping factor, sliding speed at one side of the ramp, at the other, gap.
 """
 
 from ..jit import lane_function, scalar_function
@@ -12,6 +12,9 @@ from .radau import BASIS, NODES
 
 BEYOND = 1e-4
 """How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
+
+GAP_UNIT = 0.1
+"""Of the clearance: the unit in which the gap, whose sign is a kink too, is of order 1."""
 
 LEAST_CUT = 0.02
 """A step is cut to this fraction at least: a kink that is nearer is stepped over."""
@@ -42,6 +45,15 @@ def in_contact(latched, m, gap, active):
 
 
 @lane_function
+def impact_ahead(latched, m, active):
+    """Whether a change of the gap's sign is the stepper's to find: an impact to be located."""
+    if latched is not None:
+        return m[active] == 0.0
+    else:
+        return False
+
+
+@lane_function
 def ramp_sides(coulomb, ambrosio, m, joint, sliding):
     """Functions that vanish where friction's ramp begins and ends."""
     inverse_ramp = m[mem.PAR + joint + at.INVERSE_RAMP]
@@ -56,7 +68,7 @@ def ramp_sides(coulomb, ambrosio, m, joint, sliding):
 
 @lane_function
 def kinks_of_joint(flag, effects, m, rates, k, out):
-    """The three functions of joint k (0 or 1) from the rates at `rates` to `out`; 0 where no kink can be felt."""
+    """The four functions of joint k (0 or 1) from the rates at `rates` to `out`; 0 where no kink can be felt."""
     if flag is not None:
         joint = at.JOINT_12 if k == 0 else at.JOINT_23
         gap = m[rates + at.GAP_12 + 3 * k]
@@ -73,9 +85,11 @@ def kinks_of_joint(flag, effects, m, rates, k, out):
         low, high = ramp_sides(
             effects.coulomb, effects.ambrosio, m, joint, m[rates + at.SLIDING_12 + k]
         )
+        free = impact_ahead(effects.latched, m, at.ACTIVE_12 + k)
         m[out] = factor if touches else 0.0
         m[out + 1] = low if touches and factor > 0.0 else 0.0
         m[out + 2] = high if touches and factor > 0.0 else 0.0
+        m[out + 3] = 0.0 if free else gap / (GAP_UNIT * m[mem.PAR + joint + at.CLEARANCE])
 
 
 @scalar_function
@@ -89,6 +103,8 @@ def kinks_of_start(effects, m):
         m[mem.KINKS + 3],
         m[mem.KINKS + 4],
         m[mem.KINKS + 5],
+        m[mem.KINKS + 6],
+        m[mem.KINKS + 7],
     )
     kinks_of_joint(effects.crank_rod, effects, m, mem.START_RATES, 0, mem.KINKS)
     kinks_of_joint(effects.rod_slider, effects, m, mem.START_RATES, 1, mem.KINKS + _PER_JOINT)

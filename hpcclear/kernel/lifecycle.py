@@ -5,7 +5,7 @@ import math
 from ..jit import scalar_function as lane_event
 from ..status import Status
 from . import layout as at
-from .events import absolute_integral, impact_fraction
+from .events import absolute_integral, impact_fraction, root
 
 OK = int(Status.OK)
 STEP_CAP = int(Status.STEP_CAP)
@@ -14,6 +14,9 @@ NOT_FINITE = int(Status.NOT_FINITE)
 STALLED = int(Status.STALLED)
 AVERAGE_CAP = int(Status.AVERAGE_CAP)
 UNFINISHED = -1
+
+KINK_REACH = 1e-3
+"""Part of a step that a kink of the force may stand from either end: its effect falls with the 2.5th power."""
 
 # ---- settings shared by all lanes
 (
@@ -182,6 +185,37 @@ def stop_at_impacts(lane, W, work, settings):
         latch(lane, W, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
     if second == 1.0:
         latch(lane, W, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+
+
+@lane_event
+def before_kink(lane, W, work, settings, gap):
+    """Fraction of this step at which a gap changes sign; 2 if it does not, or so near an end that it does no harm."""
+    d0 = work[(at.RATE_OLD + gap) * W + lane]
+    d1 = work[(at.RATE_NOW + gap) * W + lane]
+    if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[GAP_TOLERANCE]:
+        return 2.0
+    h = work[at.STEP * W + lane]
+    m0 = h * work[(at.RATE_OLD + gap + 2) * W + lane]
+    m1 = h * work[(at.RATE_NOW + gap + 2) * W + lane]
+    fraction = root(d0, m0, d1, m1, 1.0)
+    return fraction if KINK_REACH < fraction < 1.0 - KINK_REACH else 2.0
+
+
+@lane_event
+def stop_at_kinks(lane, W, work, settings):
+    """Shorten an explicit step to the first instant at which a contact begins or ends.
+
+    The force is K d^1.5 on one side and 0 on the other: across this kink the pair has neither its order nor an
+    error estimate that can be trusted.
+    """
+    if work[at.STIFF * W + lane] == 0.0:
+        fraction = min(
+            before_kink(lane, W, work, settings, at.GAP_12),
+            before_kink(lane, W, work, settings, at.GAP_23),
+        )
+        if fraction < 1.0:
+            work[at.ACCEPT * W + lane] = 0.0
+            work[at.NEXT_STEP * W + lane] = fraction * work[at.STEP * W + lane]
 
 
 @lane_event

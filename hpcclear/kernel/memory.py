@@ -18,8 +18,9 @@ PAR = at.WORK
     FACTORED_STEP,  # s, for which the factors hold; 0 when they do not
     NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
-) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 9)
-Z = PAR + at.PARAMETERS + 9  # increments of the velocities at the stages, stage by stage
+    KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
+) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 10)
+Z = PAR + at.PARAMETERS + 10  # increments of the velocities at the stages, stage by stage
 TRANSFORMED = Z + 3 * _N  # the same, decoupled
 FORCE = TRANSFORMED + 3 * _N  # accelerations at the stages
 CHANGE = FORCE + 3 * _N
@@ -35,6 +36,6 @@ COMPLEX_RE = REAL + _N * _N
 COMPLEX_IM = COMPLEX_RE + _N * _N
 PIVOT = COMPLEX_IM + _N * _N
 COMPLEX_PIVOT = PIVOT + _N
-KINKS_A_JOINT = 3
+KINKS_A_JOINT = 4
 KINKS = COMPLEX_PIVOT + _N  # kink functions at the start and at the stages, joint by joint
 MEMORY = KINKS + 4 * 2 * KINKS_A_JOINT

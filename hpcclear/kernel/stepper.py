@@ -34,6 +34,7 @@ from .lifecycle import (
     integrate_gap,
     load,
     stop_at_impacts,
+    stop_at_kinks,
 )
 from .record import record_step
 from .rhs import accelerations
@@ -220,6 +221,8 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                         status = failure(i, W, n, work, stages, settings)
                         if status == OK and work[at.ACCEPT * W + i] == 1.0:
                             impacts(effects.latched, i, W, work, settings)
+                            if work[at.ACCEPT * W + i] == 1.0:
+                                stop_at_kinks(i, W, work, settings)
                             if work[at.ACCEPT * W + i] == 1.0:
                                 status = free_crank_turn(
                                     effects.torque, i, W, work, settings, n - 1

@@ -38,15 +38,18 @@ EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffne
 EDGE_LIMIT = 10.0  # such a score sends a lane to the implicit method
 REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
 REJECTION_MEMORY = 0.9
+KINK_REACH = 0.005  # a kink so near the end of a step, as a part of it, is left there
+MOST_CUTS = 12.0  # of one step
 
 
 @scalar_function
 def loosened(rtol, strictness):
     """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
 
-    As in RADAU5, with another factor. `strictness`: square of how many times tighter this sample's tolerances are.
+    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
+    the result is no better than the estimate. `strictness`: square of how many times tighter this sample's tolerances are.
     """
-    return 0.03 * (rtol / math.sqrt(strictness)) ** (2.0 / 3.0)
+    return 0.1 * (rtol / math.sqrt(strictness)) ** 0.9
 
 
 @scalar_function
@@ -65,6 +68,7 @@ def take_over(size, lane, W, work, par, m, settings):
     m[mem.FACTORED_STEP] = 0.0
     m[mem.NEW_JACOBIAN] = 0.0
     m[mem.TRIED_ERROR] = 0.0
+    m[mem.KINK_CUTS] = 0.0
 
 
 @scalar_function
@@ -168,6 +172,12 @@ def new_jacobian(effects, size, m, p, torque_table, load_table, known):
 
 
 @scalar_function
+def kink_inside(effects, m):
+    """Whether the solution of this step shows a kink well before the end, and it was not cut too often already."""
+    return kink_fraction(effects, m) < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS
+
+
+@scalar_function
 def implicit_step(
     effects, size, lane, W, work, stages, par, torque_table, load_table, memory, settings
 ):
@@ -208,8 +218,16 @@ def implicit_step(
         m[mem.CONTRACTION] = 1.0
         work[at.ERROR * W + lane] = 1e6
         work[at.NEXT_STEP * W + lane] = FAILED_SHRINK * h
+    elif kink_inside(effects, m):
+        # the guess did not show it; the solution is a good guess for the part before it
+        m[mem.POLYNOMIAL_STEP] = h
+        m[mem.KINK_CUTS] += 1.0
+        m[mem.RATE] = 1.0
+        work[at.ERROR * W + lane] = 2.0
+        work[at.NEXT_STEP * W + lane] = h * max(kink_fraction(effects, m), LEAST_CUT)
     else:
         m[mem.POLYNOMIAL_STEP] = h
+        m[mem.KINK_CUTS] = 0.0
         judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings, iterations)
 
 

@@ -17,7 +17,8 @@ class Numerics(Table):
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
     """Baumgarte feedback on constraint position, 1/s; used by that formulation only."""
     method: Literal["auto", "dormand-prince", "fehlberg", "switching", "radau"] = "auto"
-    """Integrator; "switching" takes implicit steps where the motion is stiff, "radau" always, the others never."""
+    """Integrator; "switching" takes implicit steps where the motion is stiff, "radau" always, "auto" as "switching" in scenes
+    with steep friction ramps or strong damping and never in others."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
