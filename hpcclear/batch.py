@@ -125,6 +125,38 @@ def run_sample(
     return 0
 
 
+def run_summary(
+    scene: Scene,
+    output: Path,
+    ranks: Ranks,
+    *,
+    raw: Path | None = None,
+    fresh: bool = False,
+    interval: float = INTERVAL,
+    style: Style = "auto",
+) -> int:
+    """Simulate the study's Monte Carlo points and keep their statistics only; on root.
+
+    Parameters as for `run_sample`; `raw`: directory for the samples themselves, if they are wanted. Returns exit code 0.
+
+    Raises
+    ------
+    InputError, StorageError, Stopped, RankFailed
+    """
+    from .describe import describe_statistics
+    from .streaming import run_statistics
+
+    start = time.perf_counter()
+    content = run_statistics(
+        scene, output, ranks, raw=raw, fresh=fresh, interval=interval, style=style
+    )
+    timing = output.parent / "timing.nc"
+    if ranks.stage_seconds or not timing.exists():
+        dataset.write(timing_of(ranks), timing)
+    describe_statistics(content, ranks, time.perf_counter() - start, output)
+    return 0
+
+
 def _simulate(
     scene: Scene,
     points: Points,

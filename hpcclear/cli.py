@@ -150,6 +150,16 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     type=click.Path(path_type=Path),
     help="CSV table of designs instead of the study's sampling.",
 )
+@click.option(
+    "--statistics",
+    is_flag=True,
+    help="Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
+)
+@click.option(
+    "--raw",
+    type=click.Path(path_type=Path),
+    help="With --statistics: directory for the samples themselves.",
+)
 @_FRESH
 @_LIMIT
 @_INTERVAL
@@ -159,6 +169,8 @@ def sample(
     overrides: tuple[str, ...],
     output: Path,
     points: Path | None,
+    statistics: bool,
+    raw: Path | None,
     fresh: bool,
     time_limit: float | None,
     interval: float,
@@ -170,18 +182,20 @@ def sample(
     """
 
     def program(ranks: "Ranks") -> int | None:
-        from .batch import run_sample
+        from .batch import run_sample, run_summary
 
-        return run_sample(
-            _scene(file, overrides),
-            _place(output),
-            ranks,
-            table=points,
-            fresh=fresh,
-            interval=interval,
-            style=progress,
-        )
+        scene, place = _scene(file, overrides), _place(output)
+        how: dict[str, Any] = {"fresh": fresh, "interval": interval, "style": progress}
+        if statistics:
+            return run_summary(scene, place, ranks, raw=raw and _place(raw), **how)
+        return run_sample(scene, place, ranks, table=points, **how)
 
+    if statistics and points is not None:
+        reason = "--statistics makes the study's Monte Carlo points on demand"
+        raise InputError("--points", str(points), reason, "Drop one of the two")
+    if raw is not None and not statistics:
+        reason = "without --statistics the samples are what is written"
+        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
     return _on_ranks(program, time_limit)
 
 

@@ -167,6 +167,29 @@ def flag_remarks(flags: int) -> list[str]:
     return [text for flag, text in REMARKS.items() if flags & flag]
 
 
+def _load(spent: Any, wall: float) -> list[tuple[str, str]]:
+    """Wall time, and how every rank spent it."""
+    words = "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s"
+    ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(spent)]
+    return [("wall time", f"{wall:.1f} s"), *ranks]
+
+
+def describe_statistics(content: xr.Dataset, ranks: Any, wall: float, path: Path) -> None:
+    """Print mean and deviation of f with the error of the mean, failures and load of a streamed Monte Carlo."""
+    out = console()
+    by_status = content["samples_by_status"]
+    total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
+    rows = [("simulated", f"{good} of {total} without failure")]
+    if int(content["objective_count"]) > 1:
+        mean, deviation = (float(content[f"objective_{n}"]) * 1e3 for n in ("mean", "deviation"))
+        error = deviation / int(content["objective_count"]) ** 0.5
+        rows.append(("mean of f", f"{mean:.6g} mm, standard error {error:.1e} mm"))
+        rows.append(("deviation of f", f"{deviation:.4g} mm"))
+    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
+    out.print(table("Statistics", rows + _load(spent, wall)))
+    out.print(f"statistics {path}")
+
+
 def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[str, Path]) -> None:
     """Print throughput, range of f, failures and load of a batch of samples."""
     out = console()
@@ -206,14 +229,7 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
                 f"{busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
             )
         )
-    rows.append(("wall time", f"{wall:.1f} s"))
-    for rank, row in enumerate(spent):
-        rows.append(
-            (
-                f"rank {rank}",
-                "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s".format(*row),
-            )
-        )
+    rows += _load(spent, wall)
     out.print(table("Samples", rows))
     for what, path in files.items():
         out.print(f"{what:8} {path}")

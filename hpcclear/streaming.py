@@ -10,10 +10,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from . import __version__, dataset, storage
-from .checkpoint import Checkpoint, check_key, key_attribute
+from .checkpoint import INTERVAL, Checkpoint, check_key, key_attribute
 from .errors import InputError
 from .lock import Lock
-from .places import fresh_sibling
+from .places import fresh_sibling, parts_of
 from .progress import Progress, Style
 from .ranks import Ranks
 from .sampling import monte_carlo
@@ -22,6 +22,7 @@ from .scene.paths import flatten
 from .scene.points import Points
 from .statistics import BINS, BLOCK, ROWS, Accumulator, Remaining, Summary
 from .status import JOINTS, OUTCOME, Flag, Status
+from .target import recorded, resolve
 from .work import KIND, payload_of, saving
 
 STAGE = "statistics"
@@ -90,6 +91,7 @@ def run_statistics(
     samples: int | None = None,
     raw: Path | None = None,
     fresh: bool = False,
+    interval: float = INTERVAL,
     style: Style = "auto",
 ) -> xr.Dataset:
     """Simulate Monte Carlo samples on all ranks and write their statistics; on root.
@@ -108,6 +110,8 @@ def run_statistics(
         Directory for the samples themselves, a file of kind ``samples`` for every 4096.
     fresh : bool
         Start anew beside an earlier result.
+    interval : float
+        Seconds between two checkpoints.
     style : str
         How progress is shown.
 
@@ -135,7 +139,7 @@ def run_statistics(
             content = dataset.read(output, "statistics")
             check_key(content, key, output)
             return content
-        return _accumulate(scene, points, output, key, ranks, raw, style)
+        return _accumulate(scene, points, output, key, ranks, raw, interval, style)
 
 
 def _accumulate(
@@ -145,14 +149,20 @@ def _accumulate(
     key: dict[str, str],
     ranks: Ranks,
     raw: Path | None,
+    interval: float,
     style: Style,
 ) -> xr.Dataset:
     """Simulate what is left, with the statistics so far on disk every few seconds."""
+    chosen, reason = scene, ""
+    if scene.numerics.target_error is not None:
+        with ranks.stage("settings"):
+            chosen, reason = resolve(scene, points.page(0))
     attributes = {
         **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+        **recorded(reason),
         **key_attribute(key),
     }
-    checkpoint = Checkpoint(output.parent / f".{output.name}.parts", key, attributes=attributes)
+    checkpoint = Checkpoint(parts_of(output), key, interval=interval, attributes=attributes)
     if raw is not None:
         storage.make_directory(raw)
 
@@ -190,7 +200,7 @@ def _accumulate(
     progress = Progress("samples", style)
     with saving(save):
         ranks.run_points(
-            KIND, payload_of(scene, points.page(0)), _Left(points, left),
+            KIND, payload_of(chosen, points.page(0)), _Left(points, left),
             stage=STAGE, on_records=take, save=save_when_due, progress=progress, keep=False,
         )  # fmt: skip
     content = statistics_dataset(sums, attributes)

@@ -182,3 +182,33 @@ def test_repeating_a_finished_command_does_nothing_and_another_scene_is_refused(
     assert fresh.returncode == 0
     assert out.read_bytes() == before[0]
     assert len(list(tmp_path.glob("samples*.nc"))) == 2
+
+
+MONTE_CARLO = ["--set", "study.method=monte-carlo", "--set", "study.samples=64"]
+
+
+def test_statistics_are_those_of_the_samples(tmp_path):
+    out, raw = tmp_path / "statistics.nc", tmp_path / "raw"
+    words = ("sample", "jobs/quickstart.toml", *SHORT, *MONTE_CARLO)
+    done = hpcclear(*words, "-o", out, "--statistics", "--raw", raw)
+    assert done.returncode == 0, done.stderr
+    assert "mean of f" in done.stdout
+    assert hpcclear(*words, "-o", tmp_path / "samples.nc").returncode == 0
+    statistics = dataset.read(out, "statistics")
+    samples = dataset.read(tmp_path / "samples.nc", "samples")
+    (kept,) = raw.iterdir()
+    assert (dataset.read(kept, "samples")["objective"] == samples["objective"]).all()
+    assert float(statistics["objective_mean"]) == pytest.approx(
+        float(samples["objective"].mean()), rel=1e-12
+    )
+    assert int(statistics["samples_by_status"].sum()) == 64
+
+
+def test_statistics_have_no_table_and_raw_goes_with_them(tmp_path):
+    words = ("sample", "jobs/quickstart.toml", "-o", tmp_path / "x.nc")
+    done = hpcclear(*words, "--statistics", "--points", "designs.csv")
+    assert done.returncode == 2
+    assert "--points" in done.stderr
+    done = hpcclear(*words, "--raw", tmp_path)
+    assert done.returncode == 2
+    assert "--raw" in done.stderr
