@@ -139,6 +139,16 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     return Exit.DONE
 
 
+def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None:
+    """Raise InputError where options name two kinds of sampling at once."""
+    if statistics and points is not None:
+        reason = "--statistics makes the study's Monte Carlo points on demand"
+        raise InputError("--points", str(points), reason, "Drop one of the two")
+    if raw is not None and not statistics:
+        reason = "without --statistics the samples are what is written"
+        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
+
+
 @cli.command(short_help="Simulate many designs.")
 @_FILE
 @_SET
@@ -190,12 +200,7 @@ def sample(
             return run_summary(scene, place, ranks, raw=raw and _place(raw), **how)
         return run_sample(scene, place, ranks, table=points, **how)
 
-    if statistics and points is not None:
-        reason = "--statistics makes the study's Monte Carlo points on demand"
-        raise InputError("--points", str(points), reason, "Drop one of the two")
-    if raw is not None and not statistics:
-        reason = "without --statistics the samples are what is written"
-        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
+    _check_kind(points, statistics, raw)
     return _on_ranks(program, time_limit)
 
 

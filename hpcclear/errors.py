@@ -1,5 +1,7 @@
 """Errors a user can mend: one message with key, value, reason and remedy."""
 
+import os
+
 
 class InputError(ValueError):
     """Bad input; the command line prints the message and exits with code 2.
@@ -25,7 +27,8 @@ class InputError(ValueError):
 
     def __str__(self) -> str:
         shown = repr(self.value)
-        if len(shown) > 80:
+        # a file's place is of use only whole
+        if len(shown) > 80 and os.sep not in shown:
             shown = shown[:77] + "..."
         return f"{self.key} = {shown}: {self.reason}. {self.remedy}"
 
