@@ -222,8 +222,10 @@ def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
     code, output = run(words)
     assert code == 0, output
     timing = dataset.read(tmp_path / "timing.nc", "timing")
-    root = {name: float(timing[name].sel(rank=0).sum()) for name in COLUMNS}
-    total = sum(root.values())
-    print(f"{root['write']:.3f} s of {total:.1f} s were spent on files")
-    assert total - root["compile"] > 20.0
-    assert root["write"] < 0.01 * total
+    root = timing.sel(rank=0)
+    total = sum(float(root[name].sum()) for name in COLUMNS)
+    # the stage "files" opens the checkpoint and writes the result, which a run without checkpoints writes too
+    saving = float(root["write"].where(root["stage"] != "files").sum())
+    print(f"{saving:.3f} s of {total:.1f} s were spent in checkpoint calls")
+    assert total - float(root["compile"].sum()) > 20.0
+    assert saving < 0.01 * total
