@@ -153,8 +153,7 @@ def _dismiss(ranks: Ranks, code: int) -> int:
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
-            _say(str(message.body[0]))
-            ranks.mail.abort(Exit.FAILED)
+            _say_and_abort(ranks, str(message.body[0]), Exit.FAILED)
     return code
 
 
@@ -183,8 +182,8 @@ def _tell_root(ranks: Ranks, error: BaseException) -> int:
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
         nap.take()
-    _say(f"Error: {error}" if known else str(report))
-    ranks.mail.abort(Exit.BAD_INPUT if known else Exit.FAILED)
+    text = f"Error: {error}" if known else str(report)
+    _say_and_abort(ranks, text, Exit.BAD_INPUT if known else Exit.FAILED)
     return Exit.FAILED
 
 
@@ -198,6 +197,13 @@ def _report(ranks: Ranks, error: BaseException) -> str:
         )
     trace = "".join(traceback.format_exception(error)).rstrip()
     return f"hpcclear failed on {ranks.where}\n{trace}"
+
+
+def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
+    """Report, and end every rank."""
+    _say(text)
+    time.sleep(0.3)  # an abort may overtake what the launcher has not passed on to the user yet
+    ranks.mail.abort(code)
 
 
 def _say(text: str) -> None:

@@ -46,10 +46,12 @@ def saved_and_since(events: list[Event]) -> tuple[set[str], float]:
     for event in events:
         if event.what == "received":
             received |= event.samples
-        elif event.what == "saving":
+        elif event.what in ("saving", "saving a stage"):
             writing, began = set(received), event.time
-        elif event.what == "saved":
-            saved, since = writing, began
+            if event.what == "saving":  # only the result of a reading is kept, not its samples
+                writing = {sample for sample in writing if not sample.startswith(UNSAVED)}
+        elif event.what in ("saved", "saved a stage"):
+            saved, since = saved | writing, began
     return saved, since
 
 

@@ -46,7 +46,8 @@ def note(event: str, samples: Iterable[str] = ()) -> None:
     """Log what happened, in one write: seconds, rank, event, and the samples it concerns.
 
     ``finished`` by a rank's worker, each time it has advanced; ``received`` by root; ``saving`` and
-    ``saved``: root begins and has done a write of what it received; ``opened``: the checkpoint;
+    ``saved``: root begins and has done a write of the samples it received, the same with ``a stage``
+    of a result; ``opened``: the checkpoint;
     ``stage``: root begins one, which stands for a sample here.
     """
     line = "\t".join([f"{time.monotonic():.6f}", str(RANK), event, *samples])
@@ -129,7 +130,7 @@ def watch() -> None:
     ranks.Ranks.run_points = watched_run_points  # type: ignore[method-assign]
     bracket(checkpoint.Checkpoint, "__init__", "", "opened")
     bracket(checkpoint.Checkpoint, "flush", "saving", "saved")
-    bracket(checkpoint.Checkpoint, "save_stage", "saving", "saved")
+    bracket(checkpoint.Checkpoint, "save_stage", "saving a stage", "saved a stage")
 
 
 def bracket(owner: type, name: str, before: str, after: str) -> None:
