@@ -316,6 +316,7 @@ class Checkpoint:
         """Read the parts that are there; the number of the next one."""
         if (self.directory / _DONE).exists():
             discard(self.directory)
+        xr.Dataset(coords={"sample": [0]})  # what xarray loads late is loaded before samples wait
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
             reason = "it is a symbolic link"
