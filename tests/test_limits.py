@@ -219,7 +219,8 @@ def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
 def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
     words = ["sample", str(SCENE), "-o", str(tmp_path / "samples.nc"), "--time-limit", "600"]
     words += overrides(*CHEAP, "numerics.averaged_revolutions=50", "study.samples=60000")
-    code, output = finish(start(words, program=("-m", "hpcclear")))  # not watched: that takes time too
+    # the plain command: to be watched takes time too
+    code, output = finish(start(words, program=("-m", "hpcclear")))
     assert code == 0, output
     timing = dataset.read(tmp_path / "timing.nc", "timing")
     root = timing.sel(rank=0)
