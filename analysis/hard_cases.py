@@ -21,13 +21,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from hpcclear import __version__, geometry
+from hpcclear import __version__
+from hpcclear.energy import energies
 from hpcclear.errors import InputError
 from hpcclear.evaluator import evaluate_records, outcome_records
 from hpcclear.kernel import layout as at
 from hpcclear.kernel import record as rec
 from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states, topology
+from hpcclear.lowering import parameters, problem_of, start_states
 from hpcclear.response import simulate
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -81,24 +82,16 @@ def balance(
     scene: Scene, par: np.ndarray, rows: np.ndarray, n: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Energy less all work done at recorded steps, and the size to measure it by, J (steps,)."""
-    first, second, free = topology(scene)
-    q, v = rows[:, rec.STATE : rec.STATE + n].T, rows[:, rec.STATE + n : rec.STATE + 2 * n].T
-    phi = par[at.SPEED] * rows[:, rec.TURN_TIME]
-    omega = np.full_like(phi, par[at.SPEED])
-    if free:
-        phi, omega, q, v = q[-1], v[-1], q[:-1], v[:-1]
-    m = geometry.motion((first, second), par, phi, omega, q, v)
-    kinetic = geometry.kinetic_energy(m, par)
-    energy = kinetic + geometry.potential_energy(m, par, scene.effects.gravity)
-    for k, (is_open, base) in enumerate(((first, at.JOINT_12), (second, at.JOINT_23))):
-        if is_open:
-            gap = (
-                np.hypot(m.eccentricity_x[:, k], m.eccentricity_y[:, k]) - par[base + at.CLEARANCE]
-            )
-            on = rows[:, rec.ACTIVE_12 + k] if scene.effects.contact.latched else 1.0
-            energy += 0.4 * par[base + at.CONTACT_STIFFNESS] * on * np.maximum(gap, 0.0) ** 2.5
+    kinetic, total = energies(
+        scene,
+        par,
+        rows[:, rec.STATE : rec.STATE + n].T,
+        rows[:, rec.STATE + n : rec.STATE + 2 * n].T,
+        rows[:, [rec.ACTIVE_12, rec.ACTIVE_23]],
+        rows[:, rec.TURN_TIME],
+    )
     works = rows[:, rec.DRIVE_WORK] + rows[:, rec.LOAD_WORK] - rows[:, rec.DISSIPATED]
-    return energy - works, np.maximum(kinetic, rows[:, rec.ABS_DRIVE_WORK])
+    return total - works, np.maximum(kinetic, rows[:, rec.ABS_DRIVE_WORK])
 
 
 def chunks(lanes: Lanes) -> Iterator[np.ndarray]:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from . import storage
 from .errors import InputError
 from .names import DESIGN_VARIABLES, FURTHER, KINDS, Kind, Variable
-from .status import JOINTS, OUTCOME, Status
+from .status import JOINTS, ON_REQUEST, OUTCOME, Status
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
@@ -187,7 +187,9 @@ def samples_dataset(
     if len(data) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    data |= {name: records[name] for name in OUTCOME.names or () if name != "sample"}
+    asked = {name for name in ON_REQUEST if np.isfinite(records[name]).any()}
+    left_out = {"sample", *ON_REQUEST} - asked
+    data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
     coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
     return dataset("samples", coords, data, attributes, units)
 
@@ -196,7 +198,8 @@ def records(samples: xr.Dataset) -> np.ndarray:
     """The outcome records in a dataset of kind ``samples``, shape (n,) of `OUTCOME`."""
     found = np.zeros(samples.sizes["sample"], OUTCOME)
     for name in OUTCOME.names or ():
-        found[name] = samples[name].to_numpy()
+        absent = name in ON_REQUEST and name not in samples
+        found[name] = np.nan if absent else samples[name].to_numpy()
     return found
 
 

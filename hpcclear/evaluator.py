@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from . import energy
 from .ideal import ClosedForm
 from .kernel import layout as at
 from .kernel.lanes import Lanes
@@ -10,7 +11,7 @@ from .kernel.lifecycle import STATE
 from .lowering import parameters, problem_of, start_states
 from .scene import Scene
 from .scene.points import Points
-from .status import OUTCOME, Flag, Status
+from .status import OUTCOME, RESPONSES, Flag, Status
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,8 @@ class Evaluator:
         self._copies = 1 + len(COPIES) * scene.numerics.uncertainty
         problem = problem_of(scene)
         self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+        self._problem = problem
+        self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, NDArray[np.void]] = {}
 
     @property
@@ -73,12 +76,21 @@ class Evaluator:
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
             par, state, labels = with_copies(par, state, labels)
+        if self._problem.effects.ledger and self._problem.coordinates:
+            before = energy.of_starts(self.scene, par, state, self._problem.coordinates)
+            self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
         self._lanes.queue(par, state, labels)
 
     def advance(self, seconds: float) -> NDArray[np.void]:
         """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
         self._lanes.advance(seconds)
-        records = outcome_records(*self._lanes.collect())
+        labels, rows, par = self._lanes.collect()
+        records = outcome_records(labels, rows, par, bool(self._problem.effects.responses))
+        if self._starts and len(labels):
+            before = np.array([self._starts.pop(label) for label in labels.tolist()])
+            off = energy.errors(self.scene, par, before, rows, self._problem.coordinates)
+            valid = np.isfinite(records["objective"])
+            records["energy_error"] = np.where(valid, off, np.nan)
         return records if self._copies == 1 else self._join(records)
 
     def _join(self, records: NDArray[np.void]) -> NDArray[np.void]:
@@ -125,8 +137,14 @@ def joined(sample: int, group: NDArray[np.void]) -> NDArray[np.void]:
     return record
 
 
-def outcome_records(labels: NDArray[np.int64], rows: Array, par: Array) -> NDArray[np.void]:
-    """Kernel outcome rows (m, OUT) and parameters (m, PARAMETERS) as records: numbers of failed samples are NaN."""
+def outcome_records(
+    labels: NDArray[np.int64], rows: Array, par: Array, responses: bool = False
+) -> NDArray[np.void]:
+    """Kernel outcome rows (m, OUT) and parameters (m, PARAMETERS) as records.
+
+    Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
+    `responses`, uncertainty and energy error until their makers fill them in.
+    """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
     records["status"] = rows[:, at.OUT_STATUS]
@@ -137,8 +155,14 @@ def outcome_records(labels: NDArray[np.int64], rows: Array, par: Array) -> NDArr
     records["objective_uncertainty"] = np.nan
     records["mean_gap"] = rows[:, [at.OUT_GAP_12, at.OUT_GAP_23]]
     records["peak_contact_force"] = rows[:, [at.OUT_PEAK_12, at.OUT_PEAK_23]]
+    records["mean_contact_force"] = rows[:, [at.OUT_FORCE_12, at.OUT_FORCE_23]]
+    records["peak_crank_moment"] = rows[:, at.OUT_MOMENT]
+    records["slider_acceleration_deviation"] = rows[:, at.OUT_ACCELERATION]
+    records["energy_error"] = np.nan
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][~valid] = np.nan
+    for name in RESPONSES:
+        records[name][~(valid & responses)] = np.nan
     latched = rows[:, [at.OUT_LATCHED_12, at.OUT_LATCHED_23]] == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1) + int(Flag.BEYOND_HERTZ) * beyond_hertz(

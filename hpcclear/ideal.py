@@ -41,7 +41,11 @@ class ClosedForm:
         par = np.concatenate([np.zeros((0, at.PARAMETERS)), *self._par])
         self._labels, self._par = [], []
         p = self._problem
-        return labels, ideal.ideal_outcomes(par, p.transient, p.averaged), par
+        return (
+            labels,
+            ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged),
+            par,
+        )
 
 
 def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:

@@ -86,6 +86,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         "baumgarte": scene.numerics.formulation == "baumgarte",
         "ledger": scene.numerics.energy if ledger is None else ledger,
         "series": series,
+        "responses": scene.responses_asked(),
     }
     if not (first or second):
         on.update(dict.fromkeys(("fixed", "latched", "coulomb", "ambrosio"), False))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .status import Flag, Status
+from .status import ON_REQUEST, Flag, Status
 
 
 class Variable(NamedTuple):
@@ -79,6 +79,10 @@ objective_spread*     | sample       | m     | standard deviation of f between a
 objective_uncertainty | sample       | m     | scatter of f over kicked copies
 mean_gap              | sample joint | m     | time mean of the distance from the clearance circle
 peak_contact_force    | sample joint | N     | largest contact force over the averaged revolutions
+mean_contact_force    | sample joint | N     | mean contact force over the averaged revolutions
+peak_crank_moment     | sample       | N m   | largest size of the moment of the drive on the crank
+slider_acceleration_deviation | sample | m/s^2 | standard deviation of the slider acceleration in time
+energy_error          | sample       | 1     | what the energy balance leaves unexplained, relative
 latched               | sample joint | flag  | whole revolutions in contact, impact speed frozen
 rhs_evaluations*      | sample       | count | number of evaluations of the equations of motion
 status*               | sample       | flag  | how the simulation ended
@@ -335,7 +339,7 @@ def _kind(
         (coords if row.dims == (name,) else data)[name] = row
         if starred != name:
             required.add(name)
-    needed = frozenset(data if whole else required)
+    needed = frozenset(set(data) - set(ON_REQUEST) if whole else required)
     return Kind(title, coords, data, needed, design_dims, limit_dims)
 
 

@@ -70,6 +70,12 @@ class Flag(IntEnum):
     STIFF = 4  # the implicit method was used for part of the run
 
 
+RESPONSES = ("mean_contact_force", "peak_crank_moment", "slider_acceleration_deviation")
+"""Fields of `OUTCOME` that a study of one of them asks for."""
+
+ON_REQUEST = (*RESPONSES, "energy_error")
+"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
+
 OUTCOME = np.dtype(
     [
         ("sample", np.int64),  # index in the design; -1 never leaves the evaluator
@@ -81,6 +87,10 @@ OUTCOME = np.dtype(
         ),  # m, scatter over kicked copies; NaN unless asked for
         ("mean_gap", np.float64, 2),  # m, time mean of | |e| - c | at each joint
         ("peak_contact_force", np.float64, 2),  # N, at each joint over the averaged revolutions
+        ("mean_contact_force", np.float64, 2),  # N; NaN unless the study's objective asks for it,
+        ("peak_crank_moment", np.float64),  # N m, likewise
+        ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
+        ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("latched", np.int8, 2),
         ("rhs_evaluations", np.int64),
         ("status", np.int8),

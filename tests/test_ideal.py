@@ -164,12 +164,12 @@ def test_tabulated_load_is_taken_at_the_crank_angle():
 def test_outcomes_have_no_gap():
     par = np.tile(row_of_parameters(set(), None), (3, 1))
     par[:, at.PERIOD] = at.TURN / SPEED
-    rows = ideal.ideal_outcomes(par, 5, 4)
+    rows = ideal.ideal_outcomes(at.Effects(), par, None, 5, 4)
     assert (
         rows[:, [at.OUT_STATUS, at.OUT_OBJECTIVE, at.OUT_SPREAD, at.OUT_EVALUATIONS]] == 0
     ).all()
     np.testing.assert_allclose(rows[:, at.OUT_TIME], 9 * at.TURN / SPEED)
-    assert np.isnan(ideal.ideal_outcomes(par, 5, 1)[:, at.OUT_SPREAD]).all()
+    assert np.isnan(ideal.ideal_outcomes(at.Effects(), par, None, 5, 1)[:, at.OUT_SPREAD]).all()
 
 
 BARE = {

@@ -74,6 +74,10 @@ MARKERS = {
     "baumgarte": (set(), {par(at.BAUMGARTE_ALPHA2), par(at.BAUMGARTE_BETA2)}),
     "ledger": (set(), {work(at.RATE_NOW + at.DRIVE_POWER), work(at.RATE_NOW + at.DISSIPATION)}),
     "series": (set(), {work(at.RATE_NOW + at.FRICTION_12), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
+    "responses": (
+        set(),
+        {work(at.RATE_NOW + at.SLIDER_SQUARE), work(at.RATE_NOW + at.DRIVE_MOMENT)},
+    ),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {

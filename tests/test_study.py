@@ -360,7 +360,6 @@ def test_fresh_starts_beside(results, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["study.objective=mean-contact-force"], "no sample records it"),
         (["study.cases={}"], "nothing to optimise"),
         (["joints.rod_slider.clearance=0.4 mm"], "a model leaves it out"),
     ],
@@ -371,13 +370,14 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet")
 
 
-def test_peak_contact_force_is_an_objective():
-    scene = scene_of("study.objective=peak-contact-force")
-    unit, function = simulations.objective_of(scene)
-    records = np.zeros(2, [("peak_contact_force", float, 2)])
-    records["peak_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
-    assert unit == "N"
-    assert function(records).tolist() == [3.0, 5.0]
+def test_of_contact_forces_the_larger_is_the_objective():
+    for which in ("mean", "peak"):
+        scene = scene_of(f"study.objective={which}-contact-force")
+        unit, function = simulations.objective_of(scene)
+        records = np.zeros(2, [(f"{which}_contact_force", float, 2)])
+        records[f"{which}_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
+        assert unit == "N"
+        assert function(records).tolist() == [3.0, 5.0]
 
 
 # -- parts ------------------------------------------------------------------------------------------

@@ -126,8 +126,9 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, torque_table, lo
     work[(at.ACC + X1) * W + i] = rx - u1 * (s * alpha1 + c * omega * omega)
     work[(at.ACC + Y1) * W + i] = ry + u1 * (c * alpha1 - s * omega * omega)
     store_power(
-        effects.ledger, effects.series, work, drive_moment_of(effects.torque, torque, drive), omega,
-        force_1[4] + force_2[4] + friction * v3, load * v3, i, W,
+        effects.ledger, effects.series, effects.responses, work,
+        drive_moment_of(effects.torque, torque, drive), omega,
+        force_1[4] + force_2[4] + friction * v3, load * v3, work[(at.ACC + X3) * W + i], i, W,
     )  # fmt: skip
 
 

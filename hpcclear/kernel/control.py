@@ -148,7 +148,30 @@ def commit_ledger(ledger, work, i, W):
 
 
 @lane_function
-def commit(crank_rod, rod_slider, latched, ledger, work, stages, n, W):
+def commit_response(work, rate, yes, i, W):
+    """Integral of a rate after a step."""
+    change = work[at.STEP * W + i] * work[(at.RATE_SUM + rate) * W + i]
+    work[(at.INTEGRAL + rate) * W + i] += change if yes else 0.0
+    keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+
+
+@lane_function
+def commit_responses(responses, work, i, W):
+    """Integrals of forces and slider acceleration, and the peak of the crank moment, after a step."""
+    if responses is not None:
+        yes = work[at.ACCEPT * W + i] == 1.0
+        counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
+        commit_response(work, at.FORCE_12, yes, i, W)
+        commit_response(work, at.FORCE_23, yes, i, W)
+        commit_response(work, at.SLIDER_ACCELERATION, yes, i, W)
+        commit_response(work, at.SLIDER_SQUARE, yes, i, W)
+        moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
+        peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
+        work[at.PEAK_MOMENT * W + i] = peak
+
+
+@lane_function
+def commit(crank_rod, rod_slider, latched, ledger, responses, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     ended = 0.0
     for i in range(W):
@@ -177,6 +200,7 @@ def commit(crank_rod, rod_slider, latched, ledger, work, stages, n, W):
             W,
         )
         commit_ledger(ledger, work, i, W)
+        commit_responses(responses, work, i, W)
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
         for k in range(n):

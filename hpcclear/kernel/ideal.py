@@ -45,6 +45,7 @@ BLOCK = 64
 """Instants side by side, so that the compiler vectorises over them."""
 
 _PANELS = 8  # between two instants
+_PER_TURN = 3600  # instants of a revolution for peak and deviation
 # nodes and weights on [0, 1] of Gauss's rule with five points, for works between instants
 _NODES, _WEIGHTS = (
     0.5 * (np.polynomial.legendre.leggauss(5)[0] + 1.0),
@@ -193,12 +194,19 @@ def ideal_works(effects: at.Effects, par: Array, load_table: Array | None, angle
     return np.concatenate([np.zeros((4, 1)), during.cumsum(axis=1)], axis=1)
 
 
-def ideal_outcomes(par: Array, transient: int, averaged: int) -> Array:
+def ideal_outcomes(
+    effects: at.Effects, par: Array, load_table: Array | None, transient: int, averaged: int
+) -> Array:
     """Outcome rows (samples, OUT) of mechanisms without clearance: no gap, hence an objective of 0, nothing integrated.
 
     Parameters
     ----------
+    effects : layout.Effects
+        With `responses`, the crank moment's peak and the deviation of the slider acceleration, from `_PER_TURN`
+        instants; there is no contact force.
     par : ndarray, shape (samples, PARAMETERS)
+    load_table : ndarray or None
+        As for `ideal_response`.
     transient, averaged : int
         Revolutions.
     """
@@ -209,4 +217,10 @@ def ideal_outcomes(par: Array, transient: int, averaged: int) -> Array:
     # works are not part of an ensemble's record; `ideal_works` has them for one response
     works = [at.OUT_DRIVE_WORK, at.OUT_ABS_DRIVE_WORK, at.OUT_DISSIPATED, at.OUT_LOAD_WORK]
     rows[:, works] = np.nan
+    if effects.responses:
+        angle = np.linspace(0.0, at.TURN, _PER_TURN, endpoint=False)
+        for row, own in zip(rows, par, strict=True):
+            seen = ideal_response(effects, own, load_table, angle)
+            row[at.OUT_MOMENT] = np.abs(seen[CRANK_MOMENT]).max()
+            row[at.OUT_ACCELERATION] = seen[SLIDER_A].std()
     return rows

@@ -29,6 +29,7 @@ class Effects(NamedTuple):
     baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
+    responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
     sliding: Any = None  # sliding speeds, for the implicit method
 
 
@@ -80,9 +81,12 @@ PARAMETERS = 47
 # ---- what the motion writes besides accelerations ---------------------------------------------
 (GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(6, 10)
-(FRICTION_12, FRICTION_23, DRIVE_MOMENT) = range(10, 13)  # for time series only
+(FRICTION_12, FRICTION_23, DRIVE_MOMENT) = range(
+    10, 13
+)  # for time series (the last, for responses)
 (SLIDING_12, SLIDING_23) = range(13, 15)  # for the implicit method only
-RATES = 15
+(SLIDER_ACCELERATION, SLIDER_SQUARE) = range(15, 17)  # and its square; for responses only
+RATES = 17
 
 # ---- lane state and scratch ---------------------------------------------------------------------
 Q = 0  # coordinates at the start of the step
@@ -109,6 +113,7 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     INVERSE_IMPACT_23,
     PEAK_12,
     PEAK_23,
+    PEAK_MOMENT,  # of the drive, its size
     DEEPEST_12,  # largest penetration over clearance
     DEEPEST_23,
     ENDED_12,  # contacts ended in this revolution
@@ -128,8 +133,8 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 32)
-WORK = INTEGRAL + RATES + 32
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 33)
+WORK = INTEGRAL + RATES + 33
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (
@@ -151,8 +156,12 @@ WORK = INTEGRAL + RATES + 32
     LAST_F,  # the objective of the revolution before
     LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
     FIRST_F,
-) = range(18)
-BOOK = 18
+    FORCE_SUM_12,  # N s, over the averaged revolutions
+    FORCE_SUM_23,
+    ACCELERATION_SUM,  # m/s
+    SQUARE_SUM,  # m^2/s^3
+) = range(22)
+BOOK = 22
 
 # ---- one finished sample --------------------------------------------------------------------------
 (
@@ -180,6 +189,10 @@ BOOK = 18
     OUT_INVERSE_IMPACT_23,
     OUT_ATTEMPTS,
     OUT_STIFF_STEPS,
-) = range(24)
-OUT_STATE = 24
+    OUT_FORCE_12,
+    OUT_FORCE_23,
+    OUT_MOMENT,
+    OUT_ACCELERATION,
+) = range(28)
+OUT_STATE = 28
 OUT = OUT_STATE + 2 * MAX_COORDINATES

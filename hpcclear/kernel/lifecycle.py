@@ -109,12 +109,25 @@ def finish(lane, W, n, status, work, book, out, finished, counters):
     out[slot, at.OUT_INVERSE_IMPACT_23] = work[at.INVERSE_IMPACT_23 * W + lane]
     out[slot, at.OUT_ATTEMPTS] = work[at.ATTEMPTS * W + lane]
     out[slot, at.OUT_STIFF_STEPS] = work[at.STIFF_STEPS * W + lane]
+    finish_responses(lane, W, time, work, book, out, slot)
     for k in range(n):
         out[slot, at.OUT_STATE + k] = work[(at.Q + k) * W + lane]
         out[slot, at.OUT_STATE + at.MAX_COORDINATES + k] = work[(at.V + k) * W + lane]
     finished[counters[FINISHED]] = slot
     counters[FINISHED] += 1
     work[at.RUNNING * W + lane] = 0.0
+
+
+@lane_event
+def finish_responses(lane, W, time, work, book, out, slot):
+    """Means, peak and deviation over the averaged revolutions; they mean nothing unless `Effects.responses` is on."""
+    if time > 0.0:
+        out[slot, at.OUT_FORCE_12] = book[at.FORCE_SUM_12 * W + lane] / time
+        out[slot, at.OUT_FORCE_23] = book[at.FORCE_SUM_23 * W + lane] / time
+        out[slot, at.OUT_MOMENT] = work[at.PEAK_MOMENT * W + lane]
+        mean = book[at.ACCELERATION_SUM * W + lane] / time
+        square = book[at.SQUARE_SUM * W + lane] / time
+        out[slot, at.OUT_ACCELERATION] = math.sqrt(max(square - mean * mean, 0.0))
 
 
 @lane_event
@@ -301,6 +314,11 @@ def end_revolution(lane, W, work, book, settings):
         book[at.GAP_SUM_12 * W + lane] += gap_12
         book[at.GAP_SUM_23 * W + lane] += gap_23
         book[at.TIME_SUM * W + lane] += time
+        book[at.FORCE_SUM_12 * W + lane] += work[(at.INTEGRAL + at.FORCE_12) * W + lane]
+        book[at.FORCE_SUM_23 * W + lane] += work[(at.INTEGRAL + at.FORCE_23) * W + lane]
+        change = work[(at.INTEGRAL + at.SLIDER_ACCELERATION) * W + lane]
+        book[at.ACCELERATION_SUM * W + lane] += change
+        book[at.SQUARE_SUM * W + lane] += work[(at.INTEGRAL + at.SLIDER_SQUARE) * W + lane]
         f = math.sqrt(gap_12 * gap_12 + gap_23 * gap_23) / time
         count = book[at.COUNT_F * W + lane] + 1.0
         if count == 1.0:

@@ -188,7 +188,14 @@ def switched(latched, force, active):
 
 
 @lane_function
-def store_power(ledger, series, work, drive_moment, speed, loss, load_power, i, W):
+def store_power(
+    ledger, series, responses, work, drive_moment, speed, loss, load_power, acceleration, i, W
+):
+    """What the drive, the contacts and the load do, and the slider's acceleration."""
+    if responses is not None:
+        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
+        work[(at.RATE_NOW + at.SLIDER_ACCELERATION) * W + i] = acceleration
+        work[(at.RATE_NOW + at.SLIDER_SQUARE) * W + i] = acceleration * acceleration
     if series is not None:
         work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
     if ledger is not None:
@@ -286,11 +293,13 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
     store_power(
         effects.ledger,
         effects.series,
+        effects.responses,
         work,
         drive_moment_of(effects.torque, torque, -crank_load),
         omega,
         loss1 + loss2 + guide * v3,
         load * v3,
+        work[(at.ACC + 3) * W + i],
         i,
         W,
     )
@@ -366,11 +375,13 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
     store_power(
         effects.ledger,
         effects.series,
+        effects.responses,
         work,
         drive_moment_of(effects.torque, torque, -crank_load),
         omega,
         loss + friction * v3,
         load * v3,
+        a3,
         i,
         W,
     )
@@ -469,11 +480,13 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
     store_power(
         effects.ledger,
         effects.series,
+        effects.responses,
         work,
         drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3),
         omega,
         loss + guide * v3,
         load * v3,
+        work[(at.ACC + 1) * W + i],
         i,
         W,
     )
@@ -535,7 +548,19 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
     n0 = n0 + load * slope + m3 * g
     alpha, friction = guided_crank(effects.guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
     work[at.ACC * W + i] = alpha
-    store_power(effects.ledger, effects.series, work, torque, omega, friction * v3, load * v3, i, W)
+    store_power(
+        effects.ledger,
+        effects.series,
+        effects.responses,
+        work,
+        torque,
+        omega,
+        friction * v3,
+        load * v3,
+        x3 * alpha + dx3 * w2,
+        i,
+        W,
+    )
 
 
 @lane_function

@@ -288,14 +288,25 @@ def gap_of_step(flag, m, work, gap, clearance, rtol, lane, W):
 
 
 @lane_function
-def powers_of_step(ledger, m, work, lane, W):
-    """Means of the powers over the step."""
+def rate_of_step(m, work, rate, lane, W):
+    """Mean of a rate over the step."""
+    total = 0.0
+    for s in range(3):
+        total += MATRIX[2, s] * m[mem.STAGE_RATES + s * at.RATES + rate]
+    work[(at.RATE_SUM + rate) * W + lane] = total
+
+
+@lane_function
+def rates_of_step(ledger, responses, m, work, lane, W):
+    """Means of the powers, and of what the responses are made of, over the step."""
     if ledger is not None:
         for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            total = 0.0
-            for s in range(3):
-                total += MATRIX[2, s] * m[mem.STAGE_RATES + s * at.RATES + r]
-            work[(at.RATE_SUM + r) * W + lane] = total
+            rate_of_step(m, work, r, lane, W)
+    if responses is not None:
+        rate_of_step(m, work, at.FORCE_12, lane, W)
+        rate_of_step(m, work, at.FORCE_23, lane, W)
+        rate_of_step(m, work, at.SLIDER_ACCELERATION, lane, W)
+        rate_of_step(m, work, at.SLIDER_SQUARE, lane, W)
 
 
 @scalar_function

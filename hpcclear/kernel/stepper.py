@@ -82,7 +82,15 @@ def weigh_gap(work, b, e, row, gap, first, W):
 
 
 @lane_function
-def weigh_rates(crank_rod, rod_slider, ledger, work, b, e, row, first, W):
+def weigh_rate(work, b, row, rate, first, W):
+    """Add a stage's rate to the sum that becomes its integral over the step."""
+    for i in range(W):
+        old = 0.0 if first else work[(at.RATE_SUM + rate) * W + i]
+        work[(at.RATE_SUM + rate) * W + i] = old + b * work[(row + rate) * W + i]
+
+
+@lane_function
+def weigh_rates(crank_rod, rod_slider, ledger, responses, work, b, e, row, first, W):
     """Add a stage's rates, times the weights b and e of its method, to the sums over the step."""
     if crank_rod is not None:
         weigh_gap(work, b, e, row, at.GAP_12, first, W)
@@ -90,9 +98,12 @@ def weigh_rates(crank_rod, rod_slider, ledger, work, b, e, row, first, W):
         weigh_gap(work, b, e, row, at.GAP_23, first, W)
     if ledger is not None:
         for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            for i in range(W):
-                old = 0.0 if first else work[(at.RATE_SUM + r) * W + i]
-                work[(at.RATE_SUM + r) * W + i] = old + b * work[(row + r) * W + i]
+            weigh_rate(work, b, row, r, first, W)
+    if responses is not None:
+        weigh_rate(work, b, row, at.FORCE_12, first, W)
+        weigh_rate(work, b, row, at.FORCE_23, first, W)
+        weigh_rate(work, b, row, at.SLIDER_ACCELERATION, first, W)
+        weigh_rate(work, b, row, at.SLIDER_SQUARE, first, W)
 
 
 @lane_function
@@ -102,11 +113,11 @@ def weigh_stage(effects, work, weights, s, count, W):
     E = B + count
     if s == 1:
         weigh_rates(
-            effects.crank_rod, effects.rod_slider, effects.ledger, work,
+            effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
             weights[B], weights[E], at.RATE_OLD, True, W,
         )  # fmt: skip
     weigh_rates(
-        effects.crank_rod, effects.rod_slider, effects.ledger, work,
+        effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
         weights[B + s], weights[E + s], at.RATE_NOW, False, W,
     )  # fmt: skip
 
@@ -237,7 +248,7 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
                             running += work[at.RUNNING * W + i] - 1.0
             ended = commit(
                 effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
-                work, stages, n, W,
+                effects.responses, work, stages, n, W,
             )  # fmt: skip
             full = record_step(record, counters, work, stages, book, n, W)
             if ended > 0.0:

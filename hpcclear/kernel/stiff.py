@@ -23,7 +23,7 @@ from .radau import (
     guess_stages,
     newton,
     next_step,
-    powers_of_step,
+    rates_of_step,
     refilter_error,
     set_stage,
     start_of_step,
@@ -247,7 +247,7 @@ def judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings
     gaps += gap_of_step(
         effects.rod_slider, m, work, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, lane, W
     )
-    powers_of_step(effects.ledger, m, work, lane, W)
+    rates_of_step(effects.ledger, effects.responses, m, work, lane, W)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
     if total + gaps > 2.0 * n and uneasy:
         total = refilter_error(effects, size, m, p, torque_table, load_table, h)

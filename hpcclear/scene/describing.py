@@ -42,6 +42,8 @@ def effects_on(scene: "Scene") -> Iterator[str]:
         yield "Lagrange multipliers with Baumgarte feedback"
     if scene.numerics.energy:
         yield "energy balance of each sample"
+    if scene.responses_asked():
+        yield "mean contact forces, crank moment and slider acceleration of each sample"
     if scene.numerics.uncertainty:
         yield "uncertainty of each sample"
 

@@ -17,6 +17,7 @@ from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import PAPER_PATHS
 from hpcclear.scene.writing import to_toml
+from hpcclear.status import RESPONSES
 
 
 class Scene(Table):
@@ -149,6 +150,11 @@ class Scene(Table):
                         "Narrow it",
                         key=f"study.{key}.{name}",
                     ) from None
+
+    def responses_asked(self) -> bool:
+        """Whether each sample records more than gaps and peak forces: only a study of one of these asks for it."""
+        asked = {name.replace("_", "-") for name in RESPONSES}
+        return self.study is not None and self.study.objective in asked
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23."""

@@ -39,7 +39,7 @@ from . import audit, claims, optimisation, paper, responses, sensitivities, surr
 from .compiling import compile_ahead
 from .optimisation import Choice
 from .run import Result, Run
-from .simulations import Simulations, objective_of
+from .simulations import Simulations
 
 __all__ = ["run_study"]
 
@@ -78,13 +78,12 @@ def run_study(
     Raises
     ------
     InputError
-        The scene has no study or asks for what no sample records, the directory holds results of
+        The scene has no study, the directory holds results of
         another run, or all simulations of a stage failed.
     Stopped
         If asked to end early; everything finished is on disk.
     """
     study = study_of(scene)
-    objective_of(scene)
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
     place = _made(Path(directory), fresh, tell)
