@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear import dataset
-from hpcclear.status import OUTCOME, Flag, Status
+from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.surrogate.kriging import fit_kriging
 
 NAMES = ("m2", "m3", "u2", "I2", "C")
@@ -53,6 +53,8 @@ def samples(count: int = 60, failed: int = 3) -> xr.Dataset:
     records["flags"][:5] |= Flag.BEYOND_HERTZ
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][-failed:] = np.nan
+    for name in ON_REQUEST:
+        records[name] = np.nan
     records["latched"][-failed:] = 0
     records["status"][-failed:] = Status.STEP_CAP
     return dataset.samples_dataset(NAMES, points, {}, records, ATTRIBUTES)

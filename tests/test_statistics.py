@@ -12,7 +12,7 @@ from hpcclear import comm, dataset
 from hpcclear.errors import InputError
 from hpcclear.sampling import monte_carlo
 from hpcclear.statistics import ROWS, Accumulator, Summary, columns, merge, summarise
-from hpcclear.status import OUTCOME, Flag, Status
+from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.streaming import MonteCarloPoints, run_statistics, statistics_dataset
 from hpcclear.work import KIND
 
@@ -36,7 +36,7 @@ def outcomes(samples: int, seed: int = 3) -> np.ndarray:
     records["rhs_evaluations"] = rng.integers(10**4, 10**6, samples)
     records["status"] = np.where(rng.random(samples) < 0.05, Status.STEP_CAP, Status.OK)
     records["flags"] = rng.integers(0, 4, samples)
-    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
+    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force", *ON_REQUEST):
         records[name][records["status"] != 0] = np.nan
     return records
 

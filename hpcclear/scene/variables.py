@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from hpcclear.scene.fields import Quantity, Table, nearest, problem
 from hpcclear.scene.paths import quantities
+from hpcclear.status import ON_REQUEST
 
 PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
     "m1": ("mechanism.crank.mass",),
@@ -31,7 +32,7 @@ clipped."""
 RESERVED = frozenset(
     (
         *("sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap"),
-        *("peak_contact_force", "latched", "rhs_evaluations", "status", "flags"),
+        *("peak_contact_force", "latched", "rhs_evaluations", "status", "flags", *ON_REQUEST),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
     )
 )
