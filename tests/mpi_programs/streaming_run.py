@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear import comm
 from hpcclear.scene import load_scene
-from hpcclear.status import OUTCOME, Flag, Status
+from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.stopping import StopSwitch
 from hpcclear.streaming import run_statistics
 from hpcclear.work import KIND
@@ -40,7 +40,7 @@ class MadeUp:
         broken = points[:, 0] > 0.4
         records["status"][broken] = Status.NOT_FINITE
         records["objective_uncertainty"] = np.nan
-        for name in ("objective", "mean_gap", "peak_contact_force"):
+        for name in ("objective", "mean_gap", "peak_contact_force", *ON_REQUEST):
             records[name][broken] = np.nan
         records["flags"][points[:, 1] > 0.2] = Flag.LATCHED
         self._queue.append(records)
