@@ -1,13 +1,10 @@
-"""The runner of analysis/hard_cases.py, for tests."""
+"""The runners of analysis/hard_cases.py and analysis/long_run.py, for tests."""
 
-import importlib.util
+import importlib
 import sys
 from pathlib import Path
 
-PATH = Path(__file__).parent.parent / "analysis" / "hard_cases.py"
-_spec = importlib.util.spec_from_file_location("hard_cases", PATH)
-assert _spec is not None
-assert _spec.loader is not None
-hard_cases = importlib.util.module_from_spec(_spec)
-sys.modules["hard_cases"] = hard_cases
-_spec.loader.exec_module(hard_cases)
+sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
+
+hard_cases = importlib.import_module("hard_cases")
+long_run = importlib.import_module("long_run")

@@ -19,8 +19,9 @@ PAR = at.WORK
     NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
     KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
-) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 10)
-Z = PAR + at.PARAMETERS + 10  # increments of the velocities at the stages, stage by stage
+    RESIDUE,  # of Newton's iteration, as a part of the tolerance on the step's error
+) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 11)
+Z = PAR + at.PARAMETERS + 11  # increments of the velocities at the stages, stage by stage
 TRANSFORMED = Z + 3 * _N  # the same, decoupled
 FORCE = TRANSFORMED + 3 * _N  # accelerations at the stages
 CHANGE = FORCE + 3 * _N

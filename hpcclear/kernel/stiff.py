@@ -16,6 +16,7 @@ from .jacobian import difference_jacobian, evaluate_lane
 from .kinks import LEAST_CUT, kink_fraction, kinks_of_start
 from .lifecycle import ATOL, IMPLICIT, RTOL
 from .radau import (
+    NEWTON_TOLERANCE,
     evaluate_stages,
     factorise_both,
     filtered_error,
@@ -35,9 +36,11 @@ FAILED_SHRINK = 0.25  # after Newton's iteration failed
 CALM_STIFFNESS = 2.0  # h |J| below which the explicit method would do
 CALM_STEPS = 6.0  # so many in a row send the lane back
 EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffness
+CHATTER = 4.0  # or that times the change over the step between its last two stages: as good a sign
 EDGE_LIMIT = 10.0  # such a score sends a lane to the implicit method
 REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
 REJECTION_MEMORY = 0.9
+RESIDUE_IN_RAMP = 0.002  # of Newton's iteration, as a part of the friction's ramp
 KINK_REACH = 0.005  # a kink so near the end of a step, as a part of it, is left there
 MOST_CUTS = 12.0  # of one step
 
@@ -50,6 +53,22 @@ def loosened(rtol, strictness):
     the result is no better than the estimate. `strictness`: square of how many times tighter this sample's tolerances are.
     """
     return 0.1 * (rtol / math.sqrt(strictness)) ** 0.9
+
+
+@scalar_function
+def residue(m, settings):
+    """Part of the tolerance on a step's error that Newton's iteration may leave.
+
+    Where joints stick, the sliding speed lies within the ramp: a residue as wide as the ramp would throw it to and
+    fro, and every step would begin off the slow motion and end at a kink.
+    """
+    steepest = max(
+        m[mem.PAR + at.JOINT_12 + at.INVERSE_RAMP], m[mem.PAR + at.JOINT_23 + at.INVERSE_RAMP]
+    )
+    speed = m[mem.PAR + at.SPEED] * m[mem.PAR + at.CRANK_LENGTH]
+    tolerance = loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS]) * (1.0 + speed)
+    within = RESIDUE_IN_RAMP / max(steepest * tolerance, 1e-300)
+    return min(NEWTON_TOLERANCE, max(within, 1e-3 * NEWTON_TOLERANCE))
 
 
 @scalar_function
@@ -69,6 +88,7 @@ def take_over(size, lane, W, work, par, m, settings):
     m[mem.NEW_JACOBIAN] = 0.0
     m[mem.TRIED_ERROR] = 0.0
     m[mem.KINK_CUTS] = 0.0
+    m[mem.RESIDUE] = residue(m, settings)
 
 
 @scalar_function
@@ -343,16 +363,20 @@ def edge_excess(work, stages, weights, last, atol, n, k, terms, i, W):
     """Square of the change of acceleration between the last two stages of the pair less that of the velocity times EDGE / h.
 
     Both stages stand at the end of the step: summed over the coordinates it is positive where h lambda, estimated as
-    h |a7 - a6| / |v7 - v6|, is above `EDGE` (Hairer and Wanner, Solving ODEs II, IV.2).
+    h |a7 - a6| / |v7 - v6|, is above `EDGE` (Hairer and Wanner, Solving ODEs II, IV.2). Friction that saturates within
+    the step hides its slope from this estimate; but then the acceleration changes far more between these two stages
+    than over the whole step, which on a smooth path it never does.
     """
-    change = work[(at.ACC + k) * W + i] - stages[((terms - 1) * n + k) * W + i]
+    new = work[(at.ACC + k) * W + i]
+    change = new - stages[((terms - 1) * n + k) * W + i]
     dv = 0.0  # without a factor h
     for j in range(terms):
         dv += weights[last + j] * stages[(j * n + k) * W + i]
     scale = 1.0 / atol[at.MAX_COORDINATES + k]
+    over_step = CHATTER * (abs(new - stages[k * W + i]) + 1e-8 * abs(new))
+    least = min(EDGE * abs(dv), over_step) * scale
     change *= scale
-    dv *= EDGE * scale
-    return change * change - dv * dv
+    return change * change - least * least
 
 
 @lane_function
