@@ -19,7 +19,7 @@ PAR = at.WORK
     NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
     KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
-    RESIDUE,  # of Newton's iteration, as a part of the tolerance on the step's error
+    TOLERANCE,  # relative, of a step's error
 ) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 11)
 Z = PAR + at.PARAMETERS + 11  # increments of the velocities at the stages, stage by stage
 TRANSFORMED = Z + 3 * _N  # the same, decoupled

@@ -213,11 +213,11 @@ def newton(effects, size, m, p, torque_table, load_table, h, known):
                 return -(iteration + 1)
             contraction = rate / (1.0 - rate)
             left = MAX_ITERATIONS - 1 - iteration
-            if contraction * change * rate**left > m[mem.RESIDUE]:
+            if contraction * change * rate**left > NEWTON_TOLERANCE:
                 return -(iteration + 1)
         if not change < 1e10:
             return -(iteration + 1)
-        if contraction * change <= m[mem.RESIDUE]:
+        if contraction * change <= NEWTON_TOLERANCE:
             m[mem.CONTRACTION] = contraction
             return iteration + 1
         before = max(change, 1e-300)

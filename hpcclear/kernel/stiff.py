@@ -16,7 +16,6 @@ from .jacobian import difference_jacobian, evaluate_lane
 from .kinks import LEAST_CUT, kink_fraction, kinks_of_start
 from .lifecycle import ATOL, IMPLICIT, RTOL
 from .radau import (
-    NEWTON_TOLERANCE,
     evaluate_stages,
     factorise_both,
     filtered_error,
@@ -40,7 +39,7 @@ CHATTER = 4.0  # or that times the change over the step between its last two sta
 EDGE_LIMIT = 10.0  # such a score sends a lane to the implicit method
 REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
 REJECTION_MEMORY = 0.9
-RESIDUE_IN_RAMP = 0.002  # of Newton's iteration, as a part of the friction's ramp
+ERROR_IN_RAMP = 0.03  # of a step at most, as a part of the friction's ramp
 KINK_REACH = 0.005  # a kink so near the end of a step, as a part of it, is left there
 MOST_CUTS = 12.0  # of one step
 
@@ -56,19 +55,18 @@ def loosened(rtol, strictness):
 
 
 @scalar_function
-def residue(m, settings):
-    """Part of the tolerance on a step's error that Newton's iteration may leave.
+def implicit_tolerance(m, settings):
+    """Relative tolerance of implicit steps.
 
-    Where joints stick, the sliding speed lies within the ramp: a residue as wide as the ramp would throw it to and
-    fro, and every step would begin off the slow motion and end at a kink.
+    Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
+    and every step would begin off the slow motion and end at a kink. Looser than this is dearer.
     """
     steepest = max(
         m[mem.PAR + at.JOINT_12 + at.INVERSE_RAMP], m[mem.PAR + at.JOINT_23 + at.INVERSE_RAMP]
     )
     speed = m[mem.PAR + at.SPEED] * m[mem.PAR + at.CRANK_LENGTH]
-    tolerance = loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS]) * (1.0 + speed)
-    within = RESIDUE_IN_RAMP / max(steepest * tolerance, 1e-300)
-    return min(NEWTON_TOLERANCE, max(within, 1e-3 * NEWTON_TOLERANCE))
+    within = ERROR_IN_RAMP / (max(steepest, 1e-300) * (1.0 + speed))
+    return min(loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS]), within)
 
 
 @scalar_function
@@ -88,7 +86,7 @@ def take_over(size, lane, W, work, par, m, settings):
     m[mem.NEW_JACOBIAN] = 0.0
     m[mem.TRIED_ERROR] = 0.0
     m[mem.KINK_CUTS] = 0.0
-    m[mem.RESIDUE] = residue(m, settings)
+    m[mem.TOLERANCE] = implicit_tolerance(m, settings)
 
 
 @scalar_function
@@ -123,7 +121,7 @@ def fetch(effects, size, lane, W, work, stages, m, p, torque_table, load_table, 
     if unknown or follows:
         for r in range(at.RATES):
             m[mem.START_RATES + r] = m[at.RATE_NOW + r]
-    rtol = loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS])
+    rtol = m[mem.TOLERANCE]
     for k in range(n):
         m[mem.START + k] = stages[k * W + lane]
         m[mem.SCALE + k] = rtol * (m[mem.LEAST + k] + abs(m[at.Q + k]))
@@ -256,7 +254,7 @@ def judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings
     """Error of a converged step, its integrals, its end and the step to try next."""
     n = len(size)
     h = m[at.STEP]
-    rtol = loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS])
+    rtol = m[mem.TOLERANCE]
     for k in range(n):
         m[mem.FORCE + k] = m[mem.START + k]
         m[mem.FORCE + n + k] = 0.0
