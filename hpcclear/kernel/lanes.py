@@ -82,7 +82,7 @@ class Problem:
     implicit: str = "never"
 
     def settings(self) -> Array:
-        """The numbers of the stepper's control, as it reads them."""
+        """The numbers of the stepper's control, as it reads them, shape (SETTINGS,)."""
         s = np.zeros(SETTINGS)
         n = self.coordinates
         length = min(self.atol[:n])

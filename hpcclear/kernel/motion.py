@@ -57,6 +57,7 @@ def either_product(flag, other, a, b):
 
 @lane_function
 def gravity_of(gravity, par, i, W):
+    """Gravity, m/s^2 against y."""
     if gravity is not None:
         return par[at.GRAVITY * W + i]
     else:
@@ -174,6 +175,7 @@ def joint_force(
 
 @lane_function
 def store_rate(flag, work, row, value, i, W):
+    """Write down a rate that an effect asks for."""
     if flag is not None:
         work[(at.RATE_NOW + row) * W + i] = value
 
@@ -208,6 +210,7 @@ def store_power(
 
 @lane_function
 def store_crank(torque, work, last, acceleration, i, W):
+    """Write down the crank's angular acceleration where it is a coordinate."""
     if torque is not None:
         work[(at.ACC + last) * W + i] = acceleration
 

@@ -124,6 +124,7 @@ def weigh_stage(effects, work, weights, s, count, W):
 
 @lane_function
 def free_crank_turn(torque, lane, W, work, settings, last):
+    """End the step where a crank that is a coordinate ends its revolution; the status if it never will."""
     if torque is not None:
         return end_turn_of_free_crank(lane, W, work, settings, last)
     else:
@@ -132,6 +133,7 @@ def free_crank_turn(torque, lane, W, work, settings, last):
 
 @lane_function
 def impacts(latched, lane, W, work, settings):
+    """End the step at the first impact inside it, under laws that need the impact speed."""
     if latched is not None:
         stop_at_impacts(lane, W, work, settings)
 
