@@ -68,7 +68,7 @@ PAIRS = [
     added("guide friction", "effects.guide_friction={coefficient=0.1}"),
     added("baumgarte formulation", "numerics.formulation='baumgarte'"),
     added("energies", "numerics.energy=true"),
-    added("further responses", "study.objective='mean-contact-force'"),
+    added("further responses", "numerics.responses=true"),
 ]
 
 

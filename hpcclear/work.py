@@ -32,13 +32,14 @@ COMPILE = "compile"
 def payload_of(scene: "Scene", points: "Points", lanes: int | None = None) -> dict[str, Any]:
     """What a rank needs to know before it gets points: plain content, small, the same everywhere.
 
-    The study is left out: ranks simulate, whatever for.
+    The study is left out: ranks simulate, whatever for. What it asks of each sample goes into the numerics.
     """
     from .evaluator import DEFAULT_LANES
 
     lanes = DEFAULT_LANES if lanes is None else lanes
     content = scene.resolved()
     content.pop("study", None)
+    content["numerics"]["responses"] = scene.responses_asked()
     return {"scene": content, "names": points.names, "paths": points.paths, "lanes": lanes}
 
 

@@ -5,11 +5,13 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, scene_with
 
 from hpcclear import dataset
+from hpcclear.comm import alone
 from hpcclear.evaluator import evaluate_records
 from hpcclear.names import KINDS
 from hpcclear.response import simulate
 from hpcclear.scene.points import Points
 from hpcclear.status import ON_REQUEST, RESPONSES
+from hpcclear.work import MAKERS, sample_points
 
 NOTHING = Points((), np.empty((1, 0)), ())
 STUDY = {
@@ -85,6 +87,16 @@ def test_what_is_not_asked_for_is_not_a_number_and_not_in_the_file(objective):
     assert not set(ON_REQUEST) & set(content.data_vars)
     found = dataset.records(content)
     assert all(np.isnan(found[name]).all() for name in ON_REQUEST)
+
+
+@pytest.mark.parametrize("how", ["study", "numerics"])
+def test_ranks_know_what_a_study_asks_for(how):
+    """Ranks get no study: what its objective needs must reach them all the same."""
+    scene = asking({}) if how == "study" else asking({"numerics.responses": True}, "mean-gap")
+    points = Points(("C",), np.array([[2e-4], [3e-4]]), (("joints.crank_rod.clearance",),))
+    records = sample_points(scene, points, alone(MAKERS))
+    assert records.tobytes() == evaluate_records(scene, points, lanes=32).tobytes()
+    assert all(np.isfinite(records[name]).all() for name in RESPONSES)
 
 
 def test_what_is_asked_for_is_in_the_file():

@@ -42,6 +42,9 @@ class Numerics(Table):
     """Whether each sample also reports the scatter of its objective under kicks of 1e-10."""
     energy: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also closes its energy balance."""
+    responses: Annotated[bool, Field(strict=True)] = False
+    """Whether each sample also records mean contact forces, peak crank moment and deviation of the
+    slider acceleration. A study of one of these turns it on."""
 
     @property
     def absolute_tolerance(self) -> float:

@@ -152,9 +152,10 @@ class Scene(Table):
                     ) from None
 
     def responses_asked(self) -> bool:
-        """Whether each sample records more than gaps and peak forces: only a study of one of these asks for it."""
+        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
         asked = {name.replace("_", "-") for name in RESPONSES}
-        return self.study is not None and self.study.objective in asked
+        by_study = self.study is not None and self.study.objective in asked
+        return self.numerics.responses or by_study
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23."""
