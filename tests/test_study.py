@@ -370,6 +370,23 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet")
 
 
+@pytest.mark.parametrize("name", ["peak-contact-force", "peak-crank-moment"])
+def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, monkeypatch, name):
+    monkeypatch.setattr(formula, "FIELD", name.replace("-", "_"))
+    scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
+    run_study(scene, place, alone(MAKERS), progress_style="quiet")
+    units = {"peak-contact-force": "N", "peak-crank-moment": "N m"}
+    front, samples = dataset.read(place / "front.nc"), dataset.read(place / "samples.nc")
+    assert front["mean"].attrs["units"] == front["deviation"].attrs["units"] == units[name]
+    assert samples["objective"].attrs["units"] == samples["mean_gap"].attrs["units"] == "m"
+    assert not (place / "claims.nc").exists()
+    assert not (place / "readings.nc").exists()
+    assert np.isnan(dataset.read(place / "verification.nc")["mean_paper"]).all()
+    told: list[str] = []
+    run_study(scene, place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    assert told == [f"{place} holds the finished study."]
+
+
 def test_of_contact_forces_the_larger_is_the_objective():
     for which in ("mean", "peak"):
         scene = scene_of(f"study.objective={which}-contact-force")

@@ -137,7 +137,8 @@ def _tell_the_story(run: Run) -> None:
     responses.write(run, designs)
     if audit.applies(run.scene):
         audit.write(run, run.stage("readings", audit.evaluate))
-    claims.write(run, claims.judge(run, sensitivity, found.kriging, series))
+    if paper.is_comparable(run.scene):
+        claims.write(run, claims.judge(run, sensitivity, found.kriging, series))
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,8 @@ def _made(directory: Path, fresh: bool, tell: Callable[[str], object]) -> Path:
 def _finished(place: Path, key: dict[str, str], scene: Scene) -> bool:
     """Whether all results of this run are there; results of another run are refused."""
     study = study_of(scene)
-    names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc", "claims.nc"]
+    names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
+    names += ["claims.nc"] if paper.is_comparable(scene) else []
     names += ["sensitivity.nc"] if study.groups else []
     names += ["readings.nc"] if audit.applies(scene) else []
     there = [place / name for name in names if (place / name).exists()]

@@ -45,8 +45,15 @@ def case_names(scene: Scene) -> tuple[str | None, str | None]:
     return found[0], found[1]
 
 
+def is_comparable(scene: Scene) -> bool:
+    """Whether the study's objective is the paper's: what it prints and claims says nothing of another one."""
+    return study_of(scene).objective == "mean-gap"
+
+
 def printed_designs(scene: Scene) -> list[Choice]:
-    """The designs of Table 4, each in its case, as far as the study has these cases."""
+    """The designs of Table 4, each in its case, as far as the study has these cases; none for another objective."""
+    if not is_comparable(scene):
+        return []
     names = dict(zip(("case 1", "case 2"), case_names(scene), strict=True))
     return [
         Choice(f"{own} paper {letter}", own, dict(zip(DESIGN, design, strict=True)), None, printed)

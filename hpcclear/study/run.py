@@ -98,7 +98,8 @@ class Run:
         """Write a result file, with what made it."""
         content.attrs.update(self.checkpoint.attributes)
         unit = objective_of(self.scene)[0]
-        if unit != "m":
+        # of a sample all responses are recorded, each in its own unit
+        if unit != "m" and content.attrs["hpcclear_kind"] != "samples":
             for variable in content.data_vars.values():
                 if variable.attrs.get("units") == "m" and "scene_path" not in variable.attrs:
                     variable.attrs["units"] = unit
