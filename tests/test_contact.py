@@ -179,7 +179,8 @@ def test_friction_opposes_sliding_and_is_full_beyond_the_ramp(speed, mu):
     for coulomb, ambrosio, full in ((1, None, 0.01), (None, 1, 0.011)):
         ratio = friction.friction_ratio(coulomb, ambrosio, mu, 1e-3, 100.0, speed)
         assert ratio * speed >= 0.0
-        assert abs(ratio) <= mu * (1 + 1e-15)
+        # 1 + |x| - |x - 1| cancels what lies beyond the ramp, x up to 1000 here: 1000 roundings
+        assert abs(ratio) <= mu * (1 + 1e-12)
         if abs(speed) >= full:
             assert abs(ratio) == pytest.approx(mu, rel=1e-12)
     assert friction.friction_ratio(None, 1, mu, 1e-3, 100.0, 0.5e-3) == 0.0

@@ -274,8 +274,7 @@ def test_no_string_of_a_scene_leads_out_of_the_output_directory(hpcclear, tmp_pa
 
 
 def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, tmp_path):
-    for parent in (tmp_path, *list(tmp_path.parents)[:2]):
-        parent.chmod(0o755)
+    open_to_all = (tmp_path, *list(tmp_path.parents)[:3])
     locked, file, full = (tmp_path / name for name in ("locked", "file", "directory.nc"))
     locked.mkdir(mode=0o555)
     file.write_text("mine")
@@ -292,6 +291,8 @@ def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, tm
         tmp_path / "no" / "x.nc",
         Path("/proc/x.nc"),
     ):
+        for parent in open_to_all:  # another session of tests closes the outermost
+            parent.chmod(0o755)
         answer = hpcclear(*words, place, user=NOBODY)
         assert refused(answer), (place, answer)
         assert str(place.parent) in answer[1] or str(place) in answer[1]
