@@ -46,11 +46,11 @@ def integral(y: np.ndarray, x: np.ndarray) -> float:
     "changes",
     [
         pytest.param({}, id="two open"),
-        pytest.param({"effects.contact": LATCHED}, id="latched"),
+        pytest.param({"effects.contact": LATCHED}, marks=pytest.mark.full, id="latched"),
         pytest.param({"joints.crank_rod": IDEAL}, marks=pytest.mark.full, id="O23 open"),
         pytest.param({"joints.rod_slider": IDEAL}, marks=pytest.mark.full, id="O12 open"),
         pytest.param({"drive": FREE}, marks=pytest.mark.full, id="torque drive"),
-        pytest.param({"numerics.formulation": "baumgarte"}, id="baumgarte"),
+        pytest.param({"numerics.formulation": "baumgarte"}, marks=pytest.mark.full, id="baumgarte"),
         pytest.param({"numerics.method": "radau"}, marks=pytest.mark.full, id="radau"),
         pytest.param(
             {**RIGID, "drive": FREE}, marks=pytest.mark.full, id="torque drive, no clearance"
@@ -89,7 +89,7 @@ def test_what_is_not_asked_for_is_not_a_number_and_not_in_the_file(objective):
     assert all(np.isnan(found[name]).all() for name in ON_REQUEST)
 
 
-@pytest.mark.parametrize("how", ["study", "numerics"])
+@pytest.mark.parametrize("how", ["study", pytest.param("numerics", marks=pytest.mark.full)])
 def test_ranks_know_what_a_study_asks_for(how):
     """Ranks get no study: what its objective needs must reach them all the same."""
     scene = asking({}) if how == "study" else asking({"numerics.responses": True}, "mean-gap")
