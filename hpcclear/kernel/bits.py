@@ -37,3 +37,28 @@ def rough_exp2(y):
     # the chord of 2**s overshoots it: a parabola takes most of the difference away
     bits = int((y - 0.3371894346 * s * (1.0 - s)) * 4503599627370496.0)
     return _double_of(bits)  # type: ignore[call-arg]
+
+
+@intrinsic(prefer_literal=True)
+def beyond(typingctx, array, offset):
+    """View of a flat array from a constant offset on, at a distance the compiler knows (a slice's would be clamped first)."""
+
+    def codegen(context, builder, signature, args):
+        kind = signature.args[0]
+        whole = context.make_array(kind)(context, builder, args[0])
+        part = context.make_array(kind)(context, builder)
+        data = builder.gep(whole.data, [ir.Constant(ir.IntType(64), offset.literal_value)])
+        context.populate_array(
+            part,
+            data=data,
+            shape=whole.shape,
+            strides=whole.strides,
+            itemsize=whole.itemsize,
+            meminfo=whole.meminfo,
+            parent=whole.parent,
+        )
+        view = part._getvalue()
+        context.nrt.incref(builder, kind, view)
+        return view
+
+    return array(array, offset), codegen

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import layout as at
+from .collocation import make_collocation_stepper
 from .lifecycle import (
     ANGLE_TOLERANCE,
     ATOL,
@@ -31,6 +32,7 @@ from .lifecycle import (
     TRANSIENT,
 )
 from .memory import MEMORY
+from .lobatto import new_memory
 from .stepper import make_stepper
 from .tableau import Tableau
 
@@ -80,6 +82,7 @@ class Problem:
     torque_table: Array = None  # type: ignore[assignment]
     load_table: Array = None  # type: ignore[assignment]
     implicit: str = "never"
+    collocation: bool = False
 
     def settings(self) -> Array:
         """The numbers of the stepper's control, as it reads them, shape (SETTINGS,)."""
@@ -120,7 +123,8 @@ class Lanes:
         self.problem = problem
         self.width = width
         self.record = record
-        self._step = make_stepper(width, n)
+        single = problem.collocation and width == 1
+        self._step = make_collocation_stepper(n) if single else make_stepper(width, n)
         self._weights = problem.tableau.packed()
         self._settings = problem.settings()
         self._work = np.zeros(at.WORK * width)
@@ -129,6 +133,8 @@ class Lanes:
         self._book = np.zeros(at.BOOK * width)
         # absent, it keeps the implicit method from being compiled
         self._memory = None if problem.implicit == "never" else np.zeros((width, MEMORY))
+        if single:
+            self._memory = new_memory()
         self._effects = problem.effects._replace(sliding=None if self._memory is None else 1)
         self._tables = [
             _NO_TABLE if t is None else t for t in (problem.torque_table, problem.load_table)

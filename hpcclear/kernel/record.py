@@ -3,6 +3,7 @@
 from ..jit import lane_function
 from . import layout as at
 from .lifecycle import RECORDED
+from .lobatto import MATRIX, STAGES, row_of, weighted
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
 (TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
@@ -38,3 +39,30 @@ def record_step(record, counters, work, stages, book, n, W):
         return counters[RECORDED] >= record.shape[0]
     else:
         return False
+
+
+@lane_function
+def record_nodes(record, counters, work, m, book, n):
+    """Append the inner nodes of a step of collocation, which stand in the lanes of `m`, before it is committed."""
+    if record is not None:
+        for i in range(STAGES - 1):
+            row = counters[RECORDED]
+            turn_time = m[at.STAGE_TIME * STAGES + i]
+            record[row, TIME] = book[at.ELAPSED] + turn_time
+            record[row, TURN_TIME] = turn_time
+            record[row, REVOLUTION] = book[at.REVOLUTION]
+            record[row, ACTIVE_12] = m[at.ACTIVE_12 * STAGES]
+            record[row, ACTIVE_23] = m[at.ACTIVE_23 * STAGES]
+            record[row, INVERSE_12] = m[at.INVERSE_IMPACT_12 * STAGES]
+            record[row, INVERSE_23] = m[at.INVERSE_IMPACT_23 * STAGES]
+            for r in range(4):
+                power = at.DRIVE_POWER + r
+                rates = row_of(m, at.RATE_NOW + power)
+                since = weighted(m, MATRIX, work[at.RATE_OLD + power], rates, i)
+                done = book[at.DRIVE_WORK + r] + work[at.INTEGRAL + power]
+                record[row, DRIVE_WORK + r] = done + work[at.STEP] * since
+            for k in range(n):
+                record[row, STATE + k] = m[(at.QS + k) * STAGES + i]
+                record[row, STATE + n + k] = m[(at.VS + k) * STAGES + i]
+                record[row, STATE + 2 * n + k] = m[(at.ACC + k) * STAGES + i]
+            counters[RECORDED] = row + 1

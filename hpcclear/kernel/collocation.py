@@ -1,0 +1,392 @@
+"""The stepper of a single response: one step of Lobatto collocation after the other.
+
+State, books and outcome are those of the block stepper with one lane, and so are the functions around a step; what
+differs is the step itself, and that contacts which begin or end inside it are found at its nodes.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba import njit
+
+from ..jit import FASTMATH, lane_function, scalar_function
+from . import layout as at
+from . import lobatto as lob
+from .bits import beyond
+from .control import choose_step, commit
+from .events import impact_fraction, root
+from .lifecycle import (
+    ATOL,
+    GAP_TOLERANCE,
+    IMPACT_FLOOR,
+    MAX_STEPS,
+    OK,
+    RECORDED,
+    RTOL,
+    SMALLEST_STEP,
+    UNFINISHED,
+    end_revolution,
+    failure,
+    finish,
+    integrate_gap,
+    latch,
+    load,
+)
+from .lobatto import PARAMETER_OFFSET, STAGES
+from .record import record_nodes, record_step
+from .rhs import accelerations
+from .stepper import free_crank_turn, wrap_crank
+
+SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
+DECAY = 1.0  # how far the fall of the last coefficients is trusted to go on
+SAFETY = 0.8
+LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
+FAILED_SHRINK = 0.3  # after the sweeps did not converge
+BEST_CONTRACTION = 0.25  # of a sweep: longer steps need more of them than they save
+
+
+@lane_function
+def replicate(work, par, m):
+    """Give every stage the sample's parameters."""
+    for r in range(at.PARAMETERS):
+        for i in range(STAGES):
+            m[(lob.PAR + r) * STAGES + i] = par[r]
+    for s in range(lob.SCALARS * STAGES, lob.MEMORY):
+        m[s] = 0.0
+    m[lob.CONTRACTION] = 0.1
+    m[lob.KINKED] = 1.0
+    m[lob.AFTER_KINK] = par[at.FIRST_STEP]
+
+
+@lane_function
+def begin_contacts(work, m):
+    """Contact states of the step, for every stage."""
+    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+        for i in range(STAGES):
+            m[row * STAGES + i] = work[row]
+
+
+@lane_function
+def evaluate_start(effects, work, stages, m, torque_table, load_table, n):
+    """Accelerations and rates at the start of the step, where they are not known."""
+    for i in range(STAGES):
+        m[at.STAGE_TIME * STAGES + i] = work[at.TIME]
+        for k in range(n):
+            m[(at.QS + k) * STAGES + i] = work[at.Q + k]
+            m[(at.VS + k) * STAGES + i] = work[at.V + k]
+    accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
+    for k in range(n):
+        stages[k] = m[(at.ACC + k) * STAGES]
+    for r in range(at.RATES):
+        work[at.RATE_OLD + r] = m[(at.RATE_NOW + r) * STAGES]
+    work[at.FRESH] = 0.0
+    work[at.EVALUATIONS] += 1.0
+
+
+@lane_function
+def weigh(work, stages, m, settings, strictness, n):
+    """What an error of each coordinate's acceleration, kept up over the step, counts."""
+    h = work[at.STEP]
+    rtol = settings[RTOL]
+    for k in range(n):
+        a = stages[k]
+        m[lob.START_ACC * STAGES + k] = a
+        v = max(abs(work[at.V + k]), abs(work[at.V + k] + h * a))
+        by_v = h / (settings[ATOL + at.MAX_COORDINATES + k] + rtol * v)
+        by_q = h * h / (settings[ATOL + k] + rtol * abs(work[at.Q + k]))
+        m[lob.WEIGHT * STAGES + k] = strictness * (0.5 / n) * (by_v * by_v + by_q * by_q)
+
+
+@lane_function
+def sweep(effects, work, m, torque_table, load_table, n):
+    """Iterate the stages of the step to convergence. Returns whether they did."""
+    h = work[at.STEP]
+    rate = m[lob.CONTRACTION]
+    before = 0.0
+    for count in range(lob.MOST_SWEEPS):
+        lob.set_stages(m, work, n, h)
+        accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
+        change = lob.take_accelerations(m, n)
+        work[at.EVALUATIONS] += STAGES
+        if not change < 1e30:
+            return False
+        if count > 0:
+            rate = change / before if before > 0.0 else 0.0
+            m[lob.CONTRACTION] = max(rate, 1e-4)
+            if count > 2 and rate > 0.9:
+                return False
+        before = change
+        if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
+            return True
+    return False
+
+
+@lane_function
+def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
+    """Add the last coefficients of a gap, scaled as its integral's error is, to those of the accelerations."""
+    if flag is not None:
+        row = lob.COEFFICIENT + lob._N + (gap - at.GAP_12) // 3
+        lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
+        scale = work[at.STEP] / (rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
+        last, before = lob.tail(m, row)
+        weight = strictness * scale * scale
+        return high + weight * last, low + weight * before
+    else:
+        return high, low
+
+
+@lane_function
+def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
+    """Scaled error of a converged step.
+
+    The last coefficients bound the error of the polynomial; at the nodes where it ends the method is far better, by as
+    much again as the coefficients have fallen.
+    """
+    high = 0.0
+    low = 0.0
+    for k in range(n):
+        last, before = lob.tail(m, lob.COEFFICIENT + k)
+        high += m[lob.WEIGHT * STAGES + k] * last
+        low += m[lob.WEIGHT * STAGES + k] * before
+    high, low = gap_tail(crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low)
+    high, low = gap_tail(rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low)
+    fall = min(high / (low + 1e-300), 1.0)
+    return math.sqrt(high) * fall ** (0.5 * DECAY)
+
+
+@scalar_function
+def impact_in(work, m, gap, active, inverse, settings):
+    """Where in this step a joint in flight strikes, as a fraction; 2 if it does not, 1 if at the end; as `meet_impact`."""
+    tolerance = settings[GAP_TOLERANCE]
+    h = work[at.STEP]
+    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
+    for i in range(STAGES):
+        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
+        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
+        c1 = m[lob.NODE * STAGES + i]
+        if i == STAGES - 1 and abs(d1) <= tolerance and m1 > 0.0:
+            return 1.0
+        part = c1 - c0
+        fraction = impact_fraction(d0, part * m0, d1, part * m1, 0.5 * tolerance)
+        if fraction == 0.0 and i == 0:
+            speed = max(work[at.RATE_OLD + gap + 2], settings[IMPACT_FLOOR])
+            work[active] = 1.0
+            work[inverse] = 1.0 / speed
+            work[at.FRESH] = 1.0
+            return 0.0
+        if fraction <= 1.0:
+            fraction = c0 + part * fraction
+            return 1.0 if fraction > 1.0 - 1e-7 and m1 > 0.0 else fraction
+        d0, m0, c0 = d1, m1, c1
+    return 2.0
+
+
+@scalar_function
+def kink_in(work, m, gap, tolerance):
+    """Where in this step a gap changes sign, as a fraction; 2 if it does not, or so near an end that it does no harm."""
+    h = work[at.STEP]
+    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
+    for i in range(STAGES):
+        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
+        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
+        c1 = m[lob.NODE * STAGES + i]
+        at_end = (i == 0 and abs(d0) <= tolerance) or (i == STAGES - 1 and abs(d1) <= tolerance)
+        if d0 * d1 < 0.0 and not at_end:
+            part = c1 - c0
+            return c0 + part * root(d0, part * m0, d1, part * m1, 1.0)
+        d0, m0, c0 = d1, m1, c1
+    return 2.0
+
+
+@lane_function
+def contact_change(flag, latched, work, m, gap, active, inverse, settings):
+    """Fraction of the step at which a joint's contact begins or ends; 2 if it does not, 1 if an impact ends the step."""
+    if flag is not None:
+        if latched is not None:
+            if work[active] == 0.0:
+                return impact_in(work, m, gap, active, inverse, settings)
+        return kink_in(work, m, gap, settings[GAP_TOLERANCE])
+    else:
+        return 2.0
+
+
+@lane_function
+def stop_at_contacts(effects, work, m, settings):
+    """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
+    first = contact_change(
+        effects.crank_rod, effects.latched, work, m,
+        at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12, settings,
+    )  # fmt: skip
+    second = contact_change(
+        effects.rod_slider, effects.latched, work, m,
+        at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23, settings,
+    )  # fmt: skip
+    fraction = min(first, second)
+    if fraction < 1.0:
+        h = work[at.STEP]
+        work[at.ACCEPT] = 0.0
+        work[at.NEXT_STEP] = fraction * h if fraction > 0.0 else h
+        m[lob.KINKED] = 2.0
+    else:
+        if first == 1.0:
+            latch(0, 1, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
+            m[lob.KINKED] = 2.0
+        if second == 1.0:
+            latch(0, 1, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+            m[lob.KINKED] = 2.0
+
+
+@lane_function
+def quadrature(work, m, rate):
+    """Integral of a rate over the step, over h."""
+    row = lob.row_of(m, at.RATE_NOW + rate)
+    work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, work[at.RATE_OLD + rate], row, STAGES - 1)
+
+
+@lane_function
+def end_of_step(effects, work, m, n):
+    """Put the end of the step, and the integrals over it, where the block stepper would leave them."""
+    last = STAGES - 1
+    h = work[at.STEP]
+    for k in range(n):
+        start = m[lob.START_ACC * STAGES + k]
+        a = lob.row_of(m, lob.NODE_ACC + k)
+        v = work[at.V + k]
+        work[at.VS + k] = v + h * lob.weighted(m, lob.MATRIX, start, a, last)
+        work[at.QS + k] = work[at.Q + k] + h * (v + h * lob.weighted(m, lob.SQUARE, start, a, last))
+        work[at.ACC + k] = a[7]
+    for r in range(at.RATES):
+        work[at.RATE_NOW + r] = m[(at.RATE_NOW + r) * STAGES + last]
+    if effects.crank_rod is not None:
+        quadrature(work, m, at.GAP_12)
+    if effects.rod_slider is not None:
+        quadrature(work, m, at.GAP_23)
+    if effects.ledger is not None:
+        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
+            quadrature(work, m, r)
+    if effects.responses is not None:
+        for r in (at.FORCE_12, at.FORCE_23, at.SLIDER_ACCELERATION, at.SLIDER_SQUARE):
+            quadrature(work, m, r)
+
+
+@lane_function
+def peaks_inside(flag, work, m, gap, peak, deepest):
+    """Extremes of a joint at the nodes of an accepted step, its end left to `commit`."""
+    if flag is not None:
+        for i in range(STAGES):
+            work[peak] = max(work[peak], m[(at.RATE_NOW + gap + 1) * STAGES + i])
+            work[deepest] = max(work[deepest], m[(at.RATE_NOW + gap) * STAGES + i])
+
+
+@lane_function
+def propose(work, m, error):
+    """The step to try next after one that was tried to its end, and whether it is accepted."""
+    h = work[at.STEP]
+    factor = SAFETY * (error + 1e-30) ** (-1.0 / (9.0 + 2.0 * DECAY))
+    factor = min(factor, math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION]))
+    if error <= 1.0:
+        work[at.ACCEPT] = 1.0
+        proposal = h * min(max(factor, 0.3), LARGEST_GROWTH)
+        # a step cut short by the end of the revolution says little about the next one
+        work[at.NEXT_STEP] = max(proposal, work[at.NEXT_STEP]) if work[at.ENDING] == 1.0 else proposal
+    else:
+        work[at.ACCEPT] = 0.0
+        work[at.NEXT_STEP] = h * min(max(factor, LARGEST_SHRINK), 0.7)
+
+
+@lane_function
+def after_step(work, m):
+    """Where the next step begins, and how long it is after a kink."""
+    m[lob.FOLLOWS] = 1.0
+    if m[lob.KINKED] == 1.0:
+        m[lob.AFTER_KINK] = work[at.STEP]
+        m[lob.KINKED] = 0.0
+    elif m[lob.KINKED] == 2.0:
+        m[lob.KINKED] = 1.0
+        m[lob.POLYNOMIAL_STEP] = 0.0
+        work[at.NEXT_STEP] = m[lob.AFTER_KINK]
+
+
+@cache
+def make_collocation_stepper(n: int) -> Callable[..., Any]:
+    """Return the compiled stepper of one response with n coordinates.
+
+    Its arguments are those of `stepper.make_stepper`, so that either serves `lanes.Lanes`; the tableau is not read, and
+    `memory` is what `lobatto.new_memory` makes.
+    """
+
+    @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
+    def stepper(
+        effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
+        queue_par, queue_state, out, finished, counters, record, m, budget,
+    ):  # fmt: skip
+        if work[at.RUNNING] == 0.0:
+            load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
+            replicate(work, par, m)
+        while budget > 0 and work[at.RUNNING] > 0.0:
+            budget -= 1
+            strictness = par[at.STRICTNESS]
+            choose_step(work, par, effects.torque, 1)
+            begin_contacts(work, m)
+            if work[at.FRESH] == 1.0:
+                evaluate_start(effects, work, stages, m, torque_table, load_table, n)
+            weigh(work, stages, m, settings, strictness, n)
+            lob.guess(m, n, work[at.STEP])
+            work[at.ATTEMPTS] += 1.0
+            if sweep(effects, work, m, torque_table, load_table, n):
+                lob.keep_polynomial(m, n, work[at.STEP])
+                error = error_of(
+                    effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
+                )
+                work[at.ERROR] = error * error
+                propose(work, m, error)
+            else:
+                work[at.ACCEPT] = 0.0
+                work[at.NEXT_STEP] = FAILED_SHRINK * work[at.STEP]
+                m[lob.POLYNOMIAL_STEP] = 0.0
+            status = OK
+            rejected = work[at.ACCEPT] == 0.0
+            if rejected or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
+                status = failure(0, 1, n, work, stages, settings)
+            if status == OK and not rejected:
+                end_of_step(effects, work, m, n)
+                stop_at_contacts(effects, work, m, settings)
+                if work[at.ACCEPT] == 1.0:
+                    status = free_crank_turn(effects.torque, 0, 1, work, settings, n - 1)
+                if work[at.ACCEPT] == 1.0:
+                    integrate_gap(0, 1, work, at.GAP_12)
+                    integrate_gap(0, 1, work, at.GAP_23)
+                    if work[at.AVERAGING] == 1.0:
+                        peaks_inside(effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12)
+                        peaks_inside(effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23)
+            ended = 0.0
+            full = False
+            if status == OK and work[at.ACCEPT] == 1.0:
+                record_nodes(record, counters, work, m, book, n)
+                ended = commit(
+                    effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
+                    effects.responses, work, stages, n, 1,
+                )  # fmt: skip
+                full = record_step(record, counters, work, stages, book, n, 1)
+                if record is not None:
+                    full = counters[RECORDED] + STAGES > record.shape[0]
+                after_step(work, m)
+            if ended > 0.0:
+                wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
+                status = end_revolution(0, 1, work, book, settings)
+                status = OK if status == UNFINISHED else status + 1000
+            if status != OK:
+                done = status - 1000 if status >= 1000 else status
+                finish(0, 1, n, done, work, book, out, finished, counters)
+                load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
+                replicate(work, par, m)
+            if full:
+                break
+        return work[at.RUNNING] > 0.0
+
+    return stepper
+
+
+__all__ = ["make_collocation_stepper"]
