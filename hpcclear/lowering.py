@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import InputError
 from .kernel import layout as at
 from .kernel.lanes import Problem
 from .kernel.lifecycle import STATE
@@ -170,8 +171,36 @@ def implicit_method(scene: Scene) -> str:
     return "never"
 
 
-def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
-    """What is common to all samples of a scene."""
+def takes_collocation(scene: Scene, single: bool) -> bool:
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response that is not stiff.
+
+    A tabulated curve keeps its stages from running side by side, and Baumgarte's nine coordinates from fitting.
+
+    Raises
+    ------
+    InputError
+        If it is named and cannot be had.
+    """
+    minimal = scene.numerics.formulation == "minimal"
+    if scene.numerics.method == "lobatto":
+        if not minimal:
+            raise InputError(
+                "numerics.method",
+                "lobatto",
+                'works in minimal coordinates only',
+                'set numerics.formulation = "minimal" or another method',
+            )
+        return True
+    curves = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
+    smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
+    automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
+    return single and automatic and smooth
+
+
+def problem_of(
+    scene: Scene, *, series: bool = False, ledger: bool | None = None, single: bool = False
+) -> Problem:
+    """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
     averaged: Any = scene.numerics.averaged_revolutions
@@ -191,6 +220,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,  # type: ignore[arg-type]
         load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,  # type: ignore[arg-type]
         implicit=implicit_method(scene),
+        collocation=takes_collocation(scene, single),
     )
 
 

@@ -40,7 +40,7 @@ class Steps:
 
 def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
     """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
-    problem = problem_of(scene, ledger=True, series=True)
+    problem = problem_of(scene, ledger=True, series=True, single=True)
     par = parameters(scene)
     state = start_states(scene, par)
     n = problem.coordinates

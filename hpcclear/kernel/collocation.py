@@ -14,7 +14,7 @@ from numba import njit
 from ..jit import FASTMATH, lane_function, scalar_function
 from . import layout as at
 from . import lobatto as lob
-from .bits import beyond
+from .bits import beyond, rough_log2
 from .control import choose_step, commit
 from .events import impact_fraction, root
 from .lifecycle import (
@@ -43,8 +43,8 @@ SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
 DECAY = 1.0  # how far the fall of the last coefficients is trusted to go on
 SAFETY = 0.8
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
-FAILED_SHRINK = 0.3  # after the sweeps did not converge
-BEST_CONTRACTION = 0.25  # of a sweep: longer steps need more of them than they save
+FAILED_SHRINK = 0.7  # after the sweeps did not converge
+BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they save
 
 
 @lane_function
@@ -56,6 +56,7 @@ def replicate(work, par, m):
     for s in range(lob.SCALARS * STAGES, lob.MEMORY):
         m[s] = 0.0
     m[lob.CONTRACTION] = 0.1
+    m[lob.CONTRACTION_STEP] = par[at.FIRST_STEP]
     m[lob.KINKED] = 1.0
     m[lob.AFTER_KINK] = par[at.FIRST_STEP]
 
@@ -101,26 +102,30 @@ def weigh(work, stages, m, settings, strictness, n):
 
 @lane_function
 def sweep(effects, work, m, torque_table, load_table, n):
-    """Iterate the stages of the step to convergence. Returns whether they did."""
+    """Iterate the stages of the step until they have converged. Returns False when they will not in `MOST_SWEEPS`."""
     h = work[at.STEP]
-    rate = m[lob.CONTRACTION]
+    ratio = h / m[lob.CONTRACTION_STEP]
+    # of forces that depend on positions it goes with the square of the step, of damping with the step
+    rate = min(m[lob.CONTRACTION] * ratio * max(ratio, 1.0), 0.9)
     before = 0.0
-    for count in range(lob.MOST_SWEEPS):
+    left = lob.MOST_SWEEPS
+    while left > 0.0:
+        left -= 1.0
         lob.set_stages(m, work, n, h)
         accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
         change = lob.take_accelerations(m, n)
         work[at.EVALUATIONS] += STAGES
-        if not change < 1e30:
-            return False
-        if count > 0:
-            rate = change / before if before > 0.0 else 0.0
-            m[lob.CONTRACTION] = max(rate, 1e-4)
-            if count > 2 and rate > 0.9:
-                return False
+        if before > 0.0:
+            rate = change / before
         before = change
+        # what the stages still miss, and will miss after the last sweep, if the changes go on to fall at this rate
         if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
-            return True
-    return False
+            left = -1.0
+        elif not rough_log2(rate) * left + rough_log2(change) < 0.0:
+            left = 0.0
+    m[lob.CONTRACTION] = min(max(rate, 1e-4), 1e4)
+    m[lob.CONTRACTION_STEP] = h
+    return left < 0.0
 
 
 @lane_function
@@ -344,8 +349,8 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
                 propose(work, m, error)
             else:
                 work[at.ACCEPT] = 0.0
-                work[at.NEXT_STEP] = FAILED_SHRINK * work[at.STEP]
-                m[lob.POLYNOMIAL_STEP] = 0.0
+                factor = math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION])
+                work[at.NEXT_STEP] = work[at.STEP] * min(max(factor, LARGEST_SHRINK), FAILED_SHRINK)
             status = OK
             rejected = work[at.ACCEPT] == 0.0
             if rejected or work[at.ATTEMPTS] >= settings[MAX_STEPS]:

@@ -32,7 +32,7 @@ from .lifecycle import (
     TRANSIENT,
 )
 from .memory import MEMORY
-from .lobatto import new_memory
+from .lobatto import STAGES, new_memory
 from .stepper import make_stepper
 from .tableau import Tableau
 
@@ -66,6 +66,8 @@ class Problem:
         Cubic cells of a periodic table, 4 coefficients a cell.
     implicit : str
         When lanes take implicit steps, a key of `IMPLICIT_USE`.
+    collocation : bool
+        Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes.
     """
 
     effects: at.Effects
@@ -120,11 +122,11 @@ class Lanes:
 
     def __init__(self, problem: Problem, width: int, record: Array | None = None) -> None:
         n, stages = problem.coordinates, problem.tableau.stages
+        width = 1 if problem.collocation else width
         self.problem = problem
         self.width = width
         self.record = record
-        single = problem.collocation and width == 1
-        self._step = make_collocation_stepper(n) if single else make_stepper(width, n)
+        self._step = make_collocation_stepper(n) if problem.collocation else make_stepper(width, n)
         self._weights = problem.tableau.packed()
         self._settings = problem.settings()
         self._work = np.zeros(at.WORK * width)
@@ -133,7 +135,7 @@ class Lanes:
         self._book = np.zeros(at.BOOK * width)
         # absent, it keeps the implicit method from being compiled
         self._memory = None if problem.implicit == "never" else np.zeros((width, MEMORY))
-        if single:
+        if problem.collocation:
             self._memory = new_memory()
         self._effects = problem.effects._replace(sliding=None if self._memory is None else 1)
         self._tables = [
@@ -176,6 +178,9 @@ class Lanes:
         To be called when everything finished has been collected: lanes keep their own copy of what they
         run, so the queue is rebuilt from what still waits.
         """
+        if self.pending == 0:
+            self._accept_queue(par, state, labels)
+            return
         book = self._book.reshape(at.BOOK, self.width)
         running = np.flatnonzero(self.running)
         slots = book[at.SAMPLE, running].astype(np.int64)
@@ -207,7 +212,8 @@ class Lanes:
     @property
     def record_full(self) -> bool:
         """Whether the record must be emptied before the stepper can go on."""
-        return self.record is not None and self.counters[RECORDED] >= len(self.record)
+        left = 0 if self.record is None else len(self.record) - int(self.counters[RECORDED])
+        return self.record is not None and left < (STAGES if self.problem.collocation else 1)
 
     def take_record(self) -> Array:
         """The recorded rows since the last call (a copy); the record is empty afterwards."""

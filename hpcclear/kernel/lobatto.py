@@ -45,13 +45,13 @@ SCALARS = CHANGE + 1
     POLYNOMIAL_STEP,  # s, of the step whose coefficients are kept; 0 when there are none
     FOLLOWS,  # 1 where the step to come begins at that step's end, 0 where at its start
     CONTRACTION,  # of the fixed-point iteration
+    CONTRACTION_STEP,  # s, of the step for which that was found
     AFTER_KINK,  # s, the step that was accepted first after the last kink
     KINKED,  # 1 while no step was accepted since a kink
-    ASKED,  # s, the step to try after one that a kink cuts
 ) = range(SCALARS * STAGES, SCALARS * STAGES + 6)
 MEMORY = (SCALARS + 1) * STAGES
 
-MOST_SWEEPS = 12
+MOST_SWEEPS = 12.0
 """Sweeps over the stages after which a step counts as not converging."""
 
 

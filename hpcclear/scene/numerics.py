@@ -16,9 +16,10 @@ class Numerics(Table):
     """Baumgarte feedback on constraint speed, 1/s; used by that formulation only."""
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
     """Baumgarte feedback on constraint position, 1/s; used by that formulation only."""
-    method: Literal["auto", "dormand-prince", "fehlberg", "switching", "radau"] = "auto"
-    """Integrator; "switching" takes implicit steps where the motion is stiff, "radau" always, "auto" as "switching" in scenes
-    with steep friction ramps or strong damping and never in others."""
+    method: Literal["auto", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"] = "auto"
+    """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
+    "radau" always, "auto" as "switching" in scenes with steep friction ramps or strong damping, in others "lobatto" for
+    a single response and "dormand-prince" for an ensemble."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
