@@ -44,6 +44,7 @@ DECAY = 1.0  # how far the fall of the last coefficients is trusted to go on
 SAFETY = 0.8
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
+UNTESTED = 0.5  # a contraction that one sweep left unmeasured is taken to have fallen to this part: or steps might stay small for ever
 BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they save
 
 
@@ -108,6 +109,7 @@ def sweep(effects, work, m, torque_table, load_table, n):
     # of forces that depend on positions it goes with the square of the step, of damping with the step
     rate = min(m[lob.CONTRACTION] * ratio * max(ratio, 1.0), 0.9)
     before = 0.0
+    found = UNTESTED * rate
     left = lob.MOST_SWEEPS
     while left > 0.0:
         left -= 1.0
@@ -117,13 +119,14 @@ def sweep(effects, work, m, torque_table, load_table, n):
         work[at.EVALUATIONS] += STAGES
         if before > 0.0:
             rate = change / before
+            found = rate
         before = change
         # what the stages still miss, and will miss after the last sweep, if the changes go on to fall at this rate
         if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
             left = -1.0
         elif not rough_log2(rate) * left + rough_log2(change) < 0.0:
             left = 0.0
-    m[lob.CONTRACTION] = min(max(rate, 1e-4), 1e4)
+    m[lob.CONTRACTION] = min(max(found, 1e-4), 1e4)
     m[lob.CONTRACTION_STEP] = h
     return left < 0.0
 
