@@ -14,7 +14,7 @@ from numba import njit
 from ..jit import FASTMATH, lane_function, scalar_function
 from . import layout as at
 from . import lobatto as lob
-from .bits import beyond, rough_log2
+from .bits import rough_log2
 from .control import choose_step, commit
 from .events import impact_fraction, root
 from .lifecycle import (
@@ -34,9 +34,8 @@ from .lifecycle import (
     latch,
     load,
 )
-from .lobatto import PARAMETER_OFFSET, STAGES
+from .lobatto import STAGES
 from .record import record_nodes, record_step
-from .rhs import accelerations
 from .stepper import free_crank_turn, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
@@ -78,7 +77,7 @@ def evaluate_start(effects, work, stages, m, torque_table, load_table, n):
         for k in range(n):
             m[(at.QS + k) * STAGES + i] = work[at.Q + k]
             m[(at.VS + k) * STAGES + i] = work[at.V + k]
-    accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
+    lob.accelerations_of_stages(effects, m, torque_table, load_table)
     for k in range(n):
         stages[k] = m[(at.ACC + k) * STAGES]
     for r in range(at.RATES):
@@ -114,7 +113,7 @@ def sweep(effects, work, m, torque_table, load_table, n):
     while left > 0.0:
         left -= 1.0
         lob.set_stages(m, work, n, h)
-        accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
+        lob.accelerations_of_stages(effects, m, torque_table, load_table)
         change = lob.take_accelerations(m, n)
         work[at.EVALUATIONS] += STAGES
         if before > 0.0:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from ..jit import lane_function
 from . import layout as at
+from .bits import beyond
+from .rhs import accelerations
 
 Array = NDArray[np.float64]
 
@@ -143,6 +145,12 @@ def set_stages(m, work, n, h):
         stages_of(m, 3, work[at.Q + 3], work[at.V + 3], h)
     if n > 4:
         stages_of(m, 4, work[at.Q + 4], work[at.V + 4], h)
+
+
+@lane_function
+def accelerations_of_stages(effects, m, torque_table, load_table):
+    """Accelerations and rates at all stages."""
+    accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
 
 
 @lane_function
