@@ -46,8 +46,8 @@ def _solver(tableau: str | None) -> Callable[[Setup, int], float]:
     def solve(setup: Setup, sample: int = 0) -> float:
         problem = setup.problem
         if tableau is not None:
-            problem = replace(problem, tableau=TABLEAUS[tableau])
-        key = (problem.effects, problem.tableau.name, problem.rtol, problem.atol)
+            problem = replace(problem, tableau=TABLEAUS[tableau], collocation=False)
+        key = (problem.effects, problem.tableau.name, problem.collocation, problem.rtol, problem.atol)
         _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
             par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
