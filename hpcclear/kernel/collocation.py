@@ -14,7 +14,7 @@ from numba import njit
 from ..jit import FASTMATH, lane_function, scalar_function
 from . import layout as at
 from . import lobatto as lob
-from .bits import rough_log2
+from .bits import rough_exp2, rough_log2
 from .control import choose_step, commit
 from .events import impact_fraction, root
 from .lifecycle import (
@@ -39,8 +39,8 @@ from .record import record_nodes, record_step
 from .stepper import free_crank_turn, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
-DECAY = 1.0  # how far the fall of the last coefficients is trusted to go on
-SAFETY = 0.8
+EXPONENT = -0.5 / 11.0  # h by the square of the error: the last coefficients over the step go with h^9, their fall with h^2
+LOG_SAFETY = -0.32  # log2(0.8)
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
 UNTESTED = 0.5  # a contraction that one sweep left unmeasured is taken to have fallen to this part: or steps might stay small for ever
@@ -146,10 +146,10 @@ def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
 
 @lane_function
 def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
-    """Scaled error of a converged step.
+    """Square of the scaled error of a converged step.
 
-    The last coefficients bound the error of the polynomial; at the nodes where it ends the method is far better, by as
-    much again as the coefficients have fallen.
+    The last two coefficients bound the error of the polynomial. At the end of the step the method is far better, and
+    the faster they fall the more: the bound is taken to fall once more by as much as from the two before to the last.
     """
     high = 0.0
     low = 0.0
@@ -159,8 +159,7 @@ def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
         low += m[lob.WEIGHT * STAGES + k] * before
     high, low = gap_tail(crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low)
     high, low = gap_tail(rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low)
-    fall = min(high / (low + 1e-300), 1.0)
-    return math.sqrt(high) * fall ** (0.5 * DECAY)
+    return high * min(high / (low + 1e-300), 1.0)
 
 
 @scalar_function
@@ -291,7 +290,7 @@ def peaks_inside(flag, work, m, gap, peak, deepest):
 def propose(work, m, error):
     """The step to try next after one that was tried to its end, and whether it is accepted."""
     h = work[at.STEP]
-    factor = SAFETY * (error + 1e-30) ** (-1.0 / (9.0 + 2.0 * DECAY))
+    factor = rough_exp2(LOG_SAFETY + EXPONENT * rough_log2(error + 1e-60))
     factor = min(factor, math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION]))
     if error <= 1.0:
         work[at.ACCEPT] = 1.0
@@ -347,7 +346,7 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
                 error = error_of(
                     effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
                 )
-                work[at.ERROR] = error * error
+                work[at.ERROR] = error
                 propose(work, m, error)
             else:
                 work[at.ACCEPT] = 0.0
