@@ -110,8 +110,12 @@ def flag_gaps(crank_rod, rod_slider, torque, latched, work, last, tolerance, W):
 
 @lane_function
 def keep(work, row, new, yes, i, W):
-    """Store a new value where the step was accepted."""
-    work[row * W + i] = new if yes else work[row * W + i]
+    """Store a new value where the step was accepted.
+
+    Both are read before one is chosen: else the compiler chooses between two addresses, and vectorises no loop with that.
+    """
+    old = work[row * W + i]
+    work[row * W + i] = new if yes else old
 
 
 @lane_function
@@ -207,7 +211,8 @@ def commit(crank_rod, rod_slider, latched, ledger, responses, work, stages, n, W
             keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
             keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
             new = work[(at.ACC + k) * W + i]
-            stages[k * W + i] = new if yes else stages[k * W + i]
+            old = stages[k * W + i]
+            stages[k * W + i] = new if yes else old
         work[at.TIME * W + i] += accept * work[at.STEP * W + i]
         keep(work, at.LOG_ERROR, 0.5 * rough_log2(max(work[at.ERROR * W + i], 1e-8)), yes, i, W)
         rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0

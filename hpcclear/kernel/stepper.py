@@ -72,54 +72,62 @@ def adopt_fresh(work, stages, n, W):
 
 
 @lane_function
-def weigh_gap(work, b, e, row, gap, first, W):
+def weigh_gap(flag, work, gap, first, b0, e0, b, e, i, W):
     """Add a stage's gap to the sums that become its integral over the step and the error of that."""
-    for i in range(W):
-        old = 0.0 if first else work[(at.RATE_SUM + gap) * W + i]
-        work[(at.RATE_SUM + gap) * W + i] = old + b * work[(row + gap) * W + i]
-        old = 0.0 if first else work[(at.RATE_ERROR + gap) * W + i]
-        work[(at.RATE_ERROR + gap) * W + i] = old + e * work[(row + gap) * W + i]
+    if flag is not None:
+        weigh_rate(flag, work, gap, first, b0, b, i, W)
+        now = work[(at.RATE_NOW + gap) * W + i]
+        old = work[(at.RATE_OLD + gap) * W + i]
+        before = work[(at.RATE_ERROR + gap) * W + i]
+        work[(at.RATE_ERROR + gap) * W + i] = (e0 * old if first else before) + e * now
 
 
 @lane_function
-def weigh_rate(work, b, row, rate, first, W):
+def weigh_rate(flag, work, rate, first, b0, b, i, W):
     """Add a stage's rate to the sum that becomes its integral over the step."""
-    for i in range(W):
-        old = 0.0 if first else work[(at.RATE_SUM + rate) * W + i]
-        work[(at.RATE_SUM + rate) * W + i] = old + b * work[(row + rate) * W + i]
+    if flag is not None:
+        now = work[(at.RATE_NOW + rate) * W + i]
+        old = work[(at.RATE_OLD + rate) * W + i]
+        before = work[(at.RATE_SUM + rate) * W + i]
+        work[(at.RATE_SUM + rate) * W + i] = (b0 * old if first else before) + b * now
 
 
 @lane_function
-def weigh_rates(crank_rod, rod_slider, ledger, responses, work, b, e, row, first, W):
-    """Add a stage's rates, times the weights b and e of its method, to the sums over the step."""
-    if crank_rod is not None:
-        weigh_gap(work, b, e, row, at.GAP_12, first, W)
-    if rod_slider is not None:
-        weigh_gap(work, b, e, row, at.GAP_23, first, W)
-    if ledger is not None:
-        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            weigh_rate(work, b, row, r, first, W)
-    if responses is not None:
-        weigh_rate(work, b, row, at.FORCE_12, first, W)
-        weigh_rate(work, b, row, at.FORCE_23, first, W)
-        weigh_rate(work, b, row, at.SLIDER_ACCELERATION, first, W)
-        weigh_rate(work, b, row, at.SLIDER_SQUARE, first, W)
+def weigh_rates(crank_rod, rod_slider, ledger, responses, work, first, b0, e0, b, e, W):
+    """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
+
+    `first`: the sums begin with those of the first stage, known from the step before, times b0 and e0. One loop for all:
+    shorter ones the compiler unrolls instead of vectorising.
+    """
+    for i in range(W):
+        weigh_gap(crank_rod, work, at.GAP_12, first, b0, e0, b, e, i, W)
+        weigh_gap(rod_slider, work, at.GAP_23, first, b0, e0, b, e, i, W)
+        weigh_rate(ledger, work, at.DRIVE_POWER, first, b0, b, i, W)
+        weigh_rate(ledger, work, at.ABS_DRIVE_POWER, first, b0, b, i, W)
+        weigh_rate(ledger, work, at.DISSIPATION, first, b0, b, i, W)
+        weigh_rate(ledger, work, at.LOAD_POWER, first, b0, b, i, W)
+        weigh_rate(responses, work, at.FORCE_12, first, b0, b, i, W)
+        weigh_rate(responses, work, at.FORCE_23, first, b0, b, i, W)
+        weigh_rate(responses, work, at.SLIDER_ACCELERATION, first, b0, b, i, W)
+        weigh_rate(responses, work, at.SLIDER_SQUARE, first, b0, b, i, W)
 
 
 @lane_function
 def weigh_stage(effects, work, weights, s, count, W):
-    """Weigh the rates of stage s; those of the first stage are known from the step before."""
+    """Weigh the rates of stage s, and with the second stage those of the first."""
     B = count + 2 * count * count
     E = B + count
+    b0, e0, b, e = weights[B], weights[E], weights[B + s], weights[E + s]
     if s == 1:
         weigh_rates(
             effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-            weights[B], weights[E], at.RATE_OLD, True, W,
+            True, b0, e0, b, e, W,
         )  # fmt: skip
-    weigh_rates(
-        effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-        weights[B + s], weights[E + s], at.RATE_NOW, False, W,
-    )  # fmt: skip
+    else:
+        weigh_rates(
+            effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
+            False, b0, e0, b, e, W,
+        )  # fmt: skip
 
 
 @lane_function
