@@ -217,10 +217,14 @@ class Ranks:
             report, _ = message.body
             raise report if isinstance(report, InputError) else RankFailed(report)
 
+    def make(self, kind: str, payload: object) -> Worker:
+        """A worker of one of the kinds, for a maker that builds on another."""
+        return self._makers[kind](payload, self)
+
     def _make_desk(self, kind: str, payload: object) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
-        self._desk = Desk(self._makers[kind](payload, self))
+        self._desk = Desk(self.make(kind, payload))
         return self._desk, time.perf_counter() - started
 
     def serve(self) -> NoReturn:

@@ -195,7 +195,9 @@ class Desk:
     @property
     def suspects(self) -> list[int]:
         """Samples in hand, ascending, if the worker raised an exception; else none."""
-        return sorted(self._in_hand) if self._inside else []
+        if not self._inside:
+            return []
+        return getattr(self._worker, "samples_in_hand", None) or sorted(self._in_hand)
 
     def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
         """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""

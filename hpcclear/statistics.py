@@ -1,13 +1,14 @@
 """Statistics of direct Monte Carlo as the samples finish, without keeping them.
 
-Samples are gathered by fixed blocks of indices. A block that is complete becomes one partial result, worked
-out in the order of its indices, and partial results are merged in the order of the blocks: so the numbers
-are the same bit for bit whichever rank made which sample, and whenever. Only blocks that are still incomplete
+Samples are gathered by fixed blocks of indices. A block is summed up as a binary tree over its samples in the order of
+their indices, and blocks are merged in their own order: so the numbers are the same bit for bit whichever rank made
+which sample, and whenever, and whether root got samples or sums of some. Only blocks that are still incomplete
 are held in memory.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,10 @@ Array = NDArray[np.float64]
 
 BLOCK = 4096
 """Samples in a block. Part of what makes results reproducible: another length merges in another order."""
+
+LEAF = 32
+"""Samples whose sums are taken at once. A block's summary is a binary tree over its leaves, so that any node of it can be
+worked out anywhere: another length would give other last bits."""
 
 BINS = 200
 """Bins of a histogram, besides one below and one above."""
@@ -76,6 +81,14 @@ class Summary:
         return found
 
 
+class Moments(NamedTuple):
+    """Count, mean and sum of squared deviations, arrays of one shape."""
+
+    count: NDArray[np.int64]
+    mean: Array
+    squares: Array
+
+
 def empty(bins: int = BINS) -> Summary:
     """The summary of no samples."""
     rows = len(ROWS)
@@ -110,19 +123,70 @@ def histogram_edges(records: np.ndarray, bins: int = BINS) -> Array:
     return edges
 
 
-def summarise(records: np.ndarray, edges: Array) -> Summary:
-    """Summary of records of `OUTCOME`, shape (m,), in their order; `edges` as `histogram_edges`."""
+def tree_length(samples: int) -> int:
+    """Samples under the root of a tree for so many: a leaf times a power of two."""
+    length = LEAF
+    while length < samples:
+        length *= 2
+    return length
+
+
+def _halved(values: Array) -> Array:
+    """Sums over the last axis, whose length is a power of two, in an order that no shape and no processor changes."""
+    while values.shape[-1] > 1:
+        middle = values.shape[-1] // 2
+        values = values[..., :middle] + values[..., middle:]
+    return values[..., 0]
+
+
+def _merged(first: Moments, second: Moments) -> Moments:
+    """Count, mean and sum of squares of both; element by element."""
+    count = first.count + second.count
+    share = second.count / np.maximum(count, 1)
+    apart = second.mean - first.mean
+    squares = first.squares + second.squares + np.square(apart) * first.count * share
+    return Moments(count, first.mean + apart * share, squares)
+
+
+def _moments(values: Array, length: int) -> Moments:
+    """Count, mean and squares of each row of (rows, m) numbers, NaN left out, as the tree of `length` gives them."""
+    padded = np.full((len(values), length), np.nan)
+    padded[:, : values.shape[1]] = values
+    leaves = padded.reshape(len(values), -1, LEAF)
+    known = np.isfinite(leaves)
+    count = known.sum(axis=-1)
+    mean = _halved(np.where(known, leaves, 0.0)) / np.maximum(count, 1)
+    squares = _halved(np.square(np.where(known, leaves - mean[..., None], 0.0)))
+    found = Moments(count, mean, squares)
+    while found.count.shape[1] > 1:
+        even = Moments(*(x[:, 0::2] for x in found))
+        odd = Moments(*(x[:, 1::2] for x in found))
+        found = _merged(even, odd)
+    return Moments(*(x[:, 0] for x in found))
+
+
+def summarise(records: np.ndarray, edges: Array, length: int | None = None) -> Summary:
+    """Summary of records of `OUTCOME`, shape (m,), in their order.
+
+    Parameters
+    ----------
+    records : ndarray
+        Neighbouring samples; where there are fewer than `length`, the design's last ones.
+    edges : ndarray
+        As `histogram_edges`.
+    length : int, optional
+        Samples under this node of the tree, `tree_length` of what there is by default.
+    """
     result = empty(edges.shape[1] - 1)
-    for row, values in enumerate(columns(records)):
-        known = values[np.isfinite(values)]
-        result.count[row] = known.size
-        if known.size == 0:
-            continue
-        result.mean[row] = known.mean()
-        result.squares[row] = np.square(known - known.mean()).sum()
-        result.minimum[row], result.maximum[row] = known.min(), known.max()
-        cells = np.searchsorted(edges[row], known, side="right")
-        result.histogram[row] = np.bincount(cells, minlength=edges.shape[1] + 1)
+    values = columns(records)
+    moments = _moments(values, tree_length(records.size) if length is None else length)
+    result.count[:], result.mean[:], result.squares[:] = moments
+    for row, numbers in enumerate(values):
+        known = numbers[np.isfinite(numbers)]
+        if known.size:
+            result.minimum[row], result.maximum[row] = known.min(), known.max()
+            cells = np.searchsorted(edges[row], known, side="right")
+            result.histogram[row] = np.bincount(cells, minlength=edges.shape[1] + 1)
     result.status[:] = np.bincount(records["status"], minlength=len(Status))
     for k, flag in enumerate(Flag):
         result.flags[k] = np.count_nonzero(records["flags"] & int(flag))
@@ -131,13 +195,12 @@ def summarise(records: np.ndarray, edges: Array) -> Summary:
 
 def merge(first: Summary, second: Summary) -> Summary:
     """Summary of both (Chan, Golub and LeVeque 1983, doi:10.1080/00031305.1983.10483115)."""
-    count = first.count + second.count
-    share = second.count / np.maximum(count, 1)
-    apart = second.mean - first.mean
+    moments = _merged(
+        Moments(first.count, first.mean, first.squares),
+        Moments(second.count, second.mean, second.squares),
+    )
     return Summary(
-        count,
-        first.mean + apart * share,
-        first.squares + second.squares + np.square(apart) * first.count * share,
+        *moments,
         np.minimum(first.minimum, second.minimum),
         np.maximum(first.maximum, second.maximum),
         first.histogram + second.histogram,
@@ -171,12 +234,14 @@ class Accumulator:
             raise ValueError("samples, length of a block and bins must be positive")
         self.total, self.block, self.bins = total, block, bins
         self.blocks = -(-total // block)
+        self._tree = tree_length(block)
         self.edges: Array | None = (
             None  # chosen from block 0, so that they are the same in every run
         )
         self._on_block = on_block
         self._open: dict[int, np.ndarray] = {}  # records by block; sample -1: not here yet
         self._missing: dict[int, int] = {}
+        self._parts: dict[int, dict[tuple[int, int], Summary]] = {}  # by block, then place and length
         self._ready: dict[int, Summary] = {}  # complete, waiting for an earlier block
         self._merged = empty(bins)
         self._next = 0  # first block that is not merged
@@ -187,9 +252,17 @@ class Accumulator:
         return self._next == self.blocks
 
     @property
+    def taken(self) -> int:
+        """Samples taken so far."""
+        parts = sum(length for nodes in self._parts.values() for _, length in nodes)
+        held = sum(self._length(n) - self._missing[n] for n in self._open)
+        ready = sum(map(self._length, self._ready))
+        return min(self._next * self.block, self.total) + ready + held + parts
+
+    @property
     def held(self) -> int:
         """Blocks held in memory because they, or block 0, are incomplete."""
-        return len(self._open)
+        return len(self._open) + len(self._parts)
 
     def _length(self, number: int) -> int:
         return min(self.block, self.total - number * self.block)
@@ -210,8 +283,67 @@ class Accumulator:
             self._put(number, records[numbers == number])
         self._reduce()
 
+    def add_part(self, first: int, length: int, summary: Summary) -> None:
+        """Take the summary of the samples from `first` on, a node of `length` samples of their block's tree.
+
+        Raises
+        ------
+        ValueError
+            If it is no such node, or some of its samples were taken before.
+        """
+        number, place = divmod(first, self.block)
+        if self.edges is None or place % length or tree_length(length) != length:
+            raise ValueError(f"{length} samples from {first} on are no part of a block")
+        if number < self._next or number in self._ready or number in self._open:
+            raise ValueError(f"samples of block {number} were taken before")
+        nodes = self._parts.setdefault(number, {})
+        if any(at < place + length and place < at + size for at, size in nodes):
+            raise ValueError(f"a sample of block {number} was taken before")
+        while length < self._tree:
+            sibling = place ^ length
+            if sibling >= self._length(number):
+                other: Summary | None = empty(self.bins)  # beyond the end of the design or the block
+            else:
+                other = nodes.pop((sibling, length), None)
+            if other is None:
+                nodes[(place, length)] = summary
+                return
+            summary = merge(summary, other) if place < sibling else merge(other, summary)
+            place, length = min(place, sibling), 2 * length
+        del self._parts[number]
+        self._ready[number] = summary
+        self._reduce()
+
+    def parts_left(self, length: int) -> NDArray[np.int64]:
+        """First sample and length (n, 2) of parts of at most `length` samples that make up all that was not taken.
+
+        Blocks of which single samples were taken are left out: they are `remaining`.
+        """
+        untouched = self._untouched()
+        starts = np.arange(0, self.block, length)
+        whole = (untouched[:, None] * self.block + starts).ravel()
+        rows = [np.column_stack([whole, np.full(whole.size, length)])]
+        rows += [np.array(self._gaps(number, 0, self._tree, length)) for number in sorted(self._parts)]
+        found = np.concatenate([row for row in rows if row.size] or rows[:1])
+        found = found[found[:, 0] < self.total]
+        return found[np.argsort(found[:, 0], kind="stable")]
+
+    def _gaps(self, number: int, place: int, size: int, length: int) -> list[tuple[int, int]]:
+        """What is missing of a block under one node of its tree."""
+        nodes = self._parts[number]
+        if (place, size) in nodes or place >= self._length(number):
+            return []
+        if size <= length and not any(place <= at < place + size for at, _ in nodes):
+            return [(number * self.block + place, size)]
+        half = size // 2
+        return self._gaps(number, place, half, length) + self._gaps(number, place + half, half, length)
+
+    def forget_parts(self) -> None:
+        """Drop the sums of blocks that are incomplete, for a run that wants their samples."""
+        self._parts.clear()
+
     def _put(self, number: int, records: np.ndarray) -> None:
-        if number < self._next or number in self._ready:
+        if number < self._next or number in self._ready or number in self._parts:
             raise ValueError(f"samples of block {number} were taken before")
         if number not in self._open:
             self._open[number] = np.zeros(self._length(number), OUTCOME)
@@ -232,7 +364,7 @@ class Accumulator:
         for number in sorted(n for n, missing in self._missing.items() if missing == 0):
             if self._on_block is not None:
                 self._on_block(number, self._open[number])
-            self._ready[number] = summarise(self._open.pop(number), self.edges)
+            self._ready[number] = summarise(self._open.pop(number), self.edges, self._tree)
             del self._missing[number]
         while self._next in self._ready:
             self._merged = merge(self._merged, self._ready.pop(self._next))
@@ -252,16 +384,20 @@ class Accumulator:
 
     def remaining(self) -> "Remaining":
         """The samples that were not taken yet."""
-        done = np.zeros(self.blocks, bool)
-        done[: self._next] = True
-        done[list(self._ready)] = True
-        done[list(self._open)] = True
         loose = [
             np.flatnonzero(held["sample"] < 0) + number * self.block
             for number, held in sorted(self._open.items())
         ]
         scattered = np.concatenate(loose) if loose else np.empty(0, np.int64)
-        return Remaining(scattered, np.flatnonzero(~done), self.block, self.total)
+        return Remaining(scattered, self._untouched(), self.block, self.total)
+
+    def _untouched(self) -> NDArray[np.int64]:
+        """Blocks of which nothing was taken."""
+        done = np.zeros(self.blocks, bool)
+        done[: self._next] = True
+        for begun in (self._ready, self._open, self._parts):
+            done[list(begun)] = True
+        return np.flatnonzero(~done)
 
     def state(self) -> dict[str, np.ndarray]:
         """All of it as plain arrays, for a checkpoint; see `restore`."""
@@ -270,10 +406,16 @@ class Accumulator:
         records = np.concatenate(held) if held else np.empty(0, OUTCOME)
         data = {"layout": np.array([self.total, self.block, self.bins, self._next])}
         data["ready"] = np.array(ready, np.int64)
+        nodes = {
+            (number * self.block + place, length): summary
+            for number, held_nodes in sorted(self._parts.items())
+            for (place, length), summary in sorted(held_nodes.items(), key=lambda item: item[0])
+        }
+        data["parts"] = np.array(list(nodes), np.int64).reshape(-1, 2)
         if self.edges is not None:
             data["edges"] = self.edges
         for field in fields(Summary):
-            rows = [self._merged, *(self._ready[number] for number in ready)]
+            rows = [self._merged, *(self._ready[number] for number in ready), *nodes.values()]
             data[f"summary_{field.name}"] = np.stack([getattr(row, field.name) for row in rows])
         return {**data, **{f"record_{name}": records[name] for name in OUTCOME.names or ()}}
 
@@ -291,10 +433,13 @@ class Accumulator:
         self.edges = arrays.get("edges")
         rows = [
             Summary(*(arrays[f"summary_{field.name}"][k] for field in fields(Summary)))
-            for k in range(len(arrays["ready"]) + 1)
+            for k in range(1 + len(arrays["ready"]) + len(arrays["parts"]))
         ]
         self._merged, self._next = rows[0], int(arrays["layout"][3])
-        self._ready = dict(zip(arrays["ready"].tolist(), rows[1:], strict=True))
+        waiting = 1 + len(arrays["ready"])
+        self._ready = dict(zip(arrays["ready"].tolist(), rows[1:waiting], strict=True))
+        for (first, length), summary in zip(arrays["parts"].tolist(), rows[waiting:], strict=True):
+            self.add_part(first, length, summary)
         records = np.empty(len(arrays["record_sample"]), OUTCOME)
         for name in OUTCOME.names or ():
             records[name] = arrays[f"record_{name}"]
@@ -312,7 +457,7 @@ class Remaining:
         self, scattered: NDArray[np.int64], whole: NDArray[np.int64], block: int, total: int
     ) -> None:
         self._scattered, self._whole = scattered.astype(np.int64), whole.astype(np.int64)
-        self._block = block
+        self._block, self._total = block, total
         size = self._whole.size * block
         if self._whole.size and self._whole[-1] == (total - 1) // block:
             size -= (self._whole[-1] + 1) * block - total  # the last block may be short
@@ -320,6 +465,11 @@ class Remaining:
 
     def __len__(self) -> int:
         return self._size
+
+    def begun(self, first_block: bool) -> "Remaining":
+        """The same without whole blocks, but for the first one if `first_block` and if it is among them."""
+        kept = self._whole[self._whole == 0] if first_block else self._whole[:0]
+        return Remaining(self._scattered, kept, self._block, self._total)
 
     def samples(self, position: NDArray[np.int64]) -> NDArray[np.int64]:
         """Sample numbers at some positions, shape (m,)."""

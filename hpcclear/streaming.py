@@ -4,6 +4,7 @@ import sys
 import time
 from collections import OrderedDict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,6 +14,7 @@ from . import __version__, dataset, storage
 from .checkpoint import INTERVAL, Checkpoint, check_key, key_attribute
 from .errors import InputError
 from .lock import Lock
+from .partials import PARTIAL, Parts, PartsProgress, part_length, unpacked
 from .places import fresh_sibling, parts_of
 from .progress import Progress, Style
 from .ranks import Ranks
@@ -20,10 +22,10 @@ from .sampling import monte_carlo
 from .scene import Scene
 from .scene.paths import flatten
 from .scene.points import Points
-from .statistics import BINS, BLOCK, ROWS, Accumulator, Remaining, Summary
+from .statistics import BINS, BLOCK, LEAF, ROWS, Accumulator, Remaining, Summary
 from .status import JOINTS, OUTCOME, Flag, Status
 from .target import recorded, resolve
-from .work import KIND, payload_of, saving
+from .work import KIND, PARTS, payload_of, saving
 
 STAGE = "statistics"
 
@@ -131,7 +133,7 @@ def run_statistics(
     output = fresh_sibling(output) if fresh else output
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     entries = {name: repr(value) for name, value in flatten(scene.resolved())}
-    layout = f"{len(points)} in blocks of {BLOCK}, {BINS} bins"
+    layout = f"{len(points)} in blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
     key = {**entries, "hpcclear version": __version__, "statistics": layout}
     with Lock(output.parent, f".{output.name}.lock"):
         storage.remove_leftovers(output.parent)
@@ -179,13 +181,7 @@ def _accumulate(
         sys.stderr.write(f"{problem}\n")
     if earlier is not None:
         sums.restore(earlier)
-    left = sums.remaining()
     saved = time.monotonic()
-
-    def take(records: np.ndarray) -> None:
-        numbered = records.astype(OUTCOME)
-        numbered["sample"] = left.samples(records["sample"])
-        sums.add(numbered)
 
     def save() -> None:
         nonlocal saved
@@ -197,17 +193,76 @@ def _accumulate(
         if time.monotonic() - saved > checkpoint.interval:
             save()
 
-    progress = Progress("samples", style)
+    how: dict[str, Any] = {"stage": STAGE, "save": save_when_due, "keep": False}
     with saving(save):
-        ranks.run_points(
-            KIND, payload_of(chosen, points.page(0)), _Left(points, left),
-            stage=STAGE, on_records=take, save=save_when_due, progress=progress, keep=False,
-        )  # fmt: skip
+        _run_samples(chosen, points, sums, ranks, whole=raw is not None, style=style, **how)
+        if not sums.complete:
+            _run_parts(chosen, points, sums, ranks, style=style, **how)
     content = statistics_dataset(sums, attributes)
     with ranks.writing():
         dataset.write(content, output)
         checkpoint.finish()
     return content
+
+
+def _run_samples(
+    scene: Scene,
+    points: MonteCarloPoints,
+    sums: Accumulator,
+    ranks: Ranks,
+    *,
+    whole: bool,
+    style: Style,
+    **how: Any,
+) -> None:
+    """Let ranks send samples: all of them if they are kept, else those of the first block, which decides the
+    histograms, and of blocks that an earlier run left with samples."""
+    if whole:
+        sums.forget_parts()
+    left = sums.remaining()
+    if not whole:
+        left = left.begun(sums.edges is None)
+    if len(left) == 0:
+        return
+
+    def take(records: np.ndarray) -> None:
+        numbered = records.astype(OUTCOME)
+        numbered["sample"] = left.samples(records["sample"])
+        sums.add(numbered)
+
+    ranks.run_points(
+        KIND, payload_of(scene, points.page(0)), _Left(points, left),
+        on_records=take, progress=Progress("samples", style), **how,
+    )  # fmt: skip
+
+
+def _run_parts(
+    scene: Scene,
+    points: MonteCarloPoints,
+    sums: Accumulator,
+    ranks: Ranks,
+    *,
+    style: Style,
+    **how: Any,
+) -> None:
+    """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
+    left = int(sums.total - sums.taken)
+    parts = Parts(sums, part_length(left, ranks.size, sums.block))
+
+    def take(records: np.ndarray) -> None:
+        for record in records:
+            sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+
+    payload = {
+        "samples": payload_of(scene, points.page(0)),
+        "design": scene.resolved(),
+        "total": len(points),
+        "edges": sums.edges,
+    }
+    ranks.run_points(
+        PARTS, payload, parts, dtype=PARTIAL, on_records=take,
+        progress=PartsProgress("samples", style, sums.total, sums.taken), **how,
+    )  # fmt: skip
 
 
 def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = None) -> xr.Dataset:

@@ -18,12 +18,16 @@ from .stopping import Stopped
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
     from .evaluator import Evaluator
+    from .partials import Summariser
     from .scene import Scene
     from .scene.points import Points
     from .study.compiling import Compiled
 
 KIND = "points"
 """The kind of stage that simulates designs; see `MAKERS`."""
+
+PARTS = "parts"
+"""The kind of stage whose ranks send sums of what they simulate."""
 
 COMPILE = "compile"
 """The kind of stage that compiles ahead what a study needs."""
@@ -62,7 +66,17 @@ def _make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
     return make_compiler(payload, ranks)
 
 
-MAKERS: Mapping[str, Maker] = {KIND: make_evaluator, COMPILE: _make_compiler}
+def _make_summariser(payload: Mapping[str, Any], ranks: Ranks) -> "Summariser":
+    from .partials import make_summariser
+
+    return make_summariser(payload, ranks)
+
+
+MAKERS: Mapping[str, Maker] = {
+    KIND: make_evaluator,
+    COMPILE: _make_compiler,
+    PARTS: _make_summariser,
+}
 """For `hpcclear.comm.run_on_ranks` and `hpcclear.comm.alone`."""
 
 

@@ -10,16 +10,16 @@ import pytest
 
 from hpcclear import comm, dataset
 from hpcclear.errors import InputError
+from hpcclear.partials import Parts, Summariser, packed, part_length, unpacked
 from hpcclear.sampling import monte_carlo
-from hpcclear.statistics import ROWS, Accumulator, Summary, columns, merge, summarise
+from hpcclear.statistics import ROWS, Accumulator, Summary, columns, empty, merge, summarise
 from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.streaming import MonteCarloPoints, run_statistics, statistics_dataset
-from hpcclear.work import KIND
 
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
 sys.path.insert(0, str(PROGRAM.parent))
 
-from streaming_run import MadeUp, scene_of  # noqa: E402
+from streaming_run import MADE_UP, MadeUp, scene_of  # noqa: E402
 
 
 def outcomes(samples: int, seed: int = 3) -> np.ndarray:
@@ -91,7 +91,7 @@ def test_order_of_arrival_changes_no_bit():
     one, other = (fill(Accumulator(3000, block=128), records, seed).result() for seed in (1, 2))
     assert same(one, other)
     changed = records.copy()
-    changed["objective"][np.flatnonzero(records["status"] == 0)[0]] *= 1.0 + 1e-12
+    changed["objective"][np.flatnonzero(records["status"] == 0)[0]] *= 1.0 + 1e-10
     assert not same(one, fill(Accumulator(3000, block=128), changed, 1).result())
 
 
@@ -191,7 +191,7 @@ def test_points_on_demand_are_the_points():
 
 
 def test_dataset_round_trip_and_raw_samples(tmp_path):
-    ranks = comm.alone({KIND: lambda payload, ranks: MadeUp()})
+    ranks = comm.alone(MADE_UP)
     scene = scene_of(9000)
     output, raw = tmp_path / "statistics.nc", tmp_path / "raw"
     content = run_statistics(scene, output, ranks, raw=raw, style="quiet")
@@ -262,3 +262,98 @@ def test_memory_does_not_grow_with_the_samples(tmp_path):
 def test_memory_is_flat_up_to_a_million_samples(tmp_path):
     growth = peak(tmp_path / "many.nc", 1_000_000) - peak(tmp_path / "few.nc", 10_000)
     assert growth < 50.0
+
+
+# ---- sums made on the ranks ----------------------------------------------------------------------
+
+
+def summed(records: np.ndarray, sums: Accumulator, first: int, length: int) -> None:
+    """What a rank and root do with one part."""
+    mine = records[first : first + length]
+    record = packed(0, first, length, mine.size, summarise(mine, sums.edges, length))
+    sums.add_part(first, length, unpacked(record[0]))
+
+
+@pytest.mark.parametrize("length", [32, 256, 4096])
+def test_parts_and_samples_give_the_same_bits(length: int):
+    records = outcomes(3 * 4096 + 1234)
+    whole = fill(Accumulator(records.size), records, 1)
+    sums = Accumulator(records.size)
+    sums.add(records[:4096])
+    parts = Parts(sums, length)
+    rows = parts[np.arange(len(parts))].astype(int)
+    for first, size in np.random.default_rng(0).permutation(rows):
+        summed(records, sums, first, size)
+    assert sums.complete
+    assert sums.taken == records.size
+    assert same(sums.result(), whole.result())
+
+
+def test_parts_of_all_lengths_over_stops_give_the_same_bits():
+    records = outcomes(6 * 4096)
+    whole = fill(Accumulator(records.size), records, 1).result()
+    rng = np.random.default_rng(5)
+    sums = Accumulator(records.size)
+    sums.add(records[:4096])
+    while not sums.complete:
+        parts = sums.parts_left(32 * 2 ** int(rng.integers(0, 8)))
+        for first, length in rng.permutation(parts)[: rng.integers(1, 40)]:
+            summed(records, sums, first, length)
+        after = Accumulator(records.size)
+        after.restore(sums.state())
+        assert after.taken == sums.taken
+        left = after.parts_left(32)
+        covered = np.concatenate([np.arange(a, a + n) for a, n in left] or [np.empty(0, int)])
+        assert covered.size == np.unique(covered).size == records.size - sums.taken
+        sums = after
+    assert same(sums.result(), whole)
+
+
+def test_a_part_counts_once_and_only_as_one():
+    records = outcomes(3 * 4096)
+    sums = Accumulator(records.size)
+    with pytest.raises(ValueError, match="no part"):
+        sums.add_part(0, 32, empty())  # the edges are not known
+    sums.add(records[:4096])
+    with pytest.raises(ValueError, match="no part"):
+        sums.add_part(4096 + 32, 64, empty())
+    summed(records, sums, 4096, 64)
+    for first, length in ((4096, 64), (4096 + 32, 32), (4096, 128)):
+        with pytest.raises(ValueError, match="before"):
+            summed(records, sums, first, length)
+    with pytest.raises(ValueError, match="before"):
+        sums.add(records[5000:5001])
+    sums.forget_parts()
+    sums.add(records[4096:])
+    assert sums.complete
+
+
+def test_a_rank_sums_up_what_it_simulates():
+    scene = scene_of(9000)
+    points = MonteCarloPoints(scene, 9000)
+    worker, plain = MadeUp(), MadeUp()
+    plain.submit(np.arange(9000), points[np.arange(9000)])
+    records = np.concatenate([plain.advance(1.0) for _ in range(9)])
+    sums = Accumulator(9000)
+    sums.add(records[:4096])
+    parts = Parts(sums, 1024)
+    rank = Summariser(worker, points, sums.edges)
+    rank.submit(np.arange(len(parts)), parts[np.arange(len(parts))])
+    assert rank.pending == len(parts) == 5
+    assert rank.samples_in_hand == list(range(4096, 9000))
+    while rank.pending:
+        for record in rank.advance(1.0):
+            sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+    assert rank.samples_in_hand == []
+    whole = Accumulator(9000)
+    whole.add(records)
+    assert same(sums.result(), whole.result())
+
+
+def test_parts_are_short_where_ranks_are_many():
+    assert part_length(10**9, 100, 4096) == 4096
+    assert part_length(10**6, 10000, 4096) == 32
+    assert part_length(10**6, 100, 4096) == 256
+    for samples, ranks in ((10**7, 64), (12345, 3)):
+        length = part_length(samples, ranks, 4096)
+        assert samples / length >= 32 * ranks or length == 32

@@ -12,7 +12,7 @@ from hpcclear.scene import load_scene
 from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.stopping import StopSwitch
 from hpcclear.streaming import run_statistics
-from hpcclear.work import KIND
+from hpcclear.work import KIND, MAKERS
 
 SCENE = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 
@@ -56,6 +56,9 @@ class MadeUp:
         return records.copy()
 
 
+MADE_UP = {**MAKERS, KIND: lambda payload, ranks: MadeUp()}
+
+
 def scene_of(samples: int):
     """The first job, sampled at random."""
     return load_scene(SCENE, ['study.method="monte-carlo"', f"study.samples={samples}"])
@@ -69,7 +72,7 @@ def main(output: str, samples: str, limit: str = "") -> int:
     with StopSwitch(ends_process=True) as stop:
         if limit:
             stop.limit_time(float(limit))
-        return comm.run_on_ranks(program, {KIND: lambda payload, ranks: MadeUp()}, stop)
+        return comm.run_on_ranks(program, MADE_UP, stop)
 
 
 if __name__ == "__main__":
