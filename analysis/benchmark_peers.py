@@ -32,7 +32,9 @@ MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"
 DECADES = 10.0 ** -np.arange(5.0, 13.0)
 ENSEMBLES = {"lankarani-nikravesh": 1e-5, "frictionless": 1e-7}  # m, median error asked for
-TOLERANCES = 10.0 ** -np.arange(3.0, 11.5, 0.5)  # tried from the loosest on, until the error is small enough
+TOLERANCES = 10.0 ** -np.arange(
+    3.0, 11.5, 0.5
+)  # tried from the loosest on, until the error is small enough
 SHORTEST = 5e-3  # s, calls are repeated to last as long
 FEW = 16  # samples for codes that take them one by one
 SLOWEST = 0.3  # s, tighter tolerances are left out beyond

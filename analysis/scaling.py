@@ -22,16 +22,18 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import xarray as xr
-from scaling_model import POLICIES, WORK, Costs, Outcome, simulate, simulate_in_two_levels
+from scaling_model import POLICIES, WORK, Costs, Outcome, simulate, simulate_sums
 
 from hpcclear.dataset import provenance
+from hpcclear.partials import part_length
 from hpcclear.schedule import HandOut, Need
 from hpcclear.status import OUTCOME
 
 LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
-LONGER = {"measured samples": 1, "samples 100 times as long": 100}
+LONGER = {"measured samples": 1, "10 times as long": 10, "100 times as long": 100}
 LIMIT = 0.9
+SUMS = "package, sums"
 
 
 # ---- measurements ------------------------------------------------------------------------------------
@@ -95,8 +97,8 @@ def seconds_each(action, repeats: int, items: int) -> float:
 
 def record_cost() -> float:
     """Seconds of root for a record in statistics mode: unpickled, summed up, checkpointed every five seconds."""
+    from hpcclear.accumulator import Accumulator
     from hpcclear.checkpoint import Checkpoint
-    from hpcclear.statistics import Accumulator
 
     total, batch = 400_000, 500
     records = np.zeros(total, OUTCOME)
@@ -135,15 +137,29 @@ def handed_cost() -> float:
 
 
 def partial_cost() -> float:
-    """Seconds of root for a block that arrives summed up already."""
-    from hpcclear.statistics import Accumulator, merge
+    """Seconds of root for a part of a block that arrives summed up: unpickled and merged."""
+    from hpcclear.accumulator import Accumulator
+    from hpcclear.partials import packed, unpacked
+    from hpcclear.statistics import summarise
 
-    sums = Accumulator(4096)
+    blocks, length = 40, 512
+    sums = Accumulator((blocks + 1) * 4096)
     records = np.zeros(4096, OUTCOME)
     records["sample"] = np.arange(4096)
+    records["objective"] = np.random.default_rng(1).random(4096)
     sums.add(records)
-    message = pickle.dumps(sums.result())
-    return seconds_each(lambda: merge(sums.result(), pickle.loads(message)), 500, 1)
+    edges = sums.edges
+    assert edges is not None  # block 0 is in
+    one = summarise(records[:length], edges, length)
+    firsts = range(4096, (blocks + 1) * 4096, length)
+    messages = [
+        pickle.dumps(packed(k, first, length, length, one)) for k, first in enumerate(firsts)
+    ]
+    started = time.process_time()
+    for message in messages:
+        for record in pickle.loads(message):  # made a moment ago, in this process
+            sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+    return (time.process_time() - started) / len(messages)
 
 
 def start_up() -> float:
@@ -182,14 +198,14 @@ def measure(samples: int) -> Costs:
 
 def model(costs: Costs, ranks: tuple[int, ...], seed: int = 1) -> xr.Dataset:
     """Every policy on every number of ranks, for samples as measured and for longer ones."""
-    names = [*POLICIES, "two levels"]
+    names = [*POLICIES, SUMS]
     shape = (len(LONGER), len(names), len(ranks))
     table = {name: np.full(shape, np.nan) for name in Outcome._fields}
     for a, longer in enumerate(LONGER.values()):
         chosen = costs._replace(samples=costs.samples * longer)
         for b, name in enumerate(names):
             for c, count in enumerate(ranks):
-                run = simulate_in_two_levels if name == "two levels" else simulate
+                run = simulate_sums if name == SUMS else simulate
                 found = run(chosen, count, POLICIES.get(name, POLICIES["package"]), seed=seed)
                 for key, value in found._asdict().items():
                     table[key][a, b, c] = value
@@ -223,7 +239,7 @@ def draw(data: xr.Dataset, path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(7.0, 3.0), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.0), sharey=True, layout="constrained")
     for axis, length in zip(axes, data["samples"].values, strict=True):
         for style, policy in zip(
             ("-o", "-s", "-^", "-v", "-D"), data["policy"].values, strict=True
@@ -241,24 +257,33 @@ def draw(data: xr.Dataset, path: Path) -> None:
     figure.savefig(path, dpi=200)
 
 
-def bottleneck(data: xr.Dataset, length: str) -> str:
+def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
     """Where the package's policy falls below the limit, and what root does there."""
-    chosen = data.sel(samples=length, policy="package")
+    chosen = data.sel(samples=length, policy=policy)
     short = chosen["efficiency"].values < LIMIT
     if not short.any():
-        return f"{length}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
+        return f"{policy}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
     first = int(np.argmax(short))
     ranks = int(chosen["ranks"][first])
     mean = float(data["cost_sample"].sel(quantile=0.5)) * LONGER[length]
-    each = {
-        "records taken in": float(data["cost_record"]) * WORK / mean,
-        "points handed out": float(data["cost_handed"]) * WORK / mean,
+    parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096))
+    each = (
+        {
+            "sums taken in": float(data["cost_partial"]) * parts,
+        }
+        if policy == SUMS
+        else {
+            "records taken in": float(data["cost_record"]) * WORK / mean,
+            "points handed out": float(data["cost_handed"]) * WORK / mean,
+        }
+    )
+    each |= {
         "messages": float(data["cost_message"]) * float(chosen["requests"][first]) / ranks,
     }
     name = max(each, key=lambda key: each[key])
     load = float(chosen["root_load"][first])
     return (
-        f"{length}: below {LIMIT} from {ranks} ranks on; root is busy {load:.0%} of the time,\n"
+        f"{policy}: below {LIMIT} from {ranks} ranks on; root is busy {load:.0%} of the time,\n"
         f"  most of it with {name} ({each[name] * 1e3:.2g} ms for each rank and {WORK:g} s of work)"
     )
 
@@ -275,7 +300,7 @@ def report(data: xr.Dataset) -> str:
         for count in data["ranks"].values:
             row = data["efficiency"].sel(samples=length, ranks=count).values
             lines.append(f"{count:>8}" + "".join(f"{value:>13.3f}" for value in row))
-        lines.append(bottleneck(data, str(length)))
+        lines += [bottleneck(data, str(length), policy) for policy in ("package", SUMS)]
     return "\n".join(lines)
 
 

@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hpcclear.partials import part_length
 from hpcclear.ranks import FLUSH_INTERVAL
 from hpcclear.schedule import QUANTUM, TAIL, Allotment, Need, allot
+from hpcclear.statistics import BLOCK
 
 LANES = 32
 LATENCY = 5e-6  # s, network
-NODE = 64  # ranks of a node, for hand-out in two levels
-BLOCK = 4096  # samples of a partial result
 WORK = 60.0  # s of work for a rank
 MOST_REQUESTS = 2_000_000  # beyond, root's load alone decides
 
@@ -33,7 +33,7 @@ class Costs(NamedTuple):
     message: float  # root, to take in and answer one message
     record: float  # root, for each finished record
     handed: float  # root, for each sample handed out
-    partial: float  # root, for each block of samples that arrives summed up already
+    partial: float  # root, for each part of a block that arrives summed up already
     start: float  # from the launch of a process to its first simulation
 
     @property
@@ -85,13 +85,12 @@ POLICIES: dict[str, Policy] = {
 class _Team:
     """The ranks: how fast each is, until when it has work, and how much it was given."""
 
-    def __init__(self, costs: Costs, size: int, lanes: int, seed: int, group: int = 1) -> None:
+    def __init__(self, costs: Costs, size: int, lanes: int, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
-        # a group of ranks works as one of so many times the speed; its differences average out
-        slow = 1.0 + 0.25 * (self._rng.random((size, group)) < 0.01)
-        pace = np.clip(self._rng.normal(1.0, 0.03, (size, group)), 0.8, 1.2)
+        slow = 1.0 + 0.25 * (self._rng.random(size) < 0.01)
+        pace = np.clip(self._rng.normal(1.0, 0.03, size), 0.8, 1.2)
         # plain lists: they are read one entry at a time
-        self.each = (costs.mean / (1.0 / (slow * pace)).sum(axis=1)).tolist()  # s a sample
+        self.each = (costs.mean * slow * pace).tolist()  # s a sample
         self._spread = float(costs.samples.std()) / costs.mean
         self._shape = costs.samples / costs.mean
         self.lanes = lanes
@@ -192,15 +191,17 @@ class _Root:
         return self.left == 0 and not self.asking and self._own <= 0.0
 
 
-def _run(root: _Root) -> Outcome:
+def _run(root: _Root, idle: float | None = None) -> Outcome:
+    """Until nothing is left; `idle`: what a rank loses at its end, in items, half of its lanes by default."""
     team, costs = root.team, root.costs
+    idle = 0.5 * team.lanes if idle is None else idle
     while not root.over:
         if root.asking and root.asking[0][0] <= root.now:
             root.answer()
         else:
             root.work()
     # the last samples leave lanes empty
-    last = max(end + 0.5 * team.lanes * each for end, each in zip(team.end, team.each, strict=True))
+    last = max(end + idle * each for end, each in zip(team.end, team.each, strict=True))
     unreported = sum(team.given[1:]) - sum(team.reported[1:])
     closing = costs.message * root.size + costs.record * unreported
     makespan = max(last, root.now) + closing
@@ -259,23 +260,19 @@ def _saturated(costs: Costs, ranks: int, total: int, work: float, requests: floa
     return Outcome(work / makespan, serving / makespan, makespan, ranks * requests)
 
 
-def simulate_in_two_levels(
+def simulate_sums(
     costs: Costs, ranks: int, policy: Policy, *, work: float = WORK, seed: int = 1
 ) -> Outcome:
-    """Root hands whole blocks to nodes; one rank of each hands them on, and sums up what comes back.
+    """`simulate` for statistics, whose ranks make their own points and send sums of parts of blocks.
 
-    Points are made on the nodes and partial results travel, so root's load goes with nodes and blocks. Not in the
-    package: what it would take beyond the ranks that one root can serve.
+    Root's load goes with the parts, whose length is the package's own choice (`hpcclear.partials.part_length`).
     """
-    inside = simulate(costs, min(ranks, NODE), policy, work=work, seed=seed)
-    nodes = ranks // NODE
-    if nodes < 2:
-        return inside
-    summed = costs._replace(record=costs.partial / BLOCK, handed=0.0)
-    team = _Team(summed, nodes, LANES * NODE, seed + 1, group=NODE)
-    total = round(ranks * work / costs.mean)
-    between = _run(_Root(summed, team, total, policy))
-    return between._replace(
-        efficiency=between.efficiency * inside.efficiency,
-        makespan=between.makespan / inside.efficiency,
-    )
+    total = max(round(ranks * work / costs.mean), ranks)
+    length = part_length(total, ranks, BLOCK)
+    rng = np.random.default_rng(seed)
+    mean, spread = length * costs.mean, math.sqrt(length) * float(costs.samples.std())
+    parts = np.maximum(rng.normal(mean, spread, 2000), 0.1 * mean)
+    # points are made where they are used; a part is handed out as two numbers, within its message
+    summed = costs._replace(samples=parts, record=costs.partial, handed=0.0)
+    team = _Team(summed, ranks, 1, seed)
+    return _run(_Root(summed, team, max(total // length, 1), policy), 0.5 * LANES / length)

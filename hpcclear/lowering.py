@@ -187,7 +187,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
             raise InputError(
                 "numerics.method",
                 "lobatto",
-                'works in minimal coordinates only',
+                "works in minimal coordinates only",
                 'set numerics.formulation = "minimal" or another method',
             )
         return True

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .accumulator import Accumulator
 from .progress import Progress, Style
-from .statistics import BINS, LEAF, ROWS, Accumulator, Summary, summarise
+from .statistics import BINS, LEAF, ROWS, Summary, summarise
 from .status import OUTCOME, Flag, Status
 
 if TYPE_CHECKING:
@@ -127,7 +128,9 @@ class Summariser:
 
     def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
         """Queue parts: numbers (m,), rows of first sample and length (m, 2)."""
-        for part, (first, length) in zip(index.tolist(), points.astype(np.int64).tolist(), strict=True):
+        for part, (first, length) in zip(
+            index.tolist(), points.astype(np.int64).tolist(), strict=True
+        ):
             samples = np.arange(first, min(first + length, len(self._points)))
             records = np.zeros(samples.size, OUTCOME)
             records["sample"] = -1

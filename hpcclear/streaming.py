@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from . import __version__, dataset, storage
+from .accumulator import Accumulator, Remaining
 from .checkpoint import INTERVAL, Checkpoint, check_key, key_attribute
 from .errors import InputError
 from .lock import Lock
@@ -22,7 +23,7 @@ from .sampling import monte_carlo
 from .scene import Scene
 from .scene.paths import flatten
 from .scene.points import Points
-from .statistics import BINS, BLOCK, LEAF, ROWS, Accumulator, Remaining, Summary
+from .statistics import BINS, BLOCK, LEAF, ROWS, Summary
 from .status import JOINTS, OUTCOME, Flag, Status
 from .target import recorded, resolve
 from .work import KIND, PARTS, payload_of, saving

@@ -17,7 +17,7 @@ from scaling_model import (
     _Team,
     equal_shares,
     simulate,
-    simulate_in_two_levels,
+    simulate_sums,
 )
 
 PACKAGE = POLICIES["package"]
@@ -73,12 +73,12 @@ def test_root_load_is_what_its_messages_take():
     assert found.root_load == pytest.approx(expected, rel=1e-6)
 
 
-def test_two_levels_spare_root_the_records():
+def test_sums_spare_root_the_records():
     slow = FREE._replace(record=2e-6, partial=3e-5, message=3e-5)
-    flat, two = simulate(slow, 1500, PACKAGE), simulate_in_two_levels(slow, 1500, PACKAGE)
+    flat, sums = simulate(slow, 1500, PACKAGE), simulate_sums(slow, 1500, PACKAGE)
     assert flat.root_load > 0.9
-    assert two.root_load < 0.2
-    assert two.efficiency > 0.95
+    assert sums.root_load < 0.2
+    assert sums.efficiency > 0.95
 
 
 def test_equal_seeds_give_equal_runs():

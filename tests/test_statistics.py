@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from hpcclear import comm, dataset
+from hpcclear.accumulator import Accumulator
 from hpcclear.errors import InputError
 from hpcclear.partials import Parts, Summariser, packed, part_length, unpacked
 from hpcclear.sampling import monte_carlo
-from hpcclear.statistics import ROWS, Accumulator, Summary, columns, empty, merge, summarise
+from hpcclear.statistics import ROWS, Summary, columns, empty, merge, summarise
 from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.streaming import MonteCarloPoints, run_statistics, statistics_dataset
 

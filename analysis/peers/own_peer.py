@@ -47,7 +47,13 @@ def _solver(tableau: str | None) -> Callable[[Setup, int], float]:
         problem = setup.problem
         if tableau is not None:
             problem = replace(problem, tableau=TABLEAUS[tableau], collocation=False)
-        key = (problem.effects, problem.tableau.name, problem.collocation, problem.rtol, problem.atol)
+        key = (
+            problem.effects,
+            problem.tableau.name,
+            problem.collocation,
+            problem.rtol,
+            problem.atol,
+        )
         _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
             par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]

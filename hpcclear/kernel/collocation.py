@@ -11,27 +11,23 @@ from typing import Any
 
 from numba import njit
 
-from ..jit import FASTMATH, lane_function, scalar_function
+from ..jit import FASTMATH, lane_function
 from . import layout as at
 from . import lobatto as lob
 from .bits import rough_exp2, rough_log2
 from .control import choose_step, commit
-from .events import impact_fraction, root
+from .crossings import stop_at_contacts
 from .lifecycle import (
     ATOL,
-    GAP_TOLERANCE,
-    IMPACT_FLOOR,
     MAX_STEPS,
     OK,
     RECORDED,
     RTOL,
-    SMALLEST_STEP,
     UNFINISHED,
     end_revolution,
     failure,
     finish,
     integrate_gap,
-    latch,
     load,
 )
 from .lobatto import STAGES
@@ -39,11 +35,13 @@ from .record import record_nodes, record_step
 from .stepper import free_crank_turn, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
-EXPONENT = -0.5 / 11.0  # h by the square of the error: the last coefficients over the step go with h^9, their fall with h^2
+EXPONENT = (
+    -0.5 / 11.0
+)  # h by the square of the error: the last coefficients over the step go with h^9, their fall with h^2
 LOG_SAFETY = -0.32  # log2(0.8)
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
-UNTESTED = 0.5  # a contraction that one sweep left unmeasured is taken to have fallen to this part: or steps might stay small for ever
+UNTESTED = 0.5  # what one sweep leaves unmeasured is taken to have fallen so far, or steps might stay small for ever
 BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they save
 
 
@@ -136,7 +134,9 @@ def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
     if flag is not None:
         row = lob.COEFFICIENT + lob._N + (gap - at.GAP_12) // 3
         lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
-        scale = work[at.STEP] / (rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
+        scale = work[at.STEP] / (
+            rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES]
+        )
         last, before = lob.tail(m, row)
         weight = strictness * scale * scale
         return high + weight * last, low + weight * before
@@ -157,98 +157,22 @@ def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
         last, before = lob.tail(m, lob.COEFFICIENT + k)
         high += m[lob.WEIGHT * STAGES + k] * last
         low += m[lob.WEIGHT * STAGES + k] * before
-    high, low = gap_tail(crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low)
-    high, low = gap_tail(rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low)
+    high, low = gap_tail(
+        crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low
+    )
+    high, low = gap_tail(
+        rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low
+    )
     return high * min(high / (low + 1e-300), 1.0)
-
-
-@scalar_function
-def impact_in(work, m, gap, active, inverse, settings):
-    """Where in this step a joint in flight strikes, as a fraction; 2 if it does not, 1 if at the end; as `meet_impact`."""
-    tolerance = settings[GAP_TOLERANCE]
-    h = work[at.STEP]
-    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
-    for i in range(STAGES):
-        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
-        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
-        c1 = m[lob.NODE * STAGES + i]
-        if i == STAGES - 1 and abs(d1) <= tolerance and m1 > 0.0:
-            return 1.0
-        part = c1 - c0
-        fraction = impact_fraction(d0, part * m0, d1, part * m1, 0.5 * tolerance)
-        if fraction == 0.0 and i == 0:
-            speed = max(work[at.RATE_OLD + gap + 2], settings[IMPACT_FLOOR])
-            work[active] = 1.0
-            work[inverse] = 1.0 / speed
-            work[at.FRESH] = 1.0
-            return 0.0
-        if fraction <= 1.0:
-            fraction = c0 + part * fraction
-            return 1.0 if fraction > 1.0 - 1e-7 and m1 > 0.0 else fraction
-        d0, m0, c0 = d1, m1, c1
-    return 2.0
-
-
-@scalar_function
-def kink_in(work, m, gap, tolerance):
-    """Where in this step a gap changes sign, as a fraction; 2 if it does not, or so near an end that it does no harm."""
-    h = work[at.STEP]
-    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
-    for i in range(STAGES):
-        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
-        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
-        c1 = m[lob.NODE * STAGES + i]
-        at_end = (i == 0 and abs(d0) <= tolerance) or (i == STAGES - 1 and abs(d1) <= tolerance)
-        if d0 * d1 < 0.0 and not at_end:
-            part = c1 - c0
-            return c0 + part * root(d0, part * m0, d1, part * m1, 1.0)
-        d0, m0, c0 = d1, m1, c1
-    return 2.0
-
-
-@lane_function
-def contact_change(flag, latched, work, m, gap, active, inverse, settings):
-    """Fraction of the step at which a joint's contact begins or ends; 2 if it does not, 1 if an impact ends the step."""
-    if flag is not None:
-        if latched is not None:
-            if work[active] == 0.0:
-                return impact_in(work, m, gap, active, inverse, settings)
-        return kink_in(work, m, gap, settings[GAP_TOLERANCE])
-    else:
-        return 2.0
-
-
-@lane_function
-def stop_at_contacts(effects, work, m, settings):
-    """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
-    first = contact_change(
-        effects.crank_rod, effects.latched, work, m,
-        at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12, settings,
-    )  # fmt: skip
-    second = contact_change(
-        effects.rod_slider, effects.latched, work, m,
-        at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23, settings,
-    )  # fmt: skip
-    fraction = min(first, second)
-    if fraction < 1.0:
-        h = work[at.STEP]
-        work[at.ACCEPT] = 0.0
-        work[at.NEXT_STEP] = fraction * h if fraction > 0.0 else h
-        m[lob.KINKED] = 2.0
-    else:
-        if first == 1.0:
-            latch(0, 1, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
-            m[lob.KINKED] = 2.0
-        if second == 1.0:
-            latch(0, 1, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
-            m[lob.KINKED] = 2.0
 
 
 @lane_function
 def quadrature(work, m, rate):
     """Integral of a rate over the step, over h."""
     row = lob.row_of(m, at.RATE_NOW + rate)
-    work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, work[at.RATE_OLD + rate], row, STAGES - 1)
+    work[at.RATE_SUM + rate] = lob.weighted(
+        m, lob.MATRIX, work[at.RATE_OLD + rate], row, STAGES - 1
+    )
 
 
 @lane_function
@@ -296,7 +220,9 @@ def propose(work, m, error):
         work[at.ACCEPT] = 1.0
         proposal = h * min(max(factor, 0.3), LARGEST_GROWTH)
         # a step cut short by the end of the revolution says little about the next one
-        work[at.NEXT_STEP] = max(proposal, work[at.NEXT_STEP]) if work[at.ENDING] == 1.0 else proposal
+        work[at.NEXT_STEP] = (
+            max(proposal, work[at.NEXT_STEP]) if work[at.ENDING] == 1.0 else proposal
+        )
     else:
         work[at.ACCEPT] = 0.0
         work[at.NEXT_STEP] = h * min(max(factor, LARGEST_SHRINK), 0.7)
@@ -365,8 +291,12 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
                     integrate_gap(0, 1, work, at.GAP_12)
                     integrate_gap(0, 1, work, at.GAP_23)
                     if work[at.AVERAGING] == 1.0:
-                        peaks_inside(effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12)
-                        peaks_inside(effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23)
+                        peaks_inside(
+                            effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12
+                        )
+                        peaks_inside(
+                            effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23
+                        )
             ended = 0.0
             full = False
             if status == OK and work[at.ACCEPT] == 1.0:

@@ -31,8 +31,8 @@ from .lifecycle import (
     STATE,
     TRANSIENT,
 )
-from .memory import MEMORY
 from .lobatto import STAGES, new_memory
+from .memory import MEMORY
 from .stepper import make_stepper
 from .tableau import Tableau
 

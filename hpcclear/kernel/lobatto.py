@@ -150,7 +150,8 @@ def set_stages(m, work, n, h):
 @lane_function
 def accelerations_of_stages(effects, m, torque_table, load_table):
     """Accelerations and rates at all stages."""
-    accelerations(effects, m, beyond(m, PARAMETER_OFFSET), torque_table, load_table, STAGES)
+    par = beyond(m, PARAMETER_OFFSET)  # type: ignore[call-arg, var-annotated]
+    accelerations(effects, m, par, torque_table, load_table, STAGES)
 
 
 @lane_function
