@@ -52,17 +52,17 @@ def scene(
     return load_scene(JOB, overrides)
 
 
-def setup(chosen: Scene, par: Array, *, alone: bool = False) -> Setup:
+def setup(chosen: Scene, par: Array) -> Setup:
     """Problem, parameters and start states; without friction its coefficient is 0 for codes that always ask."""
     if chosen.effects.friction.law == "none":
         for joint in (at.JOINT_12, at.JOINT_23):
             par[:, joint + at.FRICTION] = 0.0
-    return Setup(problem_of(chosen, single=alone), par, start_states(chosen, par))
+    return Setup(problem_of(chosen), par, start_states(chosen, par))
 
 
 def single(chosen: Scene) -> Setup:
-    """One sample, the scene itself, as `hpcclear simulate` would run it."""
-    return setup(chosen, parameters(chosen), alone=True)
+    """One sample: the scene itself."""
+    return setup(chosen, parameters(chosen))
 
 
 def ensemble(chosen: Scene, samples: int) -> Setup:

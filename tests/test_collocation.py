@@ -234,11 +234,28 @@ def test_a_lost_cause_ends_with_a_status():
     assert row[at.OUT_ATTEMPTS] == 20
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize("name", ["Hunt-Crossley", "latched"])
+def test_a_response_is_the_ensemble_s_sample(name: str, rtol: float):
+    """To 1e-9, whichever side of the tolerance at which the method changes."""
+    scene = case(name, "auto", rtol, 1)
+    _, alone, _ = integrate(scene)
+    par = parameters(scene)
+    lanes = Lanes(problem_of(scene), 32)
+    lanes.queue(np.repeat(par, 3, 0), np.repeat(start_states(scene, par), 3, 0), np.arange(3))
+    while lanes.pending:
+        lanes.advance(1.0)
+    rows = lanes.collect()[1]
+    assert lanes.problem.tableau.name == "dormand-prince"
+    np.testing.assert_allclose(alone["objective"][0], rows[:, at.OUT_OBJECTIVE], rtol=1e-9)
+
+
 def test_who_takes_collocation():
     def taken(changes, **options) -> bool:
-        return problem_of(scene_with(changes), **options).collocation
+        return problem_of(scene_with(changes, rtol=1e-9), **options).collocation
 
     smooth = {"effects.contact": HUNT_CROSSLEY}
+    assert not taken(smooth | {"numerics.rtol": 2e-9}, single=True)  # as its ensemble
     assert taken(smooth, single=True)
     assert not taken(smooth)  # an ensemble
     assert taken(smooth | {"numerics.method": "lobatto"})

@@ -42,18 +42,16 @@ def _one_lane(key: tuple) -> Lanes:
 _PROBLEMS: dict[tuple, Problem] = {}
 
 
-def _solver(tableau: str | None) -> Callable[[Setup, int], float]:
+def _solver(name: str) -> Callable[[Setup, int], float]:
+    """By collocation, or by one of the pairs."""
+    tableau = TABLEAUS.get(name)
+
     def solve(setup: Setup, sample: int = 0) -> float:
-        problem = setup.problem
-        if tableau is not None:
-            problem = replace(problem, tableau=TABLEAUS[tableau], collocation=False)
-        key = (
-            problem.effects,
-            problem.tableau.name,
-            problem.collocation,
-            problem.rtol,
-            problem.atol,
-        )
+        if tableau is None:
+            problem = replace(setup.problem, collocation=True)
+        else:
+            problem = replace(setup.problem, tableau=tableau)
+        key = (problem.effects, name, problem.rtol, problem.atol)
         _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
             par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
@@ -81,9 +79,9 @@ def plain_positions(setup: Setup) -> Array:
     return found[:, 1]
 
 
-SOLVERS = {"hpcclear": _solver(None)} | {
-    f"hpcclear {name}": _solver(name) for name in TABLEAUS
-} | {"plain loop": plain}  # fmt: skip
+SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("lobatto", *TABLEAUS)} | {
+    "plain loop": plain
+}
 BATCH = {
     "hpcclear lanes": lambda setup: lanes_positions(setup, WIDTH),
     "plain loop": plain_positions,

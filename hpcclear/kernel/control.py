@@ -119,6 +119,16 @@ def keep(work, row, new, yes, i, W):
 
 
 @lane_function
+def add_integral(work, rate, mean, yes, i, W):
+    """Add the mean of a rate over the step, times the step, where it was accepted.
+
+    The sum is chosen, not the product: else the compiler fuses the two in a single response and not in lanes.
+    """
+    added = work[(at.INTEGRAL + rate) * W + i] + work[at.STEP * W + i] * mean
+    keep(work, at.INTEGRAL + rate, added, yes, i, W)
+
+
+@lane_function
 def commit_joint(flag, latched, work, gap, active, peak, deepest, ended, i, W):
     """Contact state, integral and extremes of one joint after a step."""
     if flag is not None:
@@ -129,8 +139,7 @@ def commit_joint(flag, latched, work, gap, active, peak, deepest, ended, i, W):
         force = work[(at.RATE_NOW + gap + 1) * W + i]
         work[peak * W + i] = max(work[peak * W + i], force if counts else 0.0)
         work[deepest * W + i] = max(work[deepest * W + i], d if counts else 0.0)
-        integral = work[at.STEP * W + i] * abs(work[(at.RATE_SUM + gap) * W + i])
-        work[(at.INTEGRAL + gap) * W + i] += integral if yes else 0.0
+        add_integral(work, gap, abs(work[(at.RATE_SUM + gap) * W + i]), yes, i, W)
         keep(work, at.RATE_OLD + gap, d, yes, i, W)
         keep(work, at.RATE_OLD + gap + 2, work[(at.RATE_NOW + gap + 2) * W + i], yes, i, W)
         if latched is not None:
@@ -146,16 +155,14 @@ def commit_ledger(ledger, work, i, W):
     if ledger is not None:
         yes = work[at.ACCEPT * W + i] == 1.0
         for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            change = work[at.STEP * W + i] * work[(at.RATE_SUM + r) * W + i]
-            work[(at.INTEGRAL + r) * W + i] += change if yes else 0.0
+            add_integral(work, r, work[(at.RATE_SUM + r) * W + i], yes, i, W)
             keep(work, at.RATE_OLD + r, work[(at.RATE_NOW + r) * W + i], yes, i, W)
 
 
 @lane_function
 def commit_response(work, rate, yes, i, W):
     """Integral of a rate after a step."""
-    change = work[at.STEP * W + i] * work[(at.RATE_SUM + rate) * W + i]
-    work[(at.INTEGRAL + rate) * W + i] += change if yes else 0.0
+    add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
     keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
 
 

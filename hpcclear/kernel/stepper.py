@@ -72,62 +72,58 @@ def adopt_fresh(work, stages, n, W):
 
 
 @lane_function
-def weigh_gap(flag, work, gap, first, b0, e0, b, e, i, W):
+def weigh_gap(flag, work, gap, first, row, b, e, i, W):
     """Add a stage's gap to the sums that become its integral over the step and the error of that."""
     if flag is not None:
-        weigh_rate(flag, work, gap, first, b0, b, i, W)
-        now = work[(at.RATE_NOW + gap) * W + i]
-        old = work[(at.RATE_OLD + gap) * W + i]
+        weigh_rate(flag, work, gap, first, row, b, i, W)
         before = work[(at.RATE_ERROR + gap) * W + i]
-        work[(at.RATE_ERROR + gap) * W + i] = (e0 * old if first else before) + e * now
+        before = 0.0 if first else before
+        work[(at.RATE_ERROR + gap) * W + i] = before + e * work[(row + gap) * W + i]
 
 
 @lane_function
-def weigh_rate(flag, work, rate, first, b0, b, i, W):
+def weigh_rate(flag, work, rate, first, row, b, i, W):
     """Add a stage's rate to the sum that becomes its integral over the step."""
     if flag is not None:
-        now = work[(at.RATE_NOW + rate) * W + i]
-        old = work[(at.RATE_OLD + rate) * W + i]
         before = work[(at.RATE_SUM + rate) * W + i]
-        work[(at.RATE_SUM + rate) * W + i] = (b0 * old if first else before) + b * now
+        before = 0.0 if first else before
+        work[(at.RATE_SUM + rate) * W + i] = before + b * work[(row + rate) * W + i]
 
 
 @lane_function
-def weigh_rates(crank_rod, rod_slider, ledger, responses, work, first, b0, e0, b, e, W):
+def weigh_rates(crank_rod, rod_slider, ledger, responses, work, first, row, b, e, W):
     """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
 
-    `first`: the sums begin with those of the first stage, known from the step before, times b0 and e0. One loop for all:
-    shorter ones the compiler unrolls instead of vectorising.
+    One loop for all: shorter ones the compiler unrolls instead of vectorising. One product a sum: of two it might
+    fuse either, and lanes would differ from a single response in the last bit.
     """
     for i in range(W):
-        weigh_gap(crank_rod, work, at.GAP_12, first, b0, e0, b, e, i, W)
-        weigh_gap(rod_slider, work, at.GAP_23, first, b0, e0, b, e, i, W)
-        weigh_rate(ledger, work, at.DRIVE_POWER, first, b0, b, i, W)
-        weigh_rate(ledger, work, at.ABS_DRIVE_POWER, first, b0, b, i, W)
-        weigh_rate(ledger, work, at.DISSIPATION, first, b0, b, i, W)
-        weigh_rate(ledger, work, at.LOAD_POWER, first, b0, b, i, W)
-        weigh_rate(responses, work, at.FORCE_12, first, b0, b, i, W)
-        weigh_rate(responses, work, at.FORCE_23, first, b0, b, i, W)
-        weigh_rate(responses, work, at.SLIDER_ACCELERATION, first, b0, b, i, W)
-        weigh_rate(responses, work, at.SLIDER_SQUARE, first, b0, b, i, W)
+        weigh_gap(crank_rod, work, at.GAP_12, first, row, b, e, i, W)
+        weigh_gap(rod_slider, work, at.GAP_23, first, row, b, e, i, W)
+        weigh_rate(ledger, work, at.DRIVE_POWER, first, row, b, i, W)
+        weigh_rate(ledger, work, at.ABS_DRIVE_POWER, first, row, b, i, W)
+        weigh_rate(ledger, work, at.DISSIPATION, first, row, b, i, W)
+        weigh_rate(ledger, work, at.LOAD_POWER, first, row, b, i, W)
+        weigh_rate(responses, work, at.FORCE_12, first, row, b, i, W)
+        weigh_rate(responses, work, at.FORCE_23, first, row, b, i, W)
+        weigh_rate(responses, work, at.SLIDER_ACCELERATION, first, row, b, i, W)
+        weigh_rate(responses, work, at.SLIDER_SQUARE, first, row, b, i, W)
 
 
 @lane_function
 def weigh_stage(effects, work, weights, s, count, W):
-    """Weigh the rates of stage s, and with the second stage those of the first."""
+    """Weigh the rates of stage s; those of the first stage are known from the step before."""
     B = count + 2 * count * count
     E = B + count
-    b0, e0, b, e = weights[B], weights[E], weights[B + s], weights[E + s]
     if s == 1:
         weigh_rates(
             effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-            True, b0, e0, b, e, W,
+            True, at.RATE_OLD, weights[B], weights[E], W,
         )  # fmt: skip
-    else:
-        weigh_rates(
-            effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-            False, b0, e0, b, e, W,
-        )  # fmt: skip
+    weigh_rates(
+        effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
+        False, at.RATE_NOW, weights[B + s], weights[E + s], W,
+    )  # fmt: skip
 
 
 @lane_function

@@ -19,7 +19,7 @@ class Numerics(Table):
     method: Literal["auto", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"] = "auto"
     """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
     "radau" always, "auto" as "switching" in scenes with steep friction ramps or strong damping, in others "lobatto" for
-    a single response and "dormand-prince" for an ensemble."""
+    a single response with rtol up to 1e-9 and else "dormand-prince"."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
