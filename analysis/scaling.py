@@ -121,8 +121,8 @@ def handed_cost() -> float:
     """Seconds of root for a sample handed out: its point made and pickled."""
     from scenes import scene
 
+    from hpcclear.sampling import MonteCarloPoints
     from hpcclear.scene import load_scene
-    from hpcclear.streaming import MonteCarloPoints
 
     content = scene("lankarani-nikravesh", 1e-6, 5, 5).resolved()
     content["study"]["method"] = "monte-carlo"

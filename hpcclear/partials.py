@@ -162,8 +162,8 @@ class Summariser:
 
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     """A rank's worker: the simulations of `payload["samples"]`, summed up where they are made."""
+    from .sampling import MonteCarloPoints
     from .scene import load_scene
-    from .streaming import MonteCarloPoints
     from .work import KIND
 
     worker = ranks.make(KIND, payload["samples"])

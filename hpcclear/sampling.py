@@ -5,6 +5,7 @@ the index of the sample, so that nothing depends on how many points are drawn at
 """
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -218,3 +219,46 @@ def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
     cut = row.reach / deviation
     below = ndtr(-cut)
     return middle + deviation * np.clip(ndtri(below + uniform * (1 - 2 * below)), -cut, cut)
+
+
+_PAGE = 4096  # points made at a time
+_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
+
+
+class MonteCarloPoints:
+    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    total : int
+        Number of points.
+    """
+
+    def __init__(self, scene: Scene, total: int) -> None:
+        self._scene, self._total = scene, total
+        self._pages: OrderedDict[int, Points] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._total
+
+    def page(self, number: int) -> Points:
+        """Points `number` * 4096 and on, at most 4096 of them."""
+        if number not in self._pages:
+            first = number * _PAGE
+            count = min(_PAGE, self._total - first)
+            self._pages[number] = monte_carlo(self._scene, count, first=first)
+            if len(self._pages) > _PAGES:
+                self._pages.popitem(last=False)
+        self._pages.move_to_end(number)
+        return self._pages[number]
+
+    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        index = np.asarray(index, np.int64)
+        values = np.empty((index.size, len(self.page(0).names)))
+        numbers = index // _PAGE
+        for number in np.unique(numbers).tolist():
+            here = numbers == number
+            values[here] = self.page(number).values[index[here] - number * _PAGE]
+        return values

@@ -2,7 +2,6 @@
 
 import sys
 import time
-from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
@@ -19,58 +18,15 @@ from .partials import PARTIAL, Parts, PartsProgress, part_length, unpacked
 from .places import fresh_sibling, parts_of
 from .progress import Progress, Style
 from .ranks import Ranks
-from .sampling import monte_carlo
+from .sampling import MonteCarloPoints
 from .scene import Scene
 from .scene.paths import flatten
-from .scene.points import Points
 from .statistics import BINS, BLOCK, LEAF, ROWS, Summary
 from .status import JOINTS, OUTCOME, Flag, Status
 from .target import recorded, resolve
 from .work import KIND, PARTS, payload_of, saving
 
 STAGE = "statistics"
-
-_PAGE = BLOCK  # points made at a time: a page is a block of samples
-_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
-
-
-class MonteCarloPoints:
-    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    total : int
-        Number of points.
-    """
-
-    def __init__(self, scene: Scene, total: int) -> None:
-        self._scene, self._total = scene, total
-        self._pages: OrderedDict[int, Points] = OrderedDict()
-
-    def __len__(self) -> int:
-        return self._total
-
-    def page(self, number: int) -> Points:
-        """Points `number` * 4096 and on, at most 4096 of them."""
-        if number not in self._pages:
-            first = number * _PAGE
-            count = min(_PAGE, self._total - first)
-            self._pages[number] = monte_carlo(self._scene, count, first=first)
-            if len(self._pages) > _PAGES:
-                self._pages.popitem(last=False)
-        self._pages.move_to_end(number)
-        return self._pages[number]
-
-    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
-        index = np.asarray(index, np.int64)
-        values = np.empty((index.size, len(self.page(0).names)))
-        numbers = index // _PAGE
-        for number in np.unique(numbers).tolist():
-            here = numbers == number
-            values[here] = self.page(number).values[index[here] - number * _PAGE]
-        return values
 
 
 class _Left:

@@ -12,10 +12,10 @@ from hpcclear import comm, dataset
 from hpcclear.accumulator import Accumulator
 from hpcclear.errors import InputError
 from hpcclear.partials import Parts, Summariser, packed, part_length, unpacked
-from hpcclear.sampling import monte_carlo
+from hpcclear.sampling import MonteCarloPoints, monte_carlo
 from hpcclear.statistics import ROWS, Summary, columns, empty, merge, summarise
 from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.streaming import MonteCarloPoints, run_statistics, statistics_dataset
+from hpcclear.streaming import run_statistics, statistics_dataset
 
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
 sys.path.insert(0, str(PROGRAM.parent))
