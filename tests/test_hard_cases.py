@@ -30,12 +30,10 @@ LONG_AT_TIGHT_TOLERANCE = (
     "friction_05_ramp_1e-4",
     "friction_05_ramp_1e-6",
 )
-# Measured 2.6e-7 and 4.6e-6 over ten revolutions: a jam that tears loose, at penetrations of three clearances, with more kinks
-# than steps are cut for. Chaotic: the second figure was 1.4e-6 with another residue of Newton's iteration.
-MEASURED_ABOVE = {
-    ("friction_05_ramp_1e-4", 1e-8): 1e-6,
-    ("friction_05_ramp_1e-6", 1e-8): 1e-5,
-}
+# Measured 1.3e-6 over ten revolutions, and 4.6e-6 with another tolerance of Newton's iteration: a jam that tears loose, at
+# penetrations of three clearances. Chaotic; half of the residual comes from one step in 700 000, whose stages all stand on one
+# side of a ramp that the sliding speed crosses and leaves again between them.
+MEASURED_ABOVE = {("friction_05_ramp_1e-6", 1e-8): 1e-5}
 BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7, 1e-10: 3e-9}  # on the energy residual, over ten revolutions
 NUMBERS = ("objective", "mean_gap", "peak_contact_force")
 BAD = (math.nan, math.inf, -math.inf)
