@@ -311,6 +311,7 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
             {"formulation": "minimal", "method": "dormand-prince"},
         ),
         ("fehlberg", 1, {"formulation": "minimal", "method": "fehlberg"}),
+        ("lobatto", 1, {"formulation": "minimal", "method": "lobatto"}),
     ]
     if more:
         wanted += [
