@@ -9,6 +9,7 @@ from .errors import InputError
 from .kernel import layout as at
 from .kernel.lanes import Problem
 from .kernel.lifecycle import STATE
+from .kernel.stiff import STEEP
 from .kernel.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from .physics import contact
 from .scene import Scene
@@ -22,7 +23,7 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 TIGHT = 1e-9
 """Relative tolerance from which "auto" integrates a single response by collocation: two methods agree to about this."""
-STIFF_RAMP = 100.0
+STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
 STIFF_DAMPING = 10.0
 """Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""

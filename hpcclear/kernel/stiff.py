@@ -39,20 +39,24 @@ CHATTER = 4.0  # or that times the change over the step between its last two sta
 EDGE_LIMIT = 40.0  # such a score sends a lane to the implicit method
 REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
 REJECTION_MEMORY = 0.9
+STEEP = 100.0  # s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are
 ERROR_IN_RAMP = 0.03  # of a step at most, as a part of the friction's ramp
 KINK_REACH = 0.005  # a kink so near the end of a step, as a part of it, is left there
 MOST_CUTS = 12.0  # of one step
 
 
 @scalar_function
-def loosened(rtol, strictness):
+def loosened(rtol, strictness, steep):
     """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
 
-    Where the motion is smooth rtol^(2/3) would do, as in RADAU5; but stiff stretches are full of kinks, where the result
-    is no better than the estimate: a tenth of rtol closes the energy balance of a jam as well as the explicit pair closes that of
-    a smooth run. `strictness`: square of how many times tighter this sample's tolerances are.
+    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
+    the result is no better than the estimate, most of all where a steep friction ramp sticks and tears loose. There the
+    energy balance closes as well as elsewhere only with an exponent of 1, which costs next to nothing: kinks hold the
+    steps down anyway.
+    `strictness`: square of how many times tighter this sample's tolerances are.
     """
-    return 0.1 * rtol / math.sqrt(strictness)
+    asked = rtol / math.sqrt(strictness)
+    return 0.1 * (asked if steep else asked**0.9)
 
 
 @scalar_function
@@ -62,12 +66,15 @@ def implicit_tolerance(m, settings):
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
     and every step would begin off the slow motion and end at a kink. Looser than this is dearer.
     """
-    steepest = max(
-        m[mem.PAR + at.JOINT_12 + at.INVERSE_RAMP], m[mem.PAR + at.JOINT_23 + at.INVERSE_RAMP]
+    first, second = mem.PAR + at.JOINT_12, mem.PAR + at.JOINT_23
+    steepest = max(m[first + at.INVERSE_RAMP], m[second + at.INVERSE_RAMP])
+    slope = max(
+        m[first + at.FRICTION] * m[first + at.INVERSE_RAMP],
+        m[second + at.FRICTION] * m[second + at.INVERSE_RAMP],
     )
     speed = m[mem.PAR + at.SPEED] * m[mem.PAR + at.CRANK_LENGTH]
     within = ERROR_IN_RAMP / (max(steepest, 1e-300) * (1.0 + speed))
-    return min(loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS]), within)
+    return min(loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS], slope >= STEEP), within)
 
 
 @scalar_function
