@@ -12,6 +12,7 @@ vectorised where no run-time check of overlap is needed. Stages are the lanes of
 """
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -82,6 +83,11 @@ def matrices() -> tuple[Array, Array, Array]:
 
 def new_memory() -> Array:
     """The buffer of one response, with the method's coefficients in it."""
+    return _template().copy()
+
+
+@cache
+def _template() -> Array:
     m = np.zeros(MEMORY)
     rows = m.reshape(-1, STAGES)
     integral, double, to_coefficients = matrices()
