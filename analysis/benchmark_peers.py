@@ -246,7 +246,7 @@ def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, len(runs), figsize=(3.4 * len(runs), 3.6), sharey=True)
+    figure, axes = plt.subplots(1, len(runs), figsize=(3.4 * len(runs), 4.6), sharey=True)
     for axis, (law, data) in zip(np.atleast_1d(axes), runs.items(), strict=True):
         for k, code in enumerate(data["code"].values):
             row = data.sel(code=code)
@@ -257,7 +257,7 @@ def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
                 color=plt.cm.tab20(k % 20),
             )  # fmt: skip
         axis.set(xscale="log", yscale="log", title=law, xlabel="error of the slider position, m")
-        axis.legend(fontsize=5.5)
+        axis.legend(fontsize=5.5, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=2)
     np.atleast_1d(axes)[0].set_ylabel("ms a revolution")
     figure.tight_layout()
     figure.savefig(path, dpi=200)

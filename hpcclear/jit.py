@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import llvmlite
+import llvmlite.binding
 import numba
 import numpy as np
 from numba import config, njit
@@ -70,6 +71,14 @@ def cache_folder() -> Path:
     except OSError:
         pass  # read-only or full: compile without a shared cache
     return Path(tempfile.mkdtemp(prefix="hpcclear-"))
+
+
+def doubles_in_a_vector() -> int:
+    """Numbers that a vector register of this processor holds: 8, 4 or 2."""
+    features = llvmlite.binding.get_host_cpu_features()
+    if features.get("avx512f", False):
+        return 8
+    return 4 if features.get("avx", False) else 2
 
 
 # Decided before the first decorator runs; an explicit NUMBA_CACHE_DIR of the user's own wins.

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcclear import evaluator
+from hpcclear.errors import InputError
 from hpcclear.evaluator import DEFAULT_LANES, evaluate_records
 from hpcclear.kernel import layout as at
 from hpcclear.kernel import record
@@ -117,6 +119,31 @@ def test_order_of_samples_does_not_change_one_bit():
     assert [forward[k] for k in order] == shuffled
     alone = bits(evaluate_records(scene, points.take([7])))
     assert alone == [forward[7]]
+
+
+def test_the_number_of_lanes_does_not_change_one_bit():
+    scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-6).with_(
+        {"numerics.energy": True, "numerics.responses": True}
+    )
+    points = random_designs(scene, 21)
+    one, *others = (evaluate_records(scene, points, lanes=lanes) for lanes in (1, 16, 32))
+    assert np.isfinite(one["energy_error"]).all()
+    for records in others:
+        for name in records.dtype.names:
+            assert records[name].tobytes() == one[name].tobytes(), name
+
+
+def test_lanes_fit_the_processor_or_the_environment(monkeypatch):
+    monkeypatch.delenv("HPCCLEAR_LANES", raising=False)
+    for doubles, lanes in ((8, 32), (4, 16), (2, 16)):
+        monkeypatch.setattr(evaluator, "doubles_in_a_vector", lambda doubles=doubles: doubles)
+        assert evaluator.default_lanes() == lanes
+    monkeypatch.setenv("HPCCLEAR_LANES", "24")
+    assert evaluator.default_lanes() == 24
+    for wrong in ("0", "many", "-8", "2000", "1.5"):
+        monkeypatch.setenv("HPCCLEAR_LANES", wrong)
+        with pytest.raises(InputError, match="HPCCLEAR_LANES"):
+            evaluator.default_lanes()
 
 
 @pytest.mark.parametrize("budgets", [(1,), (7, 64, 1, 3)])
