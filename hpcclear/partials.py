@@ -179,7 +179,7 @@ class PartsProgress(Progress):
         self._samples, self._before = samples, done
 
     def start(self, total: int, completed: np.ndarray) -> None:
-        """Begin; the number of parts says nothing to a reader."""
+        """Begin with records `completed` (m,) there already; the number of parts says nothing to a reader."""
         super().start(self._samples, completed)
         self._done = self._before
         self._origin = (self._began, self._done)
@@ -187,6 +187,6 @@ class PartsProgress(Progress):
         self._history.append(self._origin)
 
     def add(self, records: np.ndarray) -> None:
-        """Count the samples of finished parts."""
+        """Count the samples of finished parts, records of `PARTIAL` (m,)."""
         self._done += int(records["samples"].sum())
         self._failed += int(records["status"][:, 1:].sum())
