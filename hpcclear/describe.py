@@ -49,9 +49,10 @@ def describe_scene(scene: Scene, cost: bool) -> None:
     states = 2 * coordinate_count(scene)
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
+    method = "lobatto" if problem.collocation else problem.tableau.name
     rows += [
         ("states", f"{states} (positions and velocities) + {open_joints} integrals of the gaps"),
-        ("method", f"{problem.tableau.name}, rtol {scene.numerics.rtol:g}"),
+        ("method", f"{method}, rtol {scene.numerics.rtol:g}"),
         (
             "revolutions",
             f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",

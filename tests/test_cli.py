@@ -33,6 +33,12 @@ def hpcclear(*words, timeout=300, module=False, **more):
     )
 
 
+def test_check_names_the_method_that_is_asked_for():
+    named = hpcclear("check", "jobs/slider_crank.toml", "--set", "numerics.method=lobatto")
+    assert "lobatto, rtol 1e-06" in named.stdout
+    assert "dormand-prince, rtol" in hpcclear("check", "jobs/slider_crank.toml").stdout
+
+
 def test_check_says_what_would_be_simulated():
     done = hpcclear("check", "jobs/slider_crank.toml", *SHORT)
     assert done.returncode == 0, done.stderr
