@@ -21,7 +21,6 @@ from .lifecycle import (
     ATOL,
     MAX_STEPS,
     OK,
-    RECORDED,
     RTOL,
     UNFINISHED,
     end_revolution,
@@ -31,13 +30,13 @@ from .lifecycle import (
     load,
 )
 from .lobatto import STAGES
-from .record import record_nodes, record_step
+from .record import no_room, record_nodes, record_step
 from .stepper import free_crank_turn, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
 EXPONENT = (
     -0.5 / 11.0
-)  # h by the square of the error: the last coefficients over the step go with h^9, their fall with h^2
+)  # of the square of the error: the last coefficients over the step go with h^9, their fall with h^2
 LOG_SAFETY = -0.32  # log2(0.8)
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
@@ -55,7 +54,7 @@ def replicate(work, par, m):
         m[s] = 0.0
     m[lob.CONTRACTION] = 0.1
     m[lob.CONTRACTION_STEP] = par[at.FIRST_STEP]
-    m[lob.KINKED] = 1.0
+    m[lob.KINK] = lob.KINK_AT_START
     m[lob.AFTER_KINK] = par[at.FIRST_STEP]
 
 
@@ -132,7 +131,7 @@ def sweep(effects, work, m, torque_table, load_table, n):
 def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
     """Add the last coefficients of a gap, scaled as its integral's error is, to those of the accelerations."""
     if flag is not None:
-        row = lob.COEFFICIENT + lob._N + (gap - at.GAP_12) // 3
+        row = lob.GAP_COEFFICIENT + (gap - at.GAP_12) // 3
         lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
         scale = work[at.STEP] / (
             rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES]
@@ -204,7 +203,7 @@ def end_of_step(effects, work, m, n):
 @lane_function
 def peaks_inside(flag, work, m, gap, peak, deepest):
     """Extremes of a joint at the nodes of an accepted step, its end left to `commit`."""
-    if flag is not None:
+    if flag is not None and work[at.AVERAGING] == 1.0:
         for i in range(STAGES):
             work[peak] = max(work[peak], m[(at.RATE_NOW + gap + 1) * STAGES + i])
             work[deepest] = max(work[deepest], m[(at.RATE_NOW + gap) * STAGES + i])
@@ -232,13 +231,56 @@ def propose(work, m, error):
 def after_step(work, m):
     """Where the next step begins, and how long it is after a kink."""
     m[lob.FOLLOWS] = 1.0
-    if m[lob.KINKED] == 1.0:
+    if m[lob.KINK] == lob.KINK_AT_START:
         m[lob.AFTER_KINK] = work[at.STEP]
-        m[lob.KINKED] = 0.0
-    elif m[lob.KINKED] == 2.0:
-        m[lob.KINKED] = 1.0
+        m[lob.KINK] = lob.KINK_BEHIND
+    elif m[lob.KINK] == lob.KINK_AT_END:
+        m[lob.KINK] = lob.KINK_AT_START
         m[lob.POLYNOMIAL_STEP] = 0.0
         work[at.NEXT_STEP] = m[lob.AFTER_KINK]
+
+
+@lane_function
+def try_step(effects, work, stages, par, m, torque_table, load_table, settings, n):
+    """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
+    strictness = par[at.STRICTNESS]
+    choose_step(work, par, effects.torque, 1)
+    begin_contacts(work, m)
+    if work[at.FRESH] == 1.0:
+        evaluate_start(effects, work, stages, m, torque_table, load_table, n)
+    weigh(work, stages, m, settings, strictness, n)
+    lob.guess(m, n, work[at.STEP])
+    work[at.ATTEMPTS] += 1.0
+    if sweep(effects, work, m, torque_table, load_table, n):
+        lob.keep_polynomial(m, n, work[at.STEP])
+        error = error_of(
+            effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
+        )
+        work[at.ERROR] = error
+        propose(work, m, error)
+    else:
+        work[at.ACCEPT] = 0.0
+        factor = math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION])
+        work[at.NEXT_STEP] = work[at.STEP] * min(max(factor, LARGEST_SHRINK), FAILED_SHRINK)
+
+
+@lane_function
+def judge_end(effects, work, stages, m, settings, n):
+    """What an accepted step shows of contacts, turns and integrals; it may yet be cut. Returns OK or why the lane ends."""
+    status = OK
+    if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
+        status = failure(0, 1, n, work, stages, settings)
+    if status == OK and work[at.ACCEPT] == 1.0:
+        end_of_step(effects, work, m, n)
+        stop_at_contacts(effects, work, m, settings)
+        if work[at.ACCEPT] == 1.0:
+            status = free_crank_turn(effects.torque, 0, 1, work, settings, n - 1)
+        if work[at.ACCEPT] == 1.0:
+            integrate_gap(0, 1, work, at.GAP_12)
+            integrate_gap(0, 1, work, at.GAP_23)
+            peaks_inside(effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12)
+            peaks_inside(effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23)
+    return status
 
 
 @cache
@@ -257,69 +299,29 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
         if work[at.RUNNING] == 0.0:
             load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
             replicate(work, par, m)
-        while budget > 0 and work[at.RUNNING] > 0.0:
+        full = False
+        while budget > 0 and work[at.RUNNING] > 0.0 and not full:
             budget -= 1
-            strictness = par[at.STRICTNESS]
-            choose_step(work, par, effects.torque, 1)
-            begin_contacts(work, m)
-            if work[at.FRESH] == 1.0:
-                evaluate_start(effects, work, stages, m, torque_table, load_table, n)
-            weigh(work, stages, m, settings, strictness, n)
-            lob.guess(m, n, work[at.STEP])
-            work[at.ATTEMPTS] += 1.0
-            if sweep(effects, work, m, torque_table, load_table, n):
-                lob.keep_polynomial(m, n, work[at.STEP])
-                error = error_of(
-                    effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
-                )
-                work[at.ERROR] = error
-                propose(work, m, error)
-            else:
-                work[at.ACCEPT] = 0.0
-                factor = math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION])
-                work[at.NEXT_STEP] = work[at.STEP] * min(max(factor, LARGEST_SHRINK), FAILED_SHRINK)
-            status = OK
-            rejected = work[at.ACCEPT] == 0.0
-            if rejected or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
-                status = failure(0, 1, n, work, stages, settings)
-            if status == OK and not rejected:
-                end_of_step(effects, work, m, n)
-                stop_at_contacts(effects, work, m, settings)
-                if work[at.ACCEPT] == 1.0:
-                    status = free_crank_turn(effects.torque, 0, 1, work, settings, n - 1)
-                if work[at.ACCEPT] == 1.0:
-                    integrate_gap(0, 1, work, at.GAP_12)
-                    integrate_gap(0, 1, work, at.GAP_23)
-                    if work[at.AVERAGING] == 1.0:
-                        peaks_inside(
-                            effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12
-                        )
-                        peaks_inside(
-                            effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23
-                        )
-            ended = 0.0
-            full = False
-            if status == OK and work[at.ACCEPT] == 1.0:
+            try_step(effects, work, stages, par, m, torque_table, load_table, settings, n)
+            status = judge_end(effects, work, stages, m, settings, n)
+            goes_on = status == OK
+            if goes_on and work[at.ACCEPT] == 1.0:
                 record_nodes(record, counters, work, m, book, n)
                 ended = commit(
                     effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
                     effects.responses, work, stages, n, 1,
                 )  # fmt: skip
-                full = record_step(record, counters, work, stages, book, n, 1)
-                if record is not None:
-                    full = counters[RECORDED] + STAGES > record.shape[0]
+                record_step(record, counters, work, stages, book, n, 1)
+                full = no_room(record, counters)
                 after_step(work, m)
-            if ended > 0.0:
-                wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
-                status = end_revolution(0, 1, work, book, settings)
-                status = OK if status == UNFINISHED else status + 1000
-            if status != OK:
-                done = status - 1000 if status >= 1000 else status
-                finish(0, 1, n, done, work, book, out, finished, counters)
+                if ended > 0.0:
+                    wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
+                    status = end_revolution(0, 1, work, book, settings)
+                    goes_on = status == UNFINISHED
+            if not goes_on:
+                finish(0, 1, n, status, work, book, out, finished, counters)
                 load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
                 replicate(work, par, m)
-            if full:
-                break
         return work[at.RUNNING] > 0.0
 
     return stepper

@@ -4,51 +4,52 @@ from ..jit import lane_function, scalar_function
 from . import layout as at
 from . import lobatto as lob
 from .events import impact_fraction, root
-from .lifecycle import GAP_TOLERANCE, IMPACT_FLOOR, latch
+from .lifecycle import GAP_TOLERANCE, cut_or_latch, latch_at_start
 from .lobatto import STAGES
+
+
+@scalar_function
+def gap_before(work, m, gap, i):
+    """A gap between node i and the one before, for a cubic: its start and length as parts of the step, gap and slope
+    times length at its start, then at its end."""
+    h = work[at.STEP]
+    start, d0, m0 = 0.0, work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2]
+    if i > 0:
+        start = m[lob.NODE * STAGES + i - 1]
+        d0 = m[(at.RATE_NOW + gap) * STAGES + i - 1]
+        m0 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i - 1]
+    length = m[lob.NODE * STAGES + i] - start
+    d1 = m[(at.RATE_NOW + gap) * STAGES + i]
+    m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
+    return start, length, d0, length * m0, d1, length * m1
 
 
 @scalar_function
 def impact_in(work, m, gap, active, inverse, settings):
     """Where in this step a joint in flight strikes, as a fraction; 2 if it does not, 1 if at the end; as `meet_impact`."""
     tolerance = settings[GAP_TOLERANCE]
-    h = work[at.STEP]
-    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
     for i in range(STAGES):
-        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
-        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
-        c1 = m[lob.NODE * STAGES + i]
+        start, length, d0, m0, d1, m1 = gap_before(work, m, gap, i)
         if i == STAGES - 1 and abs(d1) <= tolerance and m1 > 0.0:
             return 1.0
-        part = c1 - c0
-        fraction = impact_fraction(d0, part * m0, d1, part * m1, 0.5 * tolerance)
+        fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
         if fraction == 0.0 and i == 0:
-            speed = max(work[at.RATE_OLD + gap + 2], settings[IMPACT_FLOOR])
-            work[active] = 1.0
-            work[inverse] = 1.0 / speed
-            work[at.FRESH] = 1.0
+            latch_at_start(0, 1, work, settings, gap, active, inverse)
             return 0.0
         if fraction <= 1.0:
-            fraction = c0 + part * fraction
+            fraction = start + length * fraction
             return 1.0 if fraction > 1.0 - 1e-7 and m1 > 0.0 else fraction
-        d0, m0, c0 = d1, m1, c1
     return 2.0
 
 
 @scalar_function
 def kink_in(work, m, gap, tolerance):
     """Where in this step a gap changes sign, as a fraction; 2 if it does not, or so near an end that it does no harm."""
-    h = work[at.STEP]
-    d0, m0, c0 = work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2], 0.0
     for i in range(STAGES):
-        d1 = m[(at.RATE_NOW + gap) * STAGES + i]
-        m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
-        c1 = m[lob.NODE * STAGES + i]
+        start, length, d0, m0, d1, m1 = gap_before(work, m, gap, i)
         at_end = (i == 0 and abs(d0) <= tolerance) or (i == STAGES - 1 and abs(d1) <= tolerance)
         if d0 * d1 < 0.0 and not at_end:
-            part = c1 - c0
-            return c0 + part * root(d0, part * m0, d1, part * m1, 1.0)
-        d0, m0, c0 = d1, m1, c1
+            return start + length * root(d0, m0, d1, m1, 1.0)
     return 2.0
 
 
@@ -74,16 +75,5 @@ def stop_at_contacts(effects, work, m, settings):
         effects.rod_slider, effects.latched, work, m,
         at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23, settings,
     )  # fmt: skip
-    fraction = min(first, second)
-    if fraction < 1.0:
-        h = work[at.STEP]
-        work[at.ACCEPT] = 0.0
-        work[at.NEXT_STEP] = fraction * h if fraction > 0.0 else h
-        m[lob.KINKED] = 2.0
-    else:
-        if first == 1.0:
-            latch(0, 1, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
-            m[lob.KINKED] = 2.0
-        if second == 1.0:
-            latch(0, 1, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
-            m[lob.KINKED] = 2.0
+    if cut_or_latch(0, 1, work, settings, first, second):
+        m[lob.KINK] = lob.KINK_AT_END

@@ -166,11 +166,17 @@ def meet_impact(lane, W, work, settings, gap, active, inverse):
     if 1.0 - 1e-7 < fraction < 1.0 and m1 > 0.0:
         return 1.0  # as good as the end of the step, which may be stretched by round-off to end a revolution
     if fraction == 0.0:
-        speed = max(work[(at.RATE_OLD + gap + 2) * W + lane], settings[IMPACT_FLOOR])
-        work[active * W + lane] = 1.0
-        work[inverse * W + lane] = 1.0 / speed
-        work[at.FRESH * W + lane] = 1.0
+        latch_at_start(lane, W, work, settings, gap, active, inverse)
     return fraction
+
+
+@lane_event
+def latch_at_start(lane, W, work, settings, gap, active, inverse):
+    """Start a contact at the start of this step, which is tried again."""
+    speed = max(work[(at.RATE_OLD + gap + 2) * W + lane], settings[IMPACT_FLOOR])
+    work[active * W + lane] = 1.0
+    work[inverse * W + lane] = 1.0 / speed
+    work[at.FRESH * W + lane] = 1.0
 
 
 @lane_event
@@ -188,16 +194,26 @@ def stop_at_impacts(lane, W, work, settings):
     """Shorten the step to the first impact inside it, or latch the contacts that begin at its end."""
     first = meet_impact(lane, W, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
     second = meet_impact(lane, W, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+    cut_or_latch(lane, W, work, settings, first, second)
+
+
+@lane_event
+def cut_or_latch(lane, W, work, settings, first, second):
+    """Cut the step to the smaller of two fractions below 1, or start the contacts whose fraction is 1, its end.
+
+    Returns whether it did either.
+    """
     fraction = min(first, second)
     if fraction < 1.0:
         h = work[at.STEP * W + lane]
         work[at.ACCEPT * W + lane] = 0.0
         work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h
-        return
+        return True
     if first == 1.0:
         latch(lane, W, work, settings, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12)
     if second == 1.0:
         latch(lane, W, work, settings, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23)
+    return fraction == 1.0
 
 
 @lane_event

@@ -38,8 +38,9 @@ MATRIX = NODE + 1  # velocities by accelerations: row l holds the weights of nod
 SQUARE = MATRIX + _ROWS  # coordinates by accelerations, likewise
 LEGENDRE = SQUARE + _ROWS  # coefficients of degree 1 to 8 by accelerations, likewise
 NODE_ACC = LEGENDRE + _ROWS  # accelerations that the stages were made from
-COEFFICIENT = NODE_ACC + _N  # of degree 1 to 8, for coordinates, then for the two gaps
-BASE = COEFFICIENT + _N + 2  # row: coefficient of degree 0, lane by lane a coordinate
+COEFFICIENT = NODE_ACC + _N  # of degree 1 to 8, of the accelerations
+GAP_COEFFICIENT = COEFFICIENT + _N  # and of the two gaps
+BASE = GAP_COEFFICIENT + 2  # row: coefficient of degree 0, lane by lane a coordinate
 START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
 WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
 CHANGE = WEIGHT + 1  # square of the scaled change of the accelerations, by stage
@@ -50,9 +51,10 @@ SCALARS = CHANGE + 1
     CONTRACTION,  # of the fixed-point iteration
     CONTRACTION_STEP,  # s, of the step for which that was found
     AFTER_KINK,  # s, the step that was accepted first after the last kink
-    KINKED,  # 1 while no step was accepted since a kink
+    KINK,  # where the last kink is: one of the following
 ) = range(SCALARS * STAGES, SCALARS * STAGES + 6)
 MEMORY = (SCALARS + 1) * STAGES
+KINK_BEHIND, KINK_AT_START, KINK_AT_END = 0.0, 1.0, 2.0  # of the step to come; of the step tried
 
 MOST_SWEEPS = 12.0
 """Sweeps over the stages after which a step counts as not converging."""

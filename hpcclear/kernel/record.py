@@ -66,3 +66,12 @@ def record_nodes(record, counters, work, m, book, n):
                 record[row, STATE + n + k] = m[(at.VS + k) * STAGES + i]
                 record[row, STATE + 2 * n + k] = m[(at.ACC + k) * STAGES + i]
             counters[RECORDED] = row + 1
+
+
+@lane_function
+def no_room(record, counters):
+    """Whether another step of collocation might not fit into `record`."""
+    if record is not None:
+        return counters[RECORDED] + STAGES > record.shape[0]
+    else:
+        return False
