@@ -101,13 +101,10 @@ def chunks(lanes: Lanes) -> Iterator[np.ndarray]:
         yield lanes.take_record()
 
 
-def run(scene: Scene) -> Run:
-    """Simulate one scene with its energy balance; every accepted step counts, none is kept."""
-    if not scene.clearance_joints() and scene.drive.kind == "constant-speed":
-        return closed_form(scene)
+def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
+    """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
     problem = problem_of(scene, ledger=True, series=True)
-    n = problem.coordinates
-    par = parameters(scene)
+    n, par = problem.coordinates, parameters(scene)
     state = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))
     lanes.queue(par, state, np.zeros(1, np.int64))
@@ -116,6 +113,15 @@ def run(scene: Scene) -> Run:
         state[0, :n], state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n]
     ]
     start[0, rec.ACTIVE_12 : rec.ACTIVE_23 + 1] = state[0, 2 * at.MAX_COORDINATES :][:2]
+    return lanes, par, start
+
+
+def run(scene: Scene) -> Run:
+    """Simulate one scene with its energy balance; every accepted step counts, none is kept."""
+    if not scene.clearance_joints() and scene.drive.kind == "constant-speed":
+        return closed_form(scene)
+    lanes, par, start = recorded(scene)
+    n = lanes.problem.coordinates
     first, largest = balance(scene, par[0], start, n)
     off, size = 0.0, largest[0]
     began = time.perf_counter()

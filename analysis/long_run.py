@@ -16,14 +16,13 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from hard_cases import balance, chunks
+from hard_cases import balance, chunks, recorded
 
 from hpcclear import __version__
 from hpcclear.kernel import baumgarte
 from hpcclear.kernel import layout as at
 from hpcclear.kernel import record as rec
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states, topology
+from hpcclear.lowering import topology
 from hpcclear.scene import Scene, load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -34,17 +33,9 @@ FIRST = 100  # revolutions that later ones are compared with
 
 def largest_by_revolution(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Relative energy residual and constraint violation in m, the largest of each revolution."""
-    problem = problem_of(scene, ledger=True)
-    n, (first, second, _) = problem.coordinates, topology(scene)
-    par, turns = parameters(scene), scene.numerics.transient_revolutions
-    turns += int(scene.numerics.averaged_revolutions)
-    state = start_states(scene, par)
-    lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))
-    lanes.queue(par, state, np.zeros(1, np.int64))
-    start = np.zeros((1, rec.columns(n)))
-    start[0, rec.STATE : rec.STATE + 2 * n] = np.r_[
-        state[0, :n], state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n]
-    ]
+    lanes, par, start = recorded(scene)
+    n, (first, second, _) = lanes.problem.coordinates, topology(scene)
+    turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     begun, sizes = balance(scene, par[0], start, n)
     size = sizes[0]
     residual, violation = np.zeros(turns), np.full(turns, np.nan)

@@ -266,7 +266,7 @@ def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
     first = int(np.argmax(short))
     ranks = int(chosen["ranks"][first])
     mean = float(data["cost_sample"].sel(quantile=0.5)) * LONGER[length]
-    parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096))
+    parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096, mean))
     each = (
         {
             "sums taken in": float(data["cost_partial"]) * parts,

@@ -268,7 +268,7 @@ def simulate_sums(
     Root's load goes with the parts, whose length is the package's own choice (`hpcclear.partials.part_length`).
     """
     total = max(round(ranks * work / costs.mean), ranks)
-    length = part_length(total, ranks, BLOCK)
+    length = part_length(total, ranks, BLOCK, costs.mean)
     rng = np.random.default_rng(seed)
     mean, spread = length * costs.mean, math.sqrt(length) * float(costs.samples.std())
     parts = np.maximum(rng.normal(mean, spread, 2000), 0.1 * mean)

@@ -43,13 +43,15 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 def describe_scene(scene: Scene, cost: bool) -> None:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
     out = console()
-    from .lowering import coordinate_count, problem_of
+    from .lowering import coordinate_count, integrator_of, problem_of
 
-    problem = problem_of(scene)  # refuses what cannot be simulated
+    problem_of(scene)  # refuses what cannot be simulated
     states = 2 * coordinate_count(scene)
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
-    method = "lobatto" if problem.collocation else problem.tableau.name
+    method = integrator_of(scene)
+    if (alone := integrator_of(scene, single=True)) != method:
+        method += f" ({alone} for a single response)"
     rows += [
         ("states", f"{states} (positions and velocities) + {open_joints} integrals of the gaps"),
         ("method", f"{method}, rtol {scene.numerics.rtol:g}"),

@@ -229,6 +229,16 @@ def problem_of(
     )
 
 
+def integrator_of(scene: Scene, *, single: bool = False) -> str:
+    """Name of the method that a scene's samples, or its single response, are integrated by."""
+    if coordinate_count(scene) == 0:
+        return "closed form"
+    if takes_collocation(scene, single):
+        return "lobatto"
+    name = tableau_of(scene).name
+    return {"never": name, "stiff": f"{name} and radau", "always": "radau"}[implicit_method(scene)]
+
+
 def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)

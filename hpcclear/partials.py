@@ -44,10 +44,18 @@ PARTIAL = np.dtype(
 """One part's summary as a record, for the way from rank to root."""
 
 
-def part_length(samples: int, ranks: int, block: int) -> int:
-    """Samples a part: a leaf times a power of two, a block at most."""
+LONGEST = 2.0
+"""Seconds of work that a part holds at most, if samples allow: what a rank that is killed has not reported."""
+
+LONGEST_UNKNOWN = 256
+"""Samples of a part at most while nobody knows what they cost."""
+
+
+def part_length(samples: int, ranks: int, block: int, seconds: float = 0.0) -> int:
+    """Samples a part: a leaf times a power of two, a block at most; `seconds`: of one sample, 0 if not known."""
+    most = min(block, LONGEST / seconds if seconds > 0.0 else LONGEST_UNKNOWN)
     length = LEAF
-    while 2 * length <= min(block, samples // (PARTS_A_RANK * ranks)):
+    while 2 * length <= min(most, samples // (PARTS_A_RANK * ranks)):
         length *= 2
     return length
 

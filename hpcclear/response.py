@@ -15,7 +15,14 @@ from .kernel import layout as at
 from .kernel import record as rec
 from .kernel.lanes import Lanes, Problem
 from .kernel.observe import observe
-from .lowering import coordinate_count, parameters, problem_of, start_states, topology
+from .lowering import (
+    coordinate_count,
+    integrator_of,
+    parameters,
+    problem_of,
+    start_states,
+    topology,
+)
 from .scene import Scene
 from .target import recorded, resolve
 
@@ -176,7 +183,9 @@ def simulate(scene: Scene) -> xr.Dataset:
     return dataset.response_dataset(
         times,
         {**data, **outcome},
-        dataset.provenance(named.text or named.to_toml(), named.hash) | recorded(reason),
+        dataset.provenance(named.text or named.to_toml(), named.hash)
+        | recorded(reason)
+        | {"integrator": integrator_of(scene, single=True)},
     )
 
 

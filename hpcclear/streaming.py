@@ -17,7 +17,7 @@ from .lock import Lock
 from .partials import PARTIAL, Parts, PartsProgress, part_length, unpacked
 from .places import fresh_sibling, parts_of
 from .progress import Progress, Style
-from .ranks import Ranks
+from .ranks import COLUMNS, Ranks
 from .sampling import MonteCarloPoints
 from .scene import Scene
 from .scene.paths import flatten
@@ -152,9 +152,11 @@ def _accumulate(
 
     how: dict[str, Any] = {"stage": STAGE, "save": save_when_due, "keep": False}
     with saving(save):
-        _run_samples(chosen, points, sums, ranks, whole=raw is not None, style=style, **how)
+        seconds = _run_samples(
+            chosen, points, sums, ranks, whole=raw is not None, style=style, **how
+        )
         if not sums.complete:
-            _run_parts(chosen, points, sums, ranks, style=style, **how)
+            _run_parts(chosen, points, sums, ranks, seconds, style=style, **how)
     content = statistics_dataset(sums, attributes)
     with ranks.writing():
         dataset.write(content, output)
@@ -171,16 +173,16 @@ def _run_samples(
     whole: bool,
     style: Style,
     **how: Any,
-) -> None:
+) -> float:
     """Let ranks send samples: all of them if they are kept, else those of the first block, which decides the
-    histograms, and of blocks that an earlier run left with samples."""
+    histograms, and of blocks that an earlier run left with samples. Returns seconds of a rank for one; 0: none was made."""
     if whole:
         sums.forget_parts()
     left = sums.remaining()
     if not whole:
         left = left.begun(sums.edges is None)
     if len(left) == 0:
-        return
+        return 0.0
 
     def take(records: np.ndarray) -> None:
         numbered = records.astype(OUTCOME)
@@ -191,6 +193,8 @@ def _run_samples(
         KIND, payload_of(scene, points.page(0)), _Left(points, left),
         on_records=take, progress=Progress("samples", style), **how,
     )  # fmt: skip
+    busy = ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
+    return float(busy) / len(left)
 
 
 def _run_parts(
@@ -198,13 +202,14 @@ def _run_parts(
     points: MonteCarloPoints,
     sums: Accumulator,
     ranks: Ranks,
+    seconds: float,
     *,
     style: Style,
     **how: Any,
 ) -> None:
     """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
     left = int(sums.total - sums.taken)
-    parts = Parts(sums, part_length(left, ranks.size, sums.block))
+    parts = Parts(sums, part_length(left, ranks.size, sums.block, seconds))
 
     def take(records: np.ndarray) -> None:
         for record in records:

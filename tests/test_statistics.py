@@ -351,10 +351,14 @@ def test_a_rank_sums_up_what_it_simulates():
     assert same(sums.result(), whole.result())
 
 
-def test_parts_are_short_where_ranks_are_many():
-    assert part_length(10**9, 100, 4096) == 4096
-    assert part_length(10**6, 10000, 4096) == 32
-    assert part_length(10**6, 100, 4096) == 256
+def test_parts_are_short_where_ranks_are_many_or_samples_long():
+    assert part_length(10**9, 100, 4096, 1e-4) == 4096
+    assert part_length(10**6, 10000, 4096, 1e-4) == 32
+    assert part_length(10**6, 100, 4096, 1e-4) == 256
     for samples, ranks in ((10**7, 64), (12345, 3)):
-        length = part_length(samples, ranks, 4096)
+        length = part_length(samples, ranks, 4096, 1e-5)
         assert samples / length >= 32 * ranks or length == 32
+    # a rank that is killed loses no more than two seconds of a part, or what fills its lanes
+    assert part_length(10**9, 2, 4096, 3.3e-3) == 512
+    assert part_length(10**9, 2, 4096, 1.0) == 32
+    assert part_length(10**9, 2, 4096) == 256  # nobody knows yet
