@@ -63,7 +63,7 @@ def crank_acceleration(torque, par, inertia, force, phi, omega, time, i, W):
 
 
 @lane_function
-def nine_coordinates(effects, crank_rod, rod_slider, work, par, torque_table, load_table, i, W):
+def nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W):
     """Write accelerations of all nine coordinates, and gaps, forces and powers."""
     phi = work[(at.QS + PHI1) * W + i]
     omega = work[(at.VS + PHI1) * W + i]
@@ -114,8 +114,8 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, torque_table, lo
     pin = (rx - crank * c * omega * omega, ry - crank * s * omega * omega)
     g = gravity_of(effects.gravity, par, i, W)
     moment = par[at.CRANK_MOMENT * W + i]
-    load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
-    torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
+    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
     # on the crank about its bearing, from everything but the rod
     rest = moment * (s * rx - c * ry) - product(effects.gravity, moment * c, g)
     alpha1, drive, friction = bodies(

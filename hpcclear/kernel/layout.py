@@ -133,8 +133,10 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 33)
-WORK = INTEGRAL + RATES + 33
+    TORQUE_VALUE,  # of a tabulated drive torque at the stage
+    LOAD_VALUE,  # of a tabulated slider load
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 35)
+WORK = INTEGRAL + RATES + 35
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (

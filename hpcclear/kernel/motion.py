@@ -65,21 +65,21 @@ def gravity_of(gravity, par, i, W):
 
 
 @lane_function
-def load_of(load, load_table, par, table, angle, i, W):
+def load_of(load, load_table, work, par, i, W):
     """Force on the slider along +x in N."""
     if load is not None:
         return par[at.LOAD * W + i]
     elif load_table is not None:
-        return par[at.LOAD * W + i] * table_value(table, angle)
+        return par[at.LOAD * W + i] * work[at.LOAD_VALUE * W + i]
     else:
         return 0.0
 
 
 @lane_function
-def torque_of(torque_table, par, table, angle, i, W):
+def torque_of(torque_table, work, par, i, W):
     """Drive torque on the crank in N m."""
     if torque_table is not None:
-        return par[at.TORQUE * W + i] * table_value(table, angle)
+        return par[at.TORQUE * W + i] * work[at.TORQUE_VALUE * W + i]
     else:
         return par[at.TORQUE * W + i]
 
@@ -225,7 +225,7 @@ def drive_moment_of(torque, given, reaction):
 
 
 @lane_function
-def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
+def two_open(effects, work, par, phi, omega, i, W):
     """Both joints open: every body moves under forces alone."""
     cphi_s = sincos(phi)
     sphi, cphi = cphi_s[0], cphi_s[1]
@@ -276,9 +276,9 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
+    load = load_of(effects.load, effects.load_table, work, par, i, W)
     guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
-    torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
     crank_load = (
         crank * (sphi * fx1 - cphi * fy1)
         + mj1
@@ -309,7 +309,7 @@ def two_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
 
 
 @lane_function
-def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
+def crank_rod_open(effects, work, par, phi, omega, i, W):
     """O12 open, O23 ideal: coordinates rod angle and slider x, coupled by the rod's mass."""
     s_c = sincos(phi)
     sphi, cphi = s_c[0], s_c[1]
@@ -339,8 +339,8 @@ def crank_rod_open(effects, work, par, torque_table, load_table, phi, omega, i, 
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
-    torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
+    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
     m2 = par[at.ROD_MASS * W + i]
     m3 = par[at.SLIDER_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
@@ -419,7 +419,7 @@ def sliding_pair(guide, par, a11, a12, a22, b1, b2, moment, st, ct, spin, v3, we
 
 
 @lane_function
-def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i, W):
+def rod_slider_open(effects, work, par, phi, omega, i, W):
     """O12 ideal, O23 open: coordinates rod angle, slider x (and the crank angle, coupled by the rod's mass)."""
     s_c = sincos(phi)
     sphi, cphi = s_c[0], s_c[1]
@@ -449,8 +449,8 @@ def rod_slider_open(effects, work, par, torque_table, load_table, phi, omega, i,
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
-    torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
+    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
     guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
     m2 = par[at.ROD_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near
@@ -506,7 +506,7 @@ def crank_pair(torque, a11, a13, a33, b1, b3):
 
 
 @lane_function
-def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
+def both_ideal(effects, work, par, phi, omega, i, W):
     """Both joints ideal under a torque: one coordinate, the crank angle."""
     s_c = sincos(phi)
     sphi, cphi = s_c[0], s_c[1]
@@ -527,8 +527,8 @@ def both_ideal(effects, work, par, torque_table, load_table, phi, omega, i, W):
     y2 = -far * ct * k
     dy2 = far * (st * k * k - ct * dk)
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, load_table, phi, i, W)
-    torque = torque_of(effects.torque_table, par, torque_table, phi, i, W)
+    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
     v3 = x3 * omega
     inertia = (
         par[at.CRANK_INERTIA * W + i]
