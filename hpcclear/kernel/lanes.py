@@ -31,8 +31,8 @@ from .lifecycle import (
     STATE,
     TRANSIENT,
 )
-from .lobatto import STAGES, new_memory
-from .memory import MEMORY
+from . import lobatto, radau
+from .lobatto import STAGES
 from .stepper import make_stepper
 from .tableau import Tableau
 
@@ -134,9 +134,9 @@ class Lanes:
         self._par = np.ones(at.PARAMETERS * width)  # ones: a resting lane divides by them
         self._book = np.zeros(at.BOOK * width)
         # absent, it keeps the implicit method from being compiled
-        self._memory = None if problem.implicit == "never" else np.zeros((width, MEMORY))
+        self._memory = None if problem.implicit == "never" else radau.new_memory(width)
         if problem.collocation:
-            self._memory = new_memory()
+            self._memory = lobatto.new_memory()
         self._effects = problem.effects._replace(sliding=None if self._memory is None else 1)
         self._tables = [
             _NO_TABLE if t is None else t for t in (problem.torque_table, problem.load_table)

@@ -1,14 +1,30 @@
-"""What the implicit method remembers of a lane from step to step, and its scratch: one row of numbers a lane.
+"""What the implicit method remembers of a lane from step to step, and its scratch: one flat row of numbers a lane.
 
-It starts with rows like those of `work` with one lane, followed by the lane's parameters, so that the functions that
-run on lanes run on it too.
+It starts with two banks of rows of eight, each laid out like `work` with eight lanes and followed by the lane's parameters, so
+that the functions that run on lanes run on them too. In the first the stages of a step stand side by side, in the second
+the displaced states that the Jacobian's differences are taken from: eight evaluations take no longer than one.
 """
 
 from . import layout as at
 
+LANES = 8
 _N = at.MAX_COORDINATES
-PAR = at.WORK
+PAR = at.WORK  # row of the first parameter in a bank
+SECOND = PAR + at.PARAMETERS  # row where the second bank starts
+NODE = 2 * SECOND  # row: where the stages stand in the step; the last one from END on
+MATRIX = NODE + 1  # rows: coefficients of the velocities' increments in the stages of the coordinates
+UNIT = MATRIX + 3  # rows: the same in the stages of the velocities
+MARK = UNIT + 3  # rows: the unit matrix
+INCREMENT = MARK + LANES  # row: the increments of the Jacobian's differences
+KINKS_A_JOINT = 4
+KINKS = INCREMENT + 1  # rows: kink functions, joint by joint, lane by lane the stages
+COLUMNS = 3 * LANES  # of the Jacobian: by coordinates, then by velocities; the rest is not used
+JACOBIAN = (KINKS + 2 * KINKS_A_JOINT) * LANES  # d a_r by the k-th of them at r COLUMNS + k
+SCALARS = JACOBIAN + _N * COLUMNS
+MIDDLE, END = 1, 2  # lanes of the second stage and of the last, which stands at the end of the step, as do those after it
 (
+    TIME,  # s, since the start of the revolution
+    STEP,  # s
     POLYNOMIAL_STEP,  # s, of the step whose stages are kept; 0 when there are none
     TRIED_ERROR,  # of the step last tried
     ACCEPTED_STEP,  # s, of the step last accepted, for the predictive control
@@ -20,23 +36,22 @@ PAR = at.WORK
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
     KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
     TOLERANCE,  # relative, of a step's error
-) = range(PAR + at.PARAMETERS, PAR + at.PARAMETERS + 11)
-Z = PAR + at.PARAMETERS + 11  # increments of the velocities at the stages, stage by stage
+) = range(SCALARS, SCALARS + 13)
+Q = SCALARS + 13  # coordinates at the start of the step
+V = Q + _N
+Z = V + _N  # increments of the velocities at the stages, stage by stage
 TRANSFORMED = Z + 3 * _N  # the same, decoupled
-FORCE = TRANSFORMED + 3 * _N  # accelerations at the stages
-CHANGE = FORCE + 3 * _N
+CHANGE = TRANSFORMED + 3 * _N
 START = CHANGE + 3 * _N  # accelerations at the start of the step
-START_RATES = START + _N
-STAGE_RATES = START_RATES + at.RATES
-SCALE = STAGE_RATES + 3 * at.RATES  # tolerances of coordinates, then velocities
+SHIFTED = START + _N  # accelerations at a start that the error estimate has moved, and the moves of its velocities
+BASE = SHIFTED + 2 * _N  # accelerations at the state that the Jacobian holds for
+SCALE = BASE + _N  # tolerances of coordinates, then velocities
 LEAST = SCALE + 2 * _N  # sizes at which absolute and relative tolerance weigh the same, likewise
-BY_Q = LEAST + 2 * _N  # Jacobian
-BY_V = BY_Q + _N * _N
-REAL = BY_V + _N * _N  # factors of the real system, then of the complex one
+REAL = LEAST + 2 * _N  # factors of the real system, then of the complex one
 COMPLEX_RE = REAL + _N * _N
 COMPLEX_IM = COMPLEX_RE + _N * _N
 PIVOT = COMPLEX_IM + _N * _N
 COMPLEX_PIVOT = PIVOT + _N
-KINKS_A_JOINT = 4
-KINKS = COMPLEX_PIVOT + _N  # kink functions at the start and at the stages, joint by joint
-MEMORY = KINKS + 4 * 2 * KINKS_A_JOINT
+START_KINKS = COMPLEX_PIVOT + _N  # kink functions at the start of the step
+MEMORY = -(-(START_KINKS + 2 * KINKS_A_JOINT) // LANES) * LANES
+

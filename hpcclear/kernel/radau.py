@@ -7,19 +7,21 @@ q' = v allows:
 - for each eigenvalue mu/h of (h A)^-1 the linear system has n unknowns instead of 2 n, with the matrix
   ``mu/h - da/dv - (h/mu) da/dq``.
 
-The lane's numbers are in `m`, a row as laid out in `memory`; `size` is a tuple whose length is the number n of
-coordinates, known to the compiler.
+The lane's numbers are in `m`, a row as laid out in `memory`: its three stages stand side by side in the first bank, and are
+evaluated together. `size` is a tuple whose length is the number n of coordinates, known to the compiler.
 """
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..jit import lane_function, scalar_function
 from . import layout as at
 from . import memory as mem
 from .dense import factorise, factorise_complex, solve, solve_complex
-from .jacobian import evaluate_lane
+from .jacobian import evaluate_bank, fill
+from .memory import END, LANES
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -65,13 +67,28 @@ STEP_SAFETY = 0.9
 LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
 
+def new_memory(width: int) -> NDArray[np.float64]:
+    """Memory of `width` lanes, shape (width, mem.MEMORY), with the method's coefficients in it.
+
+    Lanes of a bank that no stage needs repeat the last one: what they hold must be a state like any other.
+    """
+    m = np.zeros((width, mem.MEMORY))
+    rows = m[:, : mem.JACOBIAN].reshape(width, -1, LANES)
+    stage = np.minimum(np.arange(LANES), END)
+    rows[:, mem.NODE] = NODES[stage]
+    rows[:, mem.MATRIX : mem.MATRIX + 3] = MATRIX[stage].T
+    rows[:, mem.UNIT : mem.UNIT + 3] = np.eye(3)[stage].T
+    rows[:, mem.MARK : mem.MARK + LANES] = np.eye(LANES)
+    return m
+
+
 @scalar_function
 def start_of_step(n, m):
-    """The start of the step as a stage."""
-    m[at.STAGE_TIME] = m[at.TIME]
+    """The start of the step as a stage, in every lane."""
+    fill(m, at.STAGE_TIME, m[mem.TIME])
     for k in range(n):
-        m[at.QS + k] = m[at.Q + k]
-        m[at.VS + k] = m[at.V + k]
+        fill(m, at.QS + k, m[mem.Q + k])
+        fill(m, at.VS + k, m[mem.V + k])
 
 
 @scalar_function
@@ -83,11 +100,11 @@ def factorise_both(size, m, h):
         for c in range(n):
             j = r * n + c
             unit = 1.0 / h if r == c else 0.0
-            m[mem.REAL + j] = MU * unit - m[mem.BY_V + j] - (h / MU) * m[mem.BY_Q + j]
-            m[mem.COMPLEX_RE + j] = (
-                MU_RE * unit - m[mem.BY_V + j] - (h * MU_RE / square) * m[mem.BY_Q + j]
-            )
-            m[mem.COMPLEX_IM + j] = MU_IM * unit + (h * MU_IM / square) * m[mem.BY_Q + j]
+            by_q = m[mem.JACOBIAN + r * mem.COLUMNS + c]
+            by_v = m[mem.JACOBIAN + r * mem.COLUMNS + n + c]
+            m[mem.REAL + j] = MU * unit - by_v - (h / MU) * by_q
+            m[mem.COMPLEX_RE + j] = MU_RE * unit - by_v - (h * MU_RE / square) * by_q
+            m[mem.COMPLEX_IM + j] = MU_IM * unit + (h * MU_IM / square) * by_q
     m[mem.FACTORED_STEP] = h
     real = factorise(size, m, mem.REAL, mem.PIVOT)
     return factorise_complex(size, m, mem.COMPLEX_RE, mem.COMPLEX_IM, mem.COMPLEX_PIVOT) and real
@@ -120,30 +137,63 @@ def guess_stages(size, m, h, accepted):
             m[mem.TRANSFORMED + s * n + k] = total
 
 
-@scalar_function
-def set_stage(n, m, h, s):
-    """Coordinates and velocities of stage s from the increments of the velocities."""
-    m[at.STAGE_TIME] = m[at.TIME] + NODES[s] * h
-    for k in range(n):
-        sum_z = 0.0
-        for j in range(3):
-            sum_z += MATRIX[s, j] * m[mem.Z + j * n + k]
-        v = m[at.V + k]
-        m[at.VS + k] = v + m[mem.Z + s * n + k]
-        m[at.QS + k] = m[at.Q + k] + h * (NODES[s] * v + sum_z)
+@lane_function
+def start_and_increments(k, n, m):
+    """Coordinate k and its velocity at the start of the step, and the velocity's increments at the stages."""
+    if k < n:
+        z = mem.Z + k
+        return m[mem.Q + k], m[mem.V + k], m[z], m[z + n], m[z + 2 * n]
+    else:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@lane_function
+def weighted(m, row, c, i):
+    """Sum of a coordinate's increments with the weights that three rows give them in lane i."""
+    total = m[row * LANES + i] * c[2]
+    total += m[(row + 1) * LANES + i] * c[3]
+    total += m[(row + 2) * LANES + i] * c[4]
+    return total
+
+
+@lane_function
+def stage_of(k, n, m, c, h, i):
+    """Coordinate k and its velocity at stage i."""
+    if k < n:
+        m[(at.VS + k) * LANES + i] = c[1] + weighted(m, mem.UNIT, c, i)
+        change = m[mem.NODE * LANES + i] * c[1] + weighted(m, mem.MATRIX, c, i)
+        m[(at.QS + k) * LANES + i] = c[0] + h * change
 
 
 @scalar_function
-def evaluate_stages(effects, size, m, p, torque_table, load_table, h):
-    """Accelerations and rates at the three stages."""
+def evaluate_stages(effects, size, m, torque_table, load_table, h):
+    """Coordinates and velocities of the stages from the increments of the velocities; accelerations and rates there.
+
+    All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
+    """
     n = len(size)
-    for s in range(3):
-        set_stage(n, m, h, s)
-        evaluate_lane(effects, m, p, torque_table, load_table)
-        for k in range(n):
-            m[mem.FORCE + s * n + k] = m[at.ACC + k]
-        for r in range(at.RATES):
-            m[mem.STAGE_RATES + s * at.RATES + r] = m[at.RATE_NOW + r]
+    t = m[mem.TIME]
+    c0 = start_and_increments(0, n, m)
+    c1 = start_and_increments(1, n, m)
+    c2 = start_and_increments(2, n, m)
+    c3 = start_and_increments(3, n, m)
+    c4 = start_and_increments(4, n, m)
+    c5 = start_and_increments(5, n, m)
+    c6 = start_and_increments(6, n, m)
+    c7 = start_and_increments(7, n, m)
+    c8 = start_and_increments(8, n, m)
+    for i in range(LANES):
+        m[at.STAGE_TIME * LANES + i] = t + m[mem.NODE * LANES + i] * h
+        stage_of(0, n, m, c0, h, i)
+        stage_of(1, n, m, c1, h, i)
+        stage_of(2, n, m, c2, h, i)
+        stage_of(3, n, m, c3, h, i)
+        stage_of(4, n, m, c4, h, i)
+        stage_of(5, n, m, c5, h, i)
+        stage_of(6, n, m, c6, h, i)
+        stage_of(7, n, m, c7, h, i)
+        stage_of(8, n, m, c8, h, i)
+    evaluate_bank(effects, m, torque_table, load_table)
 
 
 @scalar_function
@@ -152,7 +202,8 @@ def correct(size, m, h):
     n = len(size)
     lam, re, im = MU / h, MU_RE / h, MU_IM / h
     for k in range(n):
-        f0, f1, f2 = m[mem.FORCE + k], m[mem.FORCE + n + k], m[mem.FORCE + 2 * n + k]
+        row = (at.ACC + k) * LANES
+        f0, f1, f2 = m[row], m[row + 1], m[row + 2]
         w0, w1, w2 = (
             m[mem.TRANSFORMED + k],
             m[mem.TRANSFORMED + n + k],
@@ -194,7 +245,7 @@ def correct(size, m, h):
 
 
 @scalar_function
-def newton(effects, size, m, p, torque_table, load_table, h, known):
+def newton(effects, size, m, torque_table, load_table, h, known):
     """Solve for the stages. Returns how many iterations it took, negative if it did not converge.
 
     `known`: the stages of the first guess have been evaluated already.
@@ -204,7 +255,7 @@ def newton(effects, size, m, p, torque_table, load_table, h, known):
     m[mem.RATE] = 0.0
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0 or not known:
-            evaluate_stages(effects, size, m, p, torque_table, load_table, h)
+            evaluate_stages(effects, size, m, torque_table, load_table, h)
         change = correct(size, m, h)
         if iteration > 0:
             rate = change / before
@@ -228,7 +279,7 @@ def newton(effects, size, m, p, torque_table, load_table, h, known):
 def filtered_error(size, m, h):
     """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in mem.CHANGE (v, then q).
 
-    Reads the accelerations at the start and shifts of the velocities there from mem.FORCE on. Returns the sum of the
+    Reads the accelerations at the start and shifts of the velocities there from mem.SHIFTED on. Returns the sum of the
     scaled squares.
     """
     n = len(size)
@@ -238,12 +289,12 @@ def filtered_error(size, m, h):
         for j in range(3):
             sum_q += ERROR_BY_MATRIX[j] * m[mem.Z + j * n + k]
             sum_v += ERROR_WEIGHTS[j] * m[mem.Z + j * n + k]
-        m[mem.CHANGE + n + k] = m[mem.FORCE + n + k] + sum_q
-        m[mem.CHANGE + k] = m[mem.FORCE + k] + sum_v / h
+        m[mem.CHANGE + n + k] = m[mem.SHIFTED + n + k] + sum_q
+        m[mem.CHANGE + k] = m[mem.SHIFTED + k] + sum_v / h
     for r in range(n):
         total = 0.0
         for k in range(n):
-            total += m[mem.BY_Q + r * n + k] * m[mem.CHANGE + n + k]
+            total += m[mem.JACOBIAN + r * mem.COLUMNS + k] * m[mem.CHANGE + n + k]
         m[mem.CHANGE + r] += h / MU * total
     solve(size, m, mem.REAL, mem.PIVOT, mem.CHANGE)
     total = 0.0
@@ -256,17 +307,17 @@ def filtered_error(size, m, h):
 
 
 @scalar_function
-def refilter_error(effects, size, m, p, torque_table, load_table, h):
+def refilter_error(effects, size, m, torque_table, load_table, h):
     """The estimate once more, from the start moved by the estimate: for a first try that looked too inaccurate."""
     n = len(size)
-    m[at.STAGE_TIME] = m[at.TIME]
+    fill(m, at.STAGE_TIME, m[mem.TIME])
     for k in range(n):
-        m[at.VS + k] = m[at.V + k] + m[mem.CHANGE + k]
-        m[at.QS + k] = m[at.Q + k] + m[mem.CHANGE + n + k]
-    evaluate_lane(effects, m, p, torque_table, load_table)
+        fill(m, at.VS + k, m[mem.V + k] + m[mem.CHANGE + k])
+        fill(m, at.QS + k, m[mem.Q + k] + m[mem.CHANGE + n + k])
+    evaluate_bank(effects, m, torque_table, load_table)
     for k in range(n):
-        m[mem.FORCE + k] = m[at.ACC + k]
-        m[mem.FORCE + n + k] = m[mem.CHANGE + k]
+        m[mem.SHIFTED + k] = m[(at.ACC + k) * LANES + END]
+        m[mem.SHIFTED + n + k] = m[mem.CHANGE + k]
     return filtered_error(size, m, h)
 
 
@@ -277,11 +328,12 @@ def gap_of_step(flag, m, work, gap, clearance, rtol, lane, W):
         error = work[(at.RATE_OLD + gap) * W + lane]
         total = 0.0
         for s in range(3):
-            d = m[mem.STAGE_RATES + s * at.RATES + gap]
+            d = m[(at.RATE_NOW + gap) * LANES + s]
             total += MATRIX[2, s] * d
             error += ERROR_BY_MATRIX[s] * d
         work[(at.RATE_SUM + gap) * W + lane] = total
-        error *= m[at.STEP] / MU / (rtol * m[mem.PAR + clearance] * m[mem.PAR + at.PERIOD])
+        span = m[(mem.PAR + clearance) * LANES] * m[(mem.PAR + at.PERIOD) * LANES]
+        error *= m[mem.STEP] / MU / (rtol * span)
         return error * error
     else:
         return 0.0
@@ -292,7 +344,7 @@ def rate_of_step(m, work, rate, lane, W):
     """Mean of a rate over the step."""
     total = 0.0
     for s in range(3):
-        total += MATRIX[2, s] * m[mem.STAGE_RATES + s * at.RATES + rate]
+        total += MATRIX[2, s] * m[(at.RATE_NOW + rate) * LANES + s]
     work[(at.RATE_SUM + rate) * W + lane] = total
 
 

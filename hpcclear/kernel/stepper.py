@@ -155,7 +155,7 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
 
     Its arguments: effects (`layout.Effects`), number of stages, packed tableau, settings,
     work, stages (stages n W), par, book, drive and load tables, the queue (parameters, states), out,
-    finished, counters, record (array or None), memory of the implicit method (lanes, MEMORY; None switches it off)
+    finished, counters, record (array or None), memory of the implicit method (see `radau.new_memory`; None switches it off)
     and budget: how many block steps to take at most.
     It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
     vector length.

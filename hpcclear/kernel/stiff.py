@@ -12,9 +12,10 @@ from . import layout as at
 from . import memory as mem
 from .combine import group_of
 from .control import count_up
-from .jacobian import difference_jacobian, evaluate_lane
+from .jacobian import difference_jacobian, evaluate_bank, fill
 from .kinks import LEAST_CUT, kink_fraction, kinks_of_start
 from .lifecycle import ATOL, IMPLICIT, RTOL
+from .memory import END, LANES
 from .radau import (
     evaluate_stages,
     factorise_both,
@@ -25,7 +26,6 @@ from .radau import (
     next_step,
     rates_of_step,
     refilter_error,
-    set_stage,
     start_of_step,
 )
 
@@ -66,15 +66,16 @@ def implicit_tolerance(m, settings):
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
     and every step would begin off the slow motion and end at a kink. Looser than this is dearer.
     """
-    first, second = mem.PAR + at.JOINT_12, mem.PAR + at.JOINT_23
-    steepest = max(m[first + at.INVERSE_RAMP], m[second + at.INVERSE_RAMP])
+    first = m[(mem.PAR + at.JOINT_12 + at.INVERSE_RAMP) * LANES]
+    second = m[(mem.PAR + at.JOINT_23 + at.INVERSE_RAMP) * LANES]
     slope = max(
-        m[first + at.FRICTION] * m[first + at.INVERSE_RAMP],
-        m[second + at.FRICTION] * m[second + at.INVERSE_RAMP],
+        m[(mem.PAR + at.JOINT_12 + at.FRICTION) * LANES] * first,
+        m[(mem.PAR + at.JOINT_23 + at.FRICTION) * LANES] * second,
     )
-    speed = m[mem.PAR + at.SPEED] * m[mem.PAR + at.CRANK_LENGTH]
-    within = ERROR_IN_RAMP / (max(steepest, 1e-300) * (1.0 + speed))
-    return min(loosened(settings[RTOL], m[mem.PAR + at.STRICTNESS], slope >= STEEP), within)
+    speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
+    within = ERROR_IN_RAMP / (max(first, second, 1e-300) * (1.0 + speed))
+    strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
+    return min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
 
 
 @scalar_function
@@ -82,7 +83,8 @@ def take_over(size, lane, W, work, par, m, settings):
     """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
     n = len(size)
     for k in range(at.PARAMETERS):
-        m[mem.PAR + k] = par[k * W + lane]
+        fill(m, mem.PAR + k, par[k * W + lane])
+        fill(m, mem.SECOND + mem.PAR + k, par[k * W + lane])
     for k in range(n):
         m[mem.LEAST + k] = settings[ATOL + k] / settings[RTOL]
         m[mem.LEAST + n + k] = settings[ATOL + at.MAX_COORDINATES + k] / settings[RTOL]
@@ -98,42 +100,37 @@ def take_over(size, lane, W, work, par, m, settings):
 
 
 @scalar_function
-def fetch(effects, size, lane, W, work, stages, m, p, torque_table, load_table, settings, follows):
+def fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows):
     """Bring the start of the step into the lane's memory; `follows`: it is where the lane's last implicit step ended."""
     n = len(size)
-    for row in (
-        at.TIME,
-        at.STEP,
-        at.ACTIVE_12,
-        at.ACTIVE_23,
-        at.INVERSE_IMPACT_12,
-        at.INVERSE_IMPACT_23,
-    ):
-        m[row] = work[row * W + lane]
+    m[mem.TIME] = work[at.TIME * W + lane]
+    m[mem.STEP] = work[at.STEP * W + lane]
+    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+        fill(m, row, work[row * W + lane])
+        fill(m, mem.SECOND + row, work[row * W + lane])
     for k in range(n):
-        m[at.Q + k] = work[(at.Q + k) * W + lane]
-        m[at.V + k] = work[(at.V + k) * W + lane]
+        m[mem.Q + k] = work[(at.Q + k) * W + lane]
+        m[mem.V + k] = work[(at.V + k) * W + lane]
     fresh = work[at.FRESH * W + lane] == 1.0
     unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if unknown:
         start_of_step(n, m)
-        evaluate_lane(effects, m, p, torque_table, load_table)
+        evaluate_bank(effects, m, torque_table, load_table)
         work[at.EVALUATIONS * W + lane] += 1.0
     if fresh:
         m[mem.NEW_JACOBIAN] = 0.0
         for k in range(n):
-            stages[k * W + lane] = m[at.ACC + k]
+            stages[k * W + lane] = m[(at.ACC + k) * LANES + END]
         for r in range(at.RATES):
-            work[(at.RATE_OLD + r) * W + lane] = m[at.RATE_NOW + r]
+            work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
         work[at.FRESH * W + lane] = 0.0
-    if unknown or follows:
-        for r in range(at.RATES):
-            m[mem.START_RATES + r] = m[at.RATE_NOW + r]
+    if (unknown or follows) and kinks_of_start(effects, m):
+        m[mem.RATE] = 1.0
     rtol = m[mem.TOLERANCE]
     for k in range(n):
         m[mem.START + k] = stages[k * W + lane]
-        m[mem.SCALE + k] = rtol * (m[mem.LEAST + k] + abs(m[at.Q + k]))
-        m[mem.SCALE + n + k] = rtol * (m[mem.LEAST + n + k] + abs(m[at.V + k]))
+        m[mem.SCALE + k] = rtol * (m[mem.LEAST + k] + abs(m[mem.Q + k]))
+        m[mem.SCALE + n + k] = rtol * (m[mem.LEAST + n + k] + abs(m[mem.V + k]))
 
 
 @scalar_function
@@ -147,54 +144,43 @@ def norm_of_jacobian(size, m):
         row_v = 0.0
         for k in range(n):
             unit = m[mem.LEAST + n + k] / m[mem.LEAST + n + r]
-            row_q += abs(m[mem.BY_Q + r * n + k]) * unit
-            row_v += abs(m[mem.BY_V + r * n + k]) * unit
+            row_q += abs(m[mem.JACOBIAN + r * mem.COLUMNS + k]) * unit
+            row_v += abs(m[mem.JACOBIAN + r * mem.COLUMNS + n + k]) * unit
         by_q = max(by_q, row_q)
         by_v = max(by_v, row_v)
     return by_v + math.sqrt(by_q)
 
 
 @scalar_function
-def cut_at_kink(effects, size, lane, W, work, m, p, torque_table, load_table):
-    """Evaluate the guessed stages, and cut the step if they show a kink. Returns whether they stand as evaluated."""
-    h = m[at.STEP]
-    evaluate_stages(effects, size, m, p, torque_table, load_table, h)
+def cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table):
+    """Evaluate the guessed stages, and cut the step if they show a kink."""
+    h = m[mem.STEP]
+    evaluate_stages(effects, size, m, torque_table, load_table, h)
     work[at.EVALUATIONS * W + lane] += 3.0
     fraction = kink_fraction(effects, m)
-    if fraction >= 1.0:
-        return True
-    m[mem.POLYNOMIAL_STEP] = h
-    h *= max(fraction, LEAST_CUT)
-    m[at.STEP] = h
-    work[at.STEP * W + lane] = h
-    work[at.ENDING * W + lane] = 0.0
-    guess_stages(size, m, h, False)
-    return False
+    if fraction < 1.0:
+        m[mem.POLYNOMIAL_STEP] = h
+        h *= max(fraction, LEAST_CUT)
+        m[mem.STEP] = h
+        work[at.STEP * W + lane] = h
+        work[at.ENDING * W + lane] = 0.0
+        guess_stages(size, m, h, False)
+        evaluate_stages(effects, size, m, torque_table, load_table, h)
+        work[at.EVALUATIONS * W + lane] += 3.0
 
 
 @scalar_function
-def new_jacobian(effects, size, m, p, torque_table, load_table, known):
-    """Jacobian at the second guessed stage, or at the start where there is no guess. Returns the evaluations spent."""
+def new_jacobian(effects, size, m, torque_table, load_table, guessed):
+    """Jacobian at the second guessed stage, or at the start where there is no guess."""
     n = len(size)
-    evaluations = 2.0 * n
-    base = mem.START
-    if m[mem.POLYNOMIAL_STEP] > 0.0:
-        set_stage(n, m, m[at.STEP], 1)
-        base = mem.FORCE + n
-        if not known:
-            evaluate_lane(effects, m, p, torque_table, load_table)
-            for k in range(n):
-                m[base + k] = m[at.ACC + k]
-            evaluations += 1.0
-    else:
+    if not guessed:
         start_of_step(n, m)
-    difference_jacobian(
-        effects, size, m, p, torque_table, load_table, base, mem.LEAST, mem.BY_Q, mem.BY_V
-    )
+    for k in range(n):
+        m[mem.BASE + k] = m[(at.ACC + k) * LANES + mem.MIDDLE] if guessed else m[mem.START + k]
+    difference_jacobian(effects, size, m, torque_table, load_table)
     m[mem.NORM] = norm_of_jacobian(size, m)
     m[mem.NEW_JACOBIAN] = 1.0
     m[mem.FACTORED_STEP] = 0.0
-    return evaluations
 
 
 @scalar_function
@@ -209,34 +195,31 @@ def implicit_step(
 ):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
-    p = m[mem.PAR : mem.PAR + at.PARAMETERS]
     follows = work[at.ACCEPT * W + lane] == 1.0
     if work[at.STIFF_STEPS_HERE * W + lane] == 0.0:
         take_over(size, lane, W, work, par, m, settings)
     elif follows:
-        m[mem.ACCEPTED_STEP] = m[at.STEP]
+        m[mem.ACCEPTED_STEP] = m[mem.STEP]
         m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
         m[mem.NEW_JACOBIAN] = 0.0
-    fetch(effects, size, lane, W, work, stages, m, p, torque_table, load_table, settings, follows)
+    fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
-    if kinks_of_start(effects, m):
-        m[mem.RATE] = 1.0
-    guess_stages(size, m, m[at.STEP], follows)
-    known = False
-    if m[mem.POLYNOMIAL_STEP] > 0.0:
-        known = cut_at_kink(effects, size, lane, W, work, m, p, torque_table, load_table)
+    guess_stages(size, m, m[mem.STEP], follows)
+    guessed = m[mem.POLYNOMIAL_STEP] > 0.0
+    if guessed:
+        cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table)
     if m[mem.RATE] > CHEAP_CONTRACTION and m[mem.NEW_JACOBIAN] == 0.0:
-        spent = new_jacobian(effects, size, m, p, torque_table, load_table, known)
-        work[at.EVALUATIONS * W + lane] += spent
-    h = m[at.STEP]
+        new_jacobian(effects, size, m, torque_table, load_table, guessed)
+        work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
+    h = m[mem.STEP]
     regular = True
     if m[mem.FACTORED_STEP] != h:
         regular = factorise_both(size, m, h)
     iterations = -1
     if regular:
-        iterations = newton(effects, size, m, p, torque_table, load_table, h, known)
-        evaluated = abs(iterations) - 1 if known else abs(iterations)
+        iterations = newton(effects, size, m, torque_table, load_table, h, guessed)
+        evaluated = abs(iterations) - 1 if guessed else abs(iterations)
         work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
     if iterations < 0:
         m[mem.POLYNOMIAL_STEP] = 0.0
@@ -254,18 +237,18 @@ def implicit_step(
     else:
         m[mem.POLYNOMIAL_STEP] = h
         m[mem.KINK_CUTS] = 0.0
-        judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings, iterations)
+        judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
 
 
 @scalar_function
-def judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings, iterations):
+def judge(effects, size, lane, W, work, m, torque_table, load_table, iterations):
     """Error of a converged step, its integrals, its end and the step to try next."""
     n = len(size)
-    h = m[at.STEP]
+    h = m[mem.STEP]
     rtol = m[mem.TOLERANCE]
     for k in range(n):
-        m[mem.FORCE + k] = m[mem.START + k]
-        m[mem.FORCE + n + k] = 0.0
+        m[mem.SHIFTED + k] = m[mem.START + k]
+        m[mem.SHIFTED + n + k] = 0.0
     total = filtered_error(size, m, h)
     gaps = gap_of_step(
         effects.crank_rod, m, work, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, lane, W
@@ -276,12 +259,11 @@ def judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings
     rates_of_step(effects.ledger, effects.responses, m, work, lane, W)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
     if total + gaps > 2.0 * n and uneasy:
-        total = refilter_error(effects, size, m, p, torque_table, load_table, h)
+        total = refilter_error(effects, size, m, torque_table, load_table, h)
         work[at.EVALUATIONS * W + lane] += 1.0
     mean = (total + gaps) * (0.5 / n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
-    set_stage(n, m, h, 2)
-    evaluate_lane(effects, m, p, torque_table, load_table)
+    evaluate_stages(effects, size, m, torque_table, load_table, h)
     work[at.EVALUATIONS * W + lane] += 1.0
     leave(size, lane, W, work, m)
     work[at.ERROR * W + lane] = mean
@@ -291,7 +273,7 @@ def judge(effects, size, lane, W, work, m, p, torque_table, load_table, settings
 @scalar_function
 def propose(lane, W, work, m, iterations):
     """The step to try next, and whether the explicit method could have taken this one."""
-    h = m[at.STEP]
+    h = m[mem.STEP]
     proposal = next_step(m, h, m[mem.TRIED_ERROR], iterations)
     if m[mem.TRIED_ERROR] <= 1.0:
         if work[at.REJECTED * W + lane] == 1.0:
@@ -310,11 +292,11 @@ def leave(size, lane, W, work, m):
     """Put the end of the step where an explicit step would leave it."""
     n = len(size)
     for k in range(n):
-        work[(at.QS + k) * W + lane] = m[at.QS + k]
-        work[(at.VS + k) * W + lane] = m[at.VS + k]
-        work[(at.ACC + k) * W + lane] = m[at.ACC + k]
+        work[(at.QS + k) * W + lane] = m[(at.QS + k) * LANES + END]
+        work[(at.VS + k) * W + lane] = m[(at.VS + k) * LANES + END]
+        work[(at.ACC + k) * W + lane] = m[(at.ACC + k) * LANES + END]
     for r in range(at.RATES):
-        work[(at.RATE_NOW + r) * W + lane] = m[at.RATE_NOW + r]
+        work[(at.RATE_NOW + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
 
 
 # ---- what the block stepper calls ----------------------------------------------------------------
