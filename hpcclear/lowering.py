@@ -178,7 +178,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
     """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
 
     Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digits that either
-    knows. A tabulated curve keeps the stages from running side by side, and Baumgarte's nine coordinates from fitting;
+    knows. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
     where the motion may be stiff, implicit steps are called for.
 
     Raises

@@ -8,7 +8,7 @@ from ..jit import lane_function, scalar_function
 from . import layout as at
 from . import memory as mem
 from .bits import beyond
-from .memory import LANES
+from .memory import COORDINATES, LANES
 from .rhs import accelerations
 
 _RELATIVE = 1.5e-8  # square root of the round-off
@@ -31,9 +31,9 @@ def fill(m, row, value):
 
 
 @lane_function
-def increment(before, least):
+def increment(before, least, reach):
     """How far a number is displaced, exactly."""
-    return before + _RELATIVE * max(abs(before), least) - before
+    return before + min(_RELATIVE * max(abs(before), least), reach * least) - before
 
 
 @lane_function
@@ -42,7 +42,8 @@ def coordinate(k, n, m):
     if k < n:
         q = m[(at.QS + k) * LANES + mem.MIDDLE]
         v = m[(at.VS + k) * LANES + mem.MIDDLE]
-        return q, v, increment(q, m[mem.LEAST + k]), increment(v, m[mem.LEAST + n + k])
+        by_q = increment(q, m[mem.LEAST + k], m[mem.REACH])
+        return q, v, by_q, increment(v, m[mem.LEAST + n + k], m[mem.REACH])
     else:
         return 0.0, 0.0, 0.0, 0.0
 
@@ -76,26 +77,26 @@ def displace_all(n, m, first):
     All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
     """
     time = m[at.STAGE_TIME * LANES + mem.MIDDLE]
-    c0 = coordinate(0, n, m)
-    c1 = coordinate(1, n, m)
-    c2 = coordinate(2, n, m)
-    c3 = coordinate(3, n, m)
-    c4 = coordinate(4, n, m)
-    c5 = coordinate(5, n, m)
-    c6 = coordinate(6, n, m)
-    c7 = coordinate(7, n, m)
-    c8 = coordinate(8, n, m)
+    c0 = coordinate(COORDINATES[0], n, m)
+    c1 = coordinate(COORDINATES[1], n, m)
+    c2 = coordinate(COORDINATES[2], n, m)
+    c3 = coordinate(COORDINATES[3], n, m)
+    c4 = coordinate(COORDINATES[4], n, m)
+    c5 = coordinate(COORDINATES[5], n, m)
+    c6 = coordinate(COORDINATES[6], n, m)
+    c7 = coordinate(COORDINATES[7], n, m)
+    c8 = coordinate(COORDINATES[8], n, m)
     for i in range(LANES):
         m[(mem.SECOND + at.STAGE_TIME) * LANES + i] = time
-        by = displace(0, n, m, c0, first, i)
-        by += displace(1, n, m, c1, first, i)
-        by += displace(2, n, m, c2, first, i)
-        by += displace(3, n, m, c3, first, i)
-        by += displace(4, n, m, c4, first, i)
-        by += displace(5, n, m, c5, first, i)
-        by += displace(6, n, m, c6, first, i)
-        by += displace(7, n, m, c7, first, i)
-        by += displace(8, n, m, c8, first, i)
+        by = displace(COORDINATES[0], n, m, c0, first, i)
+        by += displace(COORDINATES[1], n, m, c1, first, i)
+        by += displace(COORDINATES[2], n, m, c2, first, i)
+        by += displace(COORDINATES[3], n, m, c3, first, i)
+        by += displace(COORDINATES[4], n, m, c4, first, i)
+        by += displace(COORDINATES[5], n, m, c5, first, i)
+        by += displace(COORDINATES[6], n, m, c6, first, i)
+        by += displace(COORDINATES[7], n, m, c7, first, i)
+        by += displace(COORDINATES[8], n, m, c8, first, i)
         m[mem.INCREMENT * LANES + i] = by
 
 
@@ -119,26 +120,26 @@ def difference(r, n, m, a, inverse, first, i):
 @lane_function
 def take_differences(n, m, first):
     """Columns of the Jacobian from `first` on, as many as there are lanes."""
-    a0 = base(0, n, m)
-    a1 = base(1, n, m)
-    a2 = base(2, n, m)
-    a3 = base(3, n, m)
-    a4 = base(4, n, m)
-    a5 = base(5, n, m)
-    a6 = base(6, n, m)
-    a7 = base(7, n, m)
-    a8 = base(8, n, m)
+    a0 = base(COORDINATES[0], n, m)
+    a1 = base(COORDINATES[1], n, m)
+    a2 = base(COORDINATES[2], n, m)
+    a3 = base(COORDINATES[3], n, m)
+    a4 = base(COORDINATES[4], n, m)
+    a5 = base(COORDINATES[5], n, m)
+    a6 = base(COORDINATES[6], n, m)
+    a7 = base(COORDINATES[7], n, m)
+    a8 = base(COORDINATES[8], n, m)
     for i in range(LANES):
         inverse = 1.0 / m[mem.INCREMENT * LANES + i]
-        difference(0, n, m, a0, inverse, first, i)
-        difference(1, n, m, a1, inverse, first, i)
-        difference(2, n, m, a2, inverse, first, i)
-        difference(3, n, m, a3, inverse, first, i)
-        difference(4, n, m, a4, inverse, first, i)
-        difference(5, n, m, a5, inverse, first, i)
-        difference(6, n, m, a6, inverse, first, i)
-        difference(7, n, m, a7, inverse, first, i)
-        difference(8, n, m, a8, inverse, first, i)
+        difference(COORDINATES[0], n, m, a0, inverse, first, i)
+        difference(COORDINATES[1], n, m, a1, inverse, first, i)
+        difference(COORDINATES[2], n, m, a2, inverse, first, i)
+        difference(COORDINATES[3], n, m, a3, inverse, first, i)
+        difference(COORDINATES[4], n, m, a4, inverse, first, i)
+        difference(COORDINATES[5], n, m, a5, inverse, first, i)
+        difference(COORDINATES[6], n, m, a6, inverse, first, i)
+        difference(COORDINATES[7], n, m, a7, inverse, first, i)
+        difference(COORDINATES[8], n, m, a8, inverse, first, i)
 
 
 @lane_function

@@ -14,6 +14,12 @@ from .radau import BASIS, NODES
 BEYOND = 1e-4
 """How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
 
+GUESSED_BEYOND = 0.03
+"""A guess shows a kink where a stage is so far beyond it; whether a nearer one is real the solution tells."""
+
+NEAR = 5e-4
+"""A kink this near the start of a step, in these units, is stepped over."""
+
 GAP_UNIT = 0.1
 """Of the clearance: the unit in which the gap, whose sign is a kink too, is of order 1."""
 
@@ -113,30 +119,33 @@ def kinks_of_start(effects, m):
 
 
 @scalar_function
-def kink_fraction(effects, m):
-    """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none."""
+def kink_fraction(effects, m, beyond):
+    """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none.
+
+    `beyond`: how far, in units of the kink's function, a stage must be for it to count.
+    """
     kink_functions(effects, m)
     first = 2.0
     for f in range(_BOTH):
         start = m[mem.START_KINKS + f]
         row = (mem.KINKS + f) * LANES
         if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
-            first = min(first, crossing(m, start, row))
+            first = min(first, crossing(m, start, row, beyond))
     return first
 
 
 @scalar_function
-def crossing(m, start, row):
+def crossing(m, start, row, beyond):
     """Where one function gets `BEYOND` its zero; 2 if it does not. `row`: where its values at the stages are."""
     sign = 1.0 if start > 0.0 else -1.0
-    if m[row + END] == 0.0:
+    if m[row + END] == 0.0 or abs(start) < NEAR:
         return 2.0
     low = 0.0
     for s in range(3):
         value = m[row + s]
-        if value == 0.0 or -BEYOND < value * sign < 0.0:
+        if value == 0.0:
             return 2.0
-        if value * sign < 0.0:
+        if value * sign < -beyond:
             return bisect(m, start, row, low, NODES[s], sign)
         low = NODES[s]
     return 2.0

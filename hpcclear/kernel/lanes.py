@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import layout as at
+from . import lobatto, radau
 from .collocation import make_collocation_stepper
 from .lifecycle import (
     ANGLE_TOLERANCE,
@@ -31,7 +32,6 @@ from .lifecycle import (
     STATE,
     TRANSIENT,
 )
-from . import lobatto, radau
 from .lobatto import STAGES
 from .stepper import make_stepper
 from .tableau import Tableau

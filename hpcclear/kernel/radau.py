@@ -21,7 +21,7 @@ from . import layout as at
 from . import memory as mem
 from .dense import factorise, factorise_complex, solve, solve_complex
 from .jacobian import evaluate_bank, fill
-from .memory import END, LANES
+from .memory import COORDINATES, END, LANES
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -62,7 +62,7 @@ BASIS = np.array(
 )
 
 MAX_ITERATIONS = 10
-NEWTON_TOLERANCE = 0.03  # of the tolerance on the step's error
+NEWTON_TOLERANCE = 0.005  # of the tolerance on the step's error: the energy balance closes no better than the iteration
 STEP_SAFETY = 0.9
 LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
@@ -111,19 +111,23 @@ def factorise_both(size, m, h):
 
 
 @scalar_function
-def guess_stages(size, m, h, accepted):
-    """First guess of the stages: the polynomial of the step before, or of the longer try from the same start."""
+def guess_stages(size, m, h):
+    """First guess of the stages: the polynomial of the step before, or of the longer try from the same start.
+
+    Without either, the velocities at the start.
+    """
     n = len(size)
     old = m[mem.POLYNOMIAL_STEP]
+    continues = m[mem.CONTINUES] == 1.0
     for s in range(3):
         for k in range(n):
             m[mem.CHANGE + s * n + k] = 0.0
         if old > 0.0:
             x = NODES[s] * h / old
-            x = 1.0 + x if accepted else x
+            x = 1.0 + x if continues else x
             for j in range(3):
                 weight = x * (BASIS[j, 0] + x * (BASIS[j, 1] + x * BASIS[j, 2]))
-                weight -= 1.0 if (accepted and j == 2) else 0.0
+                weight -= 1.0 if (continues and j == 2) else 0.0
                 for k in range(n):
                     m[mem.CHANGE + s * n + k] += weight * m[mem.Z + j * n + k]
     for s in range(3):
@@ -135,6 +139,25 @@ def guess_stages(size, m, h, accepted):
             for j in range(3):
                 total += T_INVERSE[s, j] * m[mem.Z + j * n + k]
             m[mem.TRANSFORMED + s * n + k] = total
+
+
+@scalar_function
+def guess_from_start(size, m, h):
+    """First guess of the stages: the accelerations at the start."""
+    n = len(size)
+    for s in range(3):
+        for k in range(n):
+            m[mem.Z + s * n + k] = NODES[s] * h * m[mem.START + k]
+    m[mem.POLYNOMIAL_STEP] = h
+    m[mem.CONTINUES] = 0.0
+    guess_stages(size, m, h)
+
+
+@scalar_function
+def copy_polynomial(size, m, source, target):
+    """Copy the increments at the stages."""
+    for j in range(3 * len(size)):
+        m[target + j] = m[source + j]
 
 
 @lane_function
@@ -173,26 +196,26 @@ def evaluate_stages(effects, size, m, torque_table, load_table, h):
     """
     n = len(size)
     t = m[mem.TIME]
-    c0 = start_and_increments(0, n, m)
-    c1 = start_and_increments(1, n, m)
-    c2 = start_and_increments(2, n, m)
-    c3 = start_and_increments(3, n, m)
-    c4 = start_and_increments(4, n, m)
-    c5 = start_and_increments(5, n, m)
-    c6 = start_and_increments(6, n, m)
-    c7 = start_and_increments(7, n, m)
-    c8 = start_and_increments(8, n, m)
+    c0 = start_and_increments(COORDINATES[0], n, m)
+    c1 = start_and_increments(COORDINATES[1], n, m)
+    c2 = start_and_increments(COORDINATES[2], n, m)
+    c3 = start_and_increments(COORDINATES[3], n, m)
+    c4 = start_and_increments(COORDINATES[4], n, m)
+    c5 = start_and_increments(COORDINATES[5], n, m)
+    c6 = start_and_increments(COORDINATES[6], n, m)
+    c7 = start_and_increments(COORDINATES[7], n, m)
+    c8 = start_and_increments(COORDINATES[8], n, m)
     for i in range(LANES):
         m[at.STAGE_TIME * LANES + i] = t + m[mem.NODE * LANES + i] * h
-        stage_of(0, n, m, c0, h, i)
-        stage_of(1, n, m, c1, h, i)
-        stage_of(2, n, m, c2, h, i)
-        stage_of(3, n, m, c3, h, i)
-        stage_of(4, n, m, c4, h, i)
-        stage_of(5, n, m, c5, h, i)
-        stage_of(6, n, m, c6, h, i)
-        stage_of(7, n, m, c7, h, i)
-        stage_of(8, n, m, c8, h, i)
+        stage_of(COORDINATES[0], n, m, c0, h, i)
+        stage_of(COORDINATES[1], n, m, c1, h, i)
+        stage_of(COORDINATES[2], n, m, c2, h, i)
+        stage_of(COORDINATES[3], n, m, c3, h, i)
+        stage_of(COORDINATES[4], n, m, c4, h, i)
+        stage_of(COORDINATES[5], n, m, c5, h, i)
+        stage_of(COORDINATES[6], n, m, c6, h, i)
+        stage_of(COORDINATES[7], n, m, c7, h, i)
+        stage_of(COORDINATES[8], n, m, c8, h, i)
     evaluate_bank(effects, m, torque_table, load_table)
 
 
@@ -259,7 +282,7 @@ def newton(effects, size, m, torque_table, load_table, h, known):
         change = correct(size, m, h)
         if iteration > 0:
             rate = change / before
-            m[mem.RATE] = max(m[mem.RATE], rate) if iteration > 1 else rate
+            m[mem.RATE] = max(m[mem.RATE], rate)
             if not rate < 0.99:
                 return -(iteration + 1)
             contraction = rate / (1.0 - rate)

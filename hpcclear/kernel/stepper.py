@@ -12,6 +12,7 @@ from numba import njit
 
 from ..jit import FASTMATH, lane_function
 from . import layout as at
+from .bits import borrowed
 from .combine import any_stage_state, step_error
 from .control import choose_step, commit, flag_gaps, judge_step
 from .lifecycle import (
@@ -38,7 +39,8 @@ from .lifecycle import (
 )
 from .record import record_step
 from .rhs import accelerations
-from .stiff import sense_stiffness, settle_methods, take_implicit_steps
+from .stiff import take_implicit_steps
+from .switching import sense_stiffness, settle_methods
 
 
 @lane_function
@@ -168,6 +170,12 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
         effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
         queue_par, queue_state, out, finished, counters, record, memory, budget,
     ):  # fmt: skip
+        # scalar functions would count references to what they are handed
+        settings, work, stages = borrowed(settings), borrowed(work), borrowed(stages)  # type: ignore[call-arg]
+        par, book, out, memory = borrowed(par), borrowed(book), borrowed(out), borrowed(memory)
+        torque_table, load_table = borrowed(torque_table), borrowed(load_table)
+        queue_par, queue_state = borrowed(queue_par), borrowed(queue_state)
+        finished, counters = borrowed(finished), borrowed(counters)
         # offsets in the packed tableau: c, A, A A, b, e, e A
         A = count
         AA = A + count * count

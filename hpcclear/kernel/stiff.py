@@ -1,8 +1,8 @@
-"""Implicit steps for lanes whose motion is stiff, and the decision which lanes those are.
+"""Implicit steps for lanes whose motion is stiff (which those are: `switching`).
 
 A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
 revolutions, books, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
-step would. The scores that send a lane here are all that the loop over lanes has to pay.
+step would.
 """
 
 import math
@@ -10,17 +10,17 @@ import math
 from ..jit import lane_function, scalar_function
 from . import layout as at
 from . import memory as mem
-from .combine import group_of
-from .control import count_up
 from .jacobian import difference_jacobian, evaluate_bank, fill
-from .kinks import LEAST_CUT, kink_fraction, kinks_of_start
-from .lifecycle import ATOL, IMPLICIT, RTOL
+from .kinks import BEYOND, GUESSED_BEYOND, LEAST_CUT, kink_fraction, kinks_of_start
+from .lifecycle import ATOL, RTOL
 from .memory import END, LANES
 from .radau import (
+    copy_polynomial,
     evaluate_stages,
     factorise_both,
     filtered_error,
     gap_of_step,
+    guess_from_start,
     guess_stages,
     newton,
     next_step,
@@ -29,20 +29,35 @@ from .radau import (
     start_of_step,
 )
 
-CHEAP_CONTRACTION = 0.002  # while Newton converges faster than this the Jacobian is kept
-KEPT_TO = 1.2  # a step that would grow by less keeps its size, and the factors
-FAILED_SHRINK = 0.25  # after Newton's iteration failed
-CALM_STIFFNESS = 2.0  # h |J| below which the explicit method would do
-CALM_STEPS = 6.0  # so many in a row send the lane back
-EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffness
-CHATTER = 4.0  # or that times the change over the step between its last two stages: as good a sign
-EDGE_LIMIT = 40.0  # such a score sends a lane to the implicit method
-REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
-REJECTION_MEMORY = 0.9
-STEEP = 100.0  # s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are
-ERROR_IN_RAMP = 0.03  # of a step at most, as a part of the friction's ramp
-KINK_REACH = 0.005  # a kink so near the end of a step, as a part of it, is left there
-MOST_CUTS = 12.0  # of one step
+CHEAP_CONTRACTION = 0.002
+"""While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
+
+KEPT_TO = 1.2
+"""A step that would grow by less keeps its size, and the factors."""
+
+BEST_RATE = 0.3
+"""Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
+
+SLOPE_MEMORY = 0.5
+"""How much of that rate is still believed after a step that one iteration solved."""
+
+FAILED_SHRINK = 0.1
+"""At most, after the iteration failed."""
+
+CEILING, CEILING_GROWTH = 0.6, 1.05
+"""Of the failed step, for those after it; and how that is forgotten, step by step."""
+
+CALM_STIFFNESS = 2.0
+"""h |J| below which the explicit method would do."""
+
+STEEP = 100.0
+"""s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are."""
+
+ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
+"""Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
+
+KINK_REACH, MOST_CUTS = 0.005, 12.0
+"""A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
 
 
 @scalar_function
@@ -56,15 +71,16 @@ def loosened(rtol, strictness, steep):
     `strictness`: square of how many times tighter this sample's tolerances are.
     """
     asked = rtol / math.sqrt(strictness)
-    return 0.1 * (asked if steep else asked**0.9)
+    return 0.05 * asked if steep else 0.1 * asked**0.9
 
 
 @scalar_function
-def implicit_tolerance(m, settings):
-    """Relative tolerance of implicit steps.
+def fit_to_ramp(m, settings):
+    """Relative tolerance of implicit steps and reach of the Jacobian's differences: both keep well within friction's ramp.
 
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
-    and every step would begin off the slow motion and end at a kink. Looser than this is dearer.
+    and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
+    ramp's end would hide its slope.
     """
     first = m[(mem.PAR + at.JOINT_12 + at.INVERSE_RAMP) * LANES]
     second = m[(mem.PAR + at.JOINT_23 + at.INVERSE_RAMP) * LANES]
@@ -72,10 +88,12 @@ def implicit_tolerance(m, settings):
         m[(mem.PAR + at.JOINT_12 + at.FRICTION) * LANES] * first,
         m[(mem.PAR + at.JOINT_23 + at.FRICTION) * LANES] * second,
     )
+    ramp = 1.0 / max(first, second, 1e-300)
     speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
-    within = ERROR_IN_RAMP / (max(first, second, 1e-300) * (1.0 + speed))
+    within = ERROR_IN_RAMP * ramp / (1.0 + speed)
     strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
-    return min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
+    m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
+    m[mem.REACH] = DIFFERENCE_IN_RAMP * ramp
 
 
 @scalar_function
@@ -89,14 +107,18 @@ def take_over(size, lane, W, work, par, m, settings):
         m[mem.LEAST + k] = settings[ATOL + k] / settings[RTOL]
         m[mem.LEAST + n + k] = settings[ATOL + at.MAX_COORDINATES + k] / settings[RTOL]
     m[mem.POLYNOMIAL_STEP] = 0.0
+    m[mem.KEPT_STEP] = 0.0
+    m[mem.CONTINUES] = 1.0
     m[mem.ACCEPTED_STEP] = 0.0
     m[mem.CONTRACTION] = 1.0
     m[mem.RATE] = 1.0
+    m[mem.RATE_SLOPE] = 0.0
+    m[mem.CEILING] = math.inf
     m[mem.FACTORED_STEP] = 0.0
     m[mem.NEW_JACOBIAN] = 0.0
     m[mem.TRIED_ERROR] = 0.0
     m[mem.KINK_CUTS] = 0.0
-    m[mem.TOLERANCE] = implicit_tolerance(m, settings)
+    fit_to_ramp(m, settings)
 
 
 @scalar_function
@@ -126,6 +148,9 @@ def fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, set
         work[at.FRESH * W + lane] = 0.0
     if (unknown or follows) and kinks_of_start(effects, m):
         m[mem.RATE] = 1.0
+        m[mem.RATE_SLOPE] = 0.0
+        m[mem.CEILING] = math.inf
+        m[mem.KEPT_STEP] = 0.0
     rtol = m[mem.TOLERANCE]
     for k in range(n):
         m[mem.START + k] = stages[k * W + lane]
@@ -157,14 +182,15 @@ def cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table):
     h = m[mem.STEP]
     evaluate_stages(effects, size, m, torque_table, load_table, h)
     work[at.EVALUATIONS * W + lane] += 3.0
-    fraction = kink_fraction(effects, m)
+    fraction = kink_fraction(effects, m, GUESSED_BEYOND)
     if fraction < 1.0:
         m[mem.POLYNOMIAL_STEP] = h
         h *= max(fraction, LEAST_CUT)
         m[mem.STEP] = h
         work[at.STEP * W + lane] = h
         work[at.ENDING * W + lane] = 0.0
-        guess_stages(size, m, h, False)
+        m[mem.CONTINUES] = 0.0
+        guess_stages(size, m, h)
         evaluate_stages(effects, size, m, torque_table, load_table, h)
         work[at.EVALUATIONS * W + lane] += 3.0
 
@@ -186,7 +212,65 @@ def new_jacobian(effects, size, m, torque_table, load_table, guessed):
 @scalar_function
 def kink_inside(effects, m):
     """Whether the solution of this step shows a kink well before the end, and it was not cut too often already."""
-    return kink_fraction(effects, m) < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS
+    return kink_fraction(effects, m, BEYOND) < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS
+
+
+@scalar_function
+def begin_step(effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings):
+    """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
+    follows = work[at.ACCEPT * W + lane] == 1.0
+    first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
+    if first:
+        take_over(size, lane, W, work, par, m, settings)
+    elif follows:
+        m[mem.ACCEPTED_STEP] = m[mem.STEP]
+        m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
+        m[mem.NEW_JACOBIAN] = 0.0
+        copy_polynomial(size, m, mem.Z, mem.KEPT)
+        m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
+        m[mem.CONTINUES] = 1.0
+    fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows)
+    work[at.STIFF_STEPS_HERE * W + lane] += 1.0
+    work[at.STIFF_STEPS * W + lane] += 1.0
+    if first:
+        guess_from_start(size, m, m[mem.STEP])
+    else:
+        guess_stages(size, m, m[mem.STEP])
+    return m[mem.POLYNOMIAL_STEP] > 0.0
+
+
+@scalar_function
+def solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed):
+    """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
+    if guessed:
+        cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table)
+    h = m[mem.STEP]
+    stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
+    if stale and m[mem.NEW_JACOBIAN] == 0.0:
+        new_jacobian(effects, size, m, torque_table, load_table, guessed)
+        work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
+    if m[mem.FACTORED_STEP] != h and not factorise_both(size, m, h):
+        return -1
+    iterations = newton(effects, size, m, torque_table, load_table, h, guessed)
+    evaluated = abs(iterations) - 1 if guessed else abs(iterations)
+    work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
+    return iterations
+
+
+@scalar_function
+def give_up(size, lane, W, work, m):
+    """The iteration failed: a shorter step by the polynomial of the step before, with a Jacobian that is nearer."""
+    h = m[mem.STEP]
+    copy_polynomial(size, m, mem.KEPT, mem.Z)
+    m[mem.POLYNOMIAL_STEP] = m[mem.KEPT_STEP]
+    m[mem.CONTINUES] = 1.0
+    m[mem.NEW_JACOBIAN] = 0.0
+    shrink = BEST_RATE / m[mem.RATE] if m[mem.RATE] > 0.0 else 0.0
+    m[mem.RATE] = 1.0
+    m[mem.CONTRACTION] = 1.0
+    m[mem.CEILING] = CEILING * h
+    work[at.ERROR * W + lane] = 1e6
+    work[at.NEXT_STEP * W + lane] = min(max(shrink, FAILED_SHRINK), 0.5) * h
 
 
 @scalar_function
@@ -195,47 +279,23 @@ def implicit_step(
 ):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
-    follows = work[at.ACCEPT * W + lane] == 1.0
-    if work[at.STIFF_STEPS_HERE * W + lane] == 0.0:
-        take_over(size, lane, W, work, par, m, settings)
-    elif follows:
-        m[mem.ACCEPTED_STEP] = m[mem.STEP]
-        m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
-        m[mem.NEW_JACOBIAN] = 0.0
-    fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows)
-    work[at.STIFF_STEPS_HERE * W + lane] += 1.0
-    work[at.STIFF_STEPS * W + lane] += 1.0
-    guess_stages(size, m, m[mem.STEP], follows)
-    guessed = m[mem.POLYNOMIAL_STEP] > 0.0
-    if guessed:
-        cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table)
-    if m[mem.RATE] > CHEAP_CONTRACTION and m[mem.NEW_JACOBIAN] == 0.0:
-        new_jacobian(effects, size, m, torque_table, load_table, guessed)
-        work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
-    h = m[mem.STEP]
-    regular = True
-    if m[mem.FACTORED_STEP] != h:
-        regular = factorise_both(size, m, h)
-    iterations = -1
-    if regular:
-        iterations = newton(effects, size, m, torque_table, load_table, h, guessed)
-        evaluated = abs(iterations) - 1 if guessed else abs(iterations)
-        work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
+    guessed = begin_step(
+        effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings
+    )
+    iterations = solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed)
     if iterations < 0:
-        m[mem.POLYNOMIAL_STEP] = 0.0
-        m[mem.RATE] = 1.0
-        m[mem.CONTRACTION] = 1.0
-        work[at.ERROR * W + lane] = 1e6
-        work[at.NEXT_STEP * W + lane] = FAILED_SHRINK * h
-    elif kink_inside(effects, m):
+        give_up(size, lane, W, work, m)
+        return
+    h = m[mem.STEP]
+    m[mem.POLYNOMIAL_STEP] = h
+    m[mem.CONTINUES] = 0.0
+    if kink_inside(effects, m):
         # the guess did not show it; the solution is a good guess for the part before it
-        m[mem.POLYNOMIAL_STEP] = h
         m[mem.KINK_CUTS] += 1.0
         m[mem.RATE] = 1.0
         work[at.ERROR * W + lane] = 2.0
-        work[at.NEXT_STEP * W + lane] = h * max(kink_fraction(effects, m), LEAST_CUT)
+        work[at.NEXT_STEP * W + lane] = h * max(kink_fraction(effects, m, BEYOND), LEAST_CUT)
     else:
-        m[mem.POLYNOMIAL_STEP] = h
         m[mem.KINK_CUTS] = 0.0
         judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
 
@@ -250,6 +310,13 @@ def judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
         m[mem.SHIFTED + k] = m[mem.START + k]
         m[mem.SHIFTED + n + k] = 0.0
     total = filtered_error(size, m, h)
+    uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
+    if total > 2.0 * n and uneasy:
+        total = refilter_error(effects, size, m, torque_table, load_table, h)
+        work[at.EVALUATIONS * W + lane] += 1.0
+    # as the last correction left them: integrals fit the end of the step
+    evaluate_stages(effects, size, m, torque_table, load_table, h)
+    work[at.EVALUATIONS * W + lane] += 1.0
     gaps = gap_of_step(
         effects.crank_rod, m, work, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, lane, W
     )
@@ -257,15 +324,9 @@ def judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
         effects.rod_slider, m, work, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, lane, W
     )
     rates_of_step(effects.ledger, effects.responses, m, work, lane, W)
-    uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
-    if total + gaps > 2.0 * n and uneasy:
-        total = refilter_error(effects, size, m, torque_table, load_table, h)
-        work[at.EVALUATIONS * W + lane] += 1.0
+    leave(size, lane, W, work, m)
     mean = (total + gaps) * (0.5 / n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
-    evaluate_stages(effects, size, m, torque_table, load_table, h)
-    work[at.EVALUATIONS * W + lane] += 1.0
-    leave(size, lane, W, work, m)
     work[at.ERROR * W + lane] = mean
     propose(lane, W, work, m, iterations)
 
@@ -275,6 +336,14 @@ def propose(lane, W, work, m, iterations):
     """The step to try next, and whether the explicit method could have taken this one."""
     h = m[mem.STEP]
     proposal = next_step(m, h, m[mem.TRIED_ERROR], iterations)
+    if iterations == 1:
+        m[mem.RATE_SLOPE] *= SLOPE_MEMORY
+    elif m[mem.NEW_JACOBIAN] == 1.0:
+        m[mem.RATE_SLOPE] = m[mem.RATE] / h
+    if m[mem.RATE_SLOPE] > 0.0:
+        proposal = min(proposal, BEST_RATE / m[mem.RATE_SLOPE])
+    proposal = min(proposal, m[mem.CEILING])
+    m[mem.CEILING] *= CEILING_GROWTH
     if m[mem.TRIED_ERROR] <= 1.0:
         if work[at.REJECTED * W + lane] == 1.0:
             proposal = min(proposal, h)
@@ -282,7 +351,7 @@ def propose(lane, W, work, m, iterations):
             proposal = max(proposal, work[at.NEXT_STEP * W + lane])
         if m[mem.RATE] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
             proposal = h
-        calm = h * m[mem.NORM] < CALM_STIFFNESS
+        calm = h * m[mem.NORM] < CALM_STIFFNESS and proposal < 2.0 * h
         work[at.CALM * W + lane] = work[at.CALM * W + lane] + 1.0 if calm else 0.0
     work[at.NEXT_STEP * W + lane] = proposal
 
@@ -297,30 +366,6 @@ def leave(size, lane, W, work, m):
         work[(at.ACC + k) * W + lane] = m[(at.ACC + k) * LANES + END]
     for r in range(at.RATES):
         work[(at.RATE_NOW + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
-
-
-# ---- what the block stepper calls ----------------------------------------------------------------
-
-
-@lane_function
-def settle_methods(memory, settings, work, W):
-    """Decide, between steps, which lanes go on with which method. Returns how many take implicit steps."""
-    count = 0.0
-    if memory is not None:
-        always = 1.0 if settings[IMPLICIT] == 2.0 else 0.0
-        for i in range(W):
-            stiff = work[at.STIFF * W + i]
-            go = 1.0 if work[at.EDGE_SCORE * W + i] >= EDGE_LIMIT else 0.0
-            go = max(go, 1.0 if work[at.REJECTION_SCORE * W + i] >= REJECTION_LIMIT else 0.0)
-            stay = 1.0 if work[at.CALM * W + i] < CALM_STEPS else 0.0
-            new = max(stay if stiff == 1.0 else go, always)
-            same = 1.0 if new == stiff else 0.0
-            work[at.STIFF * W + i] = new
-            for row in (at.EDGE_SCORE, at.REJECTION_SCORE, at.CALM, at.STIFF_STEPS_HERE):
-                score = work[row * W + i]
-                work[row * W + i] = score if same == 1.0 else 0.0
-            count = count_up(count, new * work[at.RUNNING * W + i])
-    return count
 
 
 @lane_function
@@ -344,45 +389,3 @@ def take_implicit_steps(
                     memory,
                     settings,
                 )
-
-
-@lane_function
-def edge_excess(work, stages, weights, last, atol, n, k, terms, i, W):
-    """Square of the change of acceleration between the last two stages of the pair less that of the velocity times EDGE / h.
-
-    Both stages stand at the end of the step: summed over the coordinates it is positive where h lambda, estimated as
-    h |a7 - a6| / |v7 - v6|, is above `EDGE` (Hairer and Wanner, Solving ODEs II, IV.2). Friction that saturates within
-    the step hides its slope from this estimate; but then the acceleration changes far more between these two stages
-    than over the whole step, which on a smooth path it never does.
-    """
-    new = work[(at.ACC + k) * W + i]
-    change = new - stages[((terms - 1) * n + k) * W + i]
-    dv = 0.0  # without a factor h
-    for j in range(terms):
-        dv += weights[last + j] * stages[(j * n + k) * W + i]
-    scale = 1.0 / atol[at.MAX_COORDINATES + k]
-    over_step = CHATTER * (abs(new - stages[k * W + i]) + 1e-8 * abs(new))
-    least = min(EDGE * abs(dv), over_step) * scale
-    change *= scale
-    return change * change - least * least
-
-
-@lane_function
-def sense_stiffness(memory, work, stages, weights, last, atol, n, terms, W):
-    """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
-    decaying count of rejections."""
-    if memory is not None:
-        count = group_of(n)
-        for first in range(0, n, count):
-            for i in range(W):
-                excess = -1e-300 if first == 0 else work[at.EDGE_EXCESS * W + i]
-                for k in range(first, first + count):
-                    excess += edge_excess(work, stages, weights, last, atol, n, k, terms, i, W)
-                work[at.EDGE_EXCESS * W + i] = excess
-        for i in range(W):
-            at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
-            score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5
-            work[at.EDGE_SCORE * W + i] = max(score, 0.0)
-            rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
-            score = REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
-            work[at.REJECTION_SCORE * W + i] = score
