@@ -1,7 +1,7 @@
 """Where the problem is well-posed, f agrees with an independent solver on independently written equations.
 
 Well-posed means that small errors die out: damping takes more out of a disturbance than the next impact puts in.
-That holds for Hunt-Crossley with chi from 0.2 to 0.5 s/m and for Lankarani-Nikravesh with c_e up to 0.5, clearances
+That holds for Hunt-Crossley with chi from 0.1 to 0.5 s/m and for Lankarani-Nikravesh with c_e up to 0.5, clearances
 from 0.05 to 1 mm, friction up to 0.1. It does not for weak damping: with chi = 0.05 s/m two runs of the oracle itself
 part, see the last test.
 """
@@ -60,7 +60,7 @@ def error(scene: Scene) -> float:
 WELL_POSED = [
     *(
         (fixed(chi), c, mu)
-        for chi in (0.2, 0.5)
+        for chi in (0.1, 0.2, 0.5)
         for c, mu in ((0.05e-3, 0.1), (0.3e-3, 0.01), (1e-3, 0.1))
     ),
     (fixed(0.5), 1e-3, 0.01),
@@ -112,17 +112,22 @@ def test_oracle_reproduces_the_reference():
 
 
 @pytest.mark.full
-def test_objective_over_the_whole_well_posed_box():
-    """Random scenes of the box, over as many revolutions as a user would take."""
+def test_objective_over_the_whole_box():
+    """Random scenes of the box, weak damping too: f is the oracle's, or its stated uncertainty says that it may not be."""
     rng = np.random.default_rng(3)
-    errors = []
-    for k in range(60):
-        contact = fixed(rng.uniform(0.2, 0.5)) if k % 2 else latched(rng.uniform(0.0, 0.5))
+    found = []
+    for k in range(80):
+        contact = fixed(rng.uniform(0.0, 0.5)) if k % 2 else latched(rng.uniform(0.0, 0.5))
         clearance, friction = 10.0 ** rng.uniform(-4.3, -3.0), rng.uniform(0.0, 0.1)
-        errors.append(abs(error(scene_of(contact, clearance, friction, 1e-6, (5, 5)))))
-    # the amplifying orbits of the test above turn up now and then
-    assert np.quantile(errors, 0.9) < 1e-4
-    assert np.median(errors) < 1e-5
+        scene = scene_of(contact, clearance, friction, 1e-6, (5, 5))
+        stated = hard_cases.uncertainty(scene) / float(hard_cases.run(scene).outcome["objective"])
+        found.append((abs(error(scene)), stated, k % 2 and contact["damping"] < 0.1))
+    errors, stated, weak = np.array(found).T
+    assert (
+        np.quantile(errors[weak == 0.0], 0.95) < 1e-4
+    )  # a faint touch of the test above turns up now and then
+    assert np.median(errors[weak == 0.0]) < 1e-5
+    assert (errors < np.maximum(1e-4, 3.0 * stated)).mean() >= 0.95
 
 
 @pytest.mark.full

@@ -72,7 +72,9 @@ def test_automatic_choice_is_right_and_cheaper(name: str):
     # it takes implicit steps, and not only those
     assert 0.0 < chosen[at.OUT_STIFF_STEPS] < chosen[at.OUT_ATTEMPTS]
     assert abs(chosen[SLIDER] - exact[SLIDER]) < 1e-7
-    assert chosen[at.OUT_EVALUATIONS] < 0.6 * explicit[at.OUT_EVALUATIONS]
+    # an implicit step takes the time of two explicit ones; evaluations do not tell, it has eight of them at a time
+    weighted = chosen[at.OUT_ATTEMPTS] + chosen[at.OUT_STIFF_STEPS]
+    assert weighted < 0.6 * explicit[at.OUT_ATTEMPTS]
 
 
 def test_scenes_that_are_not_stiff_do_not_pay():

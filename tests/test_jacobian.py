@@ -1,0 +1,106 @@
+"""The Jacobian of implicit steps, whose columns are evaluated side by side, against central differences one by one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcclear.kernel import layout as at
+from hpcclear.kernel import memory as mem
+from hpcclear.kernel.jacobian import difference_jacobian, evaluate_bank
+from hpcclear.kernel.lanes import Lanes, Problem
+from hpcclear.kernel.lifecycle import ATOL, RTOL
+from hpcclear.kernel.observe import observe
+from hpcclear.kernel.radau import new_memory
+from hpcclear.kernel.stiff import fit_to_ramp
+from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.scene import load_scene
+
+JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
+DRIVE = {"kind": "torque", "torque": 5.0, "initial_speed": 520.0, "flywheel_inertia": 0.01}
+TOPOLOGIES = {
+    # name: coordinates, changes
+    "two open": (4, {}),
+    "two open, free crank": (5, {"drive": DRIVE}),
+    "baumgarte": (9, {"numerics.formulation": "baumgarte"}),
+}
+
+
+def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
+    """What the implicit method remembers of a lane whose journals both touch, at the state of every stage."""
+    scene = load_scene(JOB).with_({
+        "effects.contact": {"law": "hunt-crossley", "damping": 0.5},
+        "effects.friction.coefficient": 0.1,
+        "numerics.method": "radau",
+        **changes,
+    })  # fmt: skip
+    problem = problem_of(scene)
+    n, par = problem.coordinates, parameters(scene)
+    state = start_states(scene, par)[0]
+    q, v = state[:n].copy(), state[at.MAX_COORDINATES :][:n].copy()
+    q += 1e-3 * np.random.default_rng(n).uniform(-1.0, 1.0, n)  # |e| above the clearance
+    m = new_memory(1)[0]
+    rows = m[: mem.JACOBIAN].reshape(-1, mem.LANES)
+    for bank in (rows[: mem.SECOND], rows[mem.SECOND : 2 * mem.SECOND]):
+        bank[mem.PAR :] = par[0][:, None]
+        bank[at.STAGE_TIME] = 1e-4
+    rows[at.QS : at.QS + n], rows[at.VS : at.VS + n] = q[:, None], v[:, None]
+    settings = problem.settings()
+    m[mem.LEAST : mem.LEAST + n] = settings[ATOL : ATOL + n] / settings[RTOL]
+    m[mem.LEAST + n : mem.LEAST + 2 * n] = (
+        settings[ATOL + at.MAX_COORDINATES :][:n] / settings[RTOL]
+    )
+    fit_to_ramp(m, settings)
+    return problem, m
+
+
+def effects_and_tables(problem: Problem) -> tuple:
+    """As the stepper of lanes hands them on."""
+    lanes = Lanes(problem, 1)
+    return lanes._effects, lanes._tables
+
+
+@pytest.mark.parametrize("name", TOPOLOGIES)
+def test_columns_are_the_derivatives(name: str):
+    n, changes = TOPOLOGIES[name]
+    problem, m = memory_of(changes)
+    assert problem.coordinates == n
+    effects, tables = effects_and_tables(problem)
+    rows = m[: mem.JACOBIAN].reshape(-1, mem.LANES)
+    state = np.r_[rows[at.QS : at.QS + n, mem.MIDDLE], rows[at.VS : at.VS + n, mem.MIDDLE]]
+
+    def accelerations(states: np.ndarray) -> np.ndarray:
+        out = np.zeros((len(states), n + at.RATES))
+        contacts = rows[at.ACTIVE_12 : at.INVERSE_IMPACT_23 + 1, mem.MIDDLE]
+        observe(
+            effects, n, rows[mem.PAR : mem.SECOND, 0].copy(), *tables, states,
+            np.tile(contacts, (len(states), 1)),
+            np.full(len(states), rows[at.STAGE_TIME, mem.MIDDLE]), out,
+        )  # fmt: skip
+        return out[:, :n]
+
+    evaluate_bank(effects, m, *tables)
+    found = rows[at.ACC : at.ACC + n, mem.MIDDLE]
+    here = accelerations(state[None])[0]
+    assert found == pytest.approx(here, rel=1e-13, abs=1e-12 * abs(here).max())
+    m[mem.BASE : mem.BASE + n] = found
+    difference_jacobian(effects, (0,) * n, m, *tables)
+    columns = m[mem.JACOBIAN : mem.JACOBIAN + n * mem.COLUMNS].reshape(n, mem.COLUMNS)[:, : 2 * n]
+
+    least = m[mem.LEAST : mem.LEAST + 2 * n]
+    increments = np.diag(np.minimum(1e-7 * np.maximum(abs(state), least), m[mem.REACH] * least))
+    reference = (accelerations(state + increments) - accelerations(state - increments)).T
+    reference /= 2.0 * np.diag(increments)
+    size = abs(reference * least).max(axis=1, keepdims=True)
+    assert (abs(found) > 0.0).sum() >= 4  # both contacts push
+    assert (abs(columns - reference) * least < 1e-4 * size).all()
+
+
+def test_differences_stay_within_the_ramp():
+    """A column's increment is a thousandth of the ramp at most: across its end the slope would be hidden."""
+    problem, m = memory_of({"effects.friction.ramp_speed": 1e-6})
+    effects, tables = effects_and_tables(problem)
+    difference_jacobian(effects, (0,) * 4, m, *tables)
+    increments = m[mem.INCREMENT * mem.LANES :][: mem.LANES]
+    assert (abs(increments[4:]) <= 1.0001e-9 * m[mem.LEAST + 4 : mem.LEAST + 8]).all()
+    assert (increments != 0.0).all()
