@@ -1,6 +1,6 @@
 """Stiff scenes: the automatic choice of method against the explicit pair alone and against LSODA, time at equal error.
 
-    python analysis/benchmark_stiff.py              # about 6 min; needs `pip install "hpcclear[bench]"` and gfortran
+    python analysis/benchmark_stiff.py              # about 4 min; needs `pip install "hpcclear[bench]"` and gfortran
     python analysis/benchmark_stiff.py --quick      # one round, about 1 min
 
 Every revolution starts from a state of a long tight run, since from rest such scenes are ill-posed. The error is the root mean
