@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..jit import lane_function, scalar_function
 from ..physics.angles import sincos
 from . import layout as at
-from .motion import gravity_of, guide_ratio, reaction_slope, table_value
+from .motion import gravity_of, guide_ratio, load_of, reaction_slope, table_value
 
 Array = NDArray[np.float64]
 
@@ -54,17 +54,6 @@ _NODES, _WEIGHTS = (
 
 
 @lane_function
-def load_at(load, load_table, par, table, angle):
-    """Force on the slider along +x in N at a crank angle."""
-    if load is not None:
-        return par[at.LOAD]
-    elif load_table is not None:
-        return par[at.LOAD] * table_value(table, angle)
-    else:
-        return 0.0
-
-
-@lane_function
 def _instant(effects, par, load_table, angle, w, alpha, out, i):
     """Rows of `ideal_response` but the rod's angle for one instant of a block; `out` is flat, (ROWS, BLOCK)."""
     crank, length = par[at.CRANK_LENGTH], par[at.ROD_LENGTH]
@@ -85,7 +74,7 @@ def _instant(effects, par, load_table, angle, w, alpha, out, i):
     a3 = pin_ax + length * swing_x
     ax = pin_ax + near * swing_x
     ay = pin_ay + near * swing_y
-    load = load_at(effects.load, effects.load_table, par, load_table, angle)
+    load = load_of(effects.load, effects.load_table, par, table_value(load_table, angle), 0, 1)
     # guide reaction N = free - slope f with f = ratio |N|, one balance of rod and slider
     slope = length * st * inverse
     free = reaction_slope(par, st, ct, alpha2, ax, ay + g, a3, 0, 1) + load * slope + m3 * g

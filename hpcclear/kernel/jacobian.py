@@ -101,45 +101,13 @@ def displace_all(n, m, first):
 
 
 @lane_function
-def base(r, n, m):
-    """Acceleration r at the state that is displaced."""
-    if r < n:
-        return m[mem.BASE + r]
-    else:
-        return 0.0
-
-
-@lane_function
-def difference(r, n, m, a, inverse, first, i):
-    """Derivative of acceleration r by what is displaced in lane i; a, the acceleration where nothing is."""
-    if r < n:
-        change = m[(mem.SECOND + at.ACC + r) * LANES + i] - a
-        m[mem.JACOBIAN + r * mem.COLUMNS + first + i] = change * inverse
-
-
-@lane_function
 def take_differences(n, m, first):
     """Columns of the Jacobian from `first` on, as many as there are lanes."""
-    a0 = base(COORDINATES[0], n, m)
-    a1 = base(COORDINATES[1], n, m)
-    a2 = base(COORDINATES[2], n, m)
-    a3 = base(COORDINATES[3], n, m)
-    a4 = base(COORDINATES[4], n, m)
-    a5 = base(COORDINATES[5], n, m)
-    a6 = base(COORDINATES[6], n, m)
-    a7 = base(COORDINATES[7], n, m)
-    a8 = base(COORDINATES[8], n, m)
     for i in range(LANES):
         inverse = 1.0 / m[mem.INCREMENT * LANES + i]
-        difference(COORDINATES[0], n, m, a0, inverse, first, i)
-        difference(COORDINATES[1], n, m, a1, inverse, first, i)
-        difference(COORDINATES[2], n, m, a2, inverse, first, i)
-        difference(COORDINATES[3], n, m, a3, inverse, first, i)
-        difference(COORDINATES[4], n, m, a4, inverse, first, i)
-        difference(COORDINATES[5], n, m, a5, inverse, first, i)
-        difference(COORDINATES[6], n, m, a6, inverse, first, i)
-        difference(COORDINATES[7], n, m, a7, inverse, first, i)
-        difference(COORDINATES[8], n, m, a8, inverse, first, i)
+        for r in range(n):
+            change = m[(mem.SECOND + at.ACC + r) * LANES + i] - m[mem.BASE + r]
+            m[mem.JACOBIAN + r * mem.COLUMNS + first + i] = change * inverse
 
 
 @lane_function

@@ -65,12 +65,12 @@ def gravity_of(gravity, par, i, W):
 
 
 @lane_function
-def load_of(load, load_table, work, par, i, W):
-    """Force on the slider along +x in N."""
+def load_of(load, load_table, par, looked_up, i, W):
+    """Force on the slider along +x in N; `looked_up`: what its table says, where it has one."""
     if load is not None:
         return par[at.LOAD * W + i]
     elif load_table is not None:
-        return par[at.LOAD * W + i] * work[at.LOAD_VALUE * W + i]
+        return par[at.LOAD * W + i] * looked_up
     else:
         return 0.0
 
@@ -276,7 +276,7 @@ def two_open(effects, work, par, phi, omega, i, W):
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
     guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
     torque = torque_of(effects.torque_table, work, par, i, W)
     crank_load = (
@@ -339,7 +339,7 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
     torque = torque_of(effects.torque_table, work, par, i, W)
     m2 = par[at.ROD_MASS * W + i]
     m3 = par[at.SLIDER_MASS * W + i]
@@ -449,7 +449,7 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
         W,
     )
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
     torque = torque_of(effects.torque_table, work, par, i, W)
     guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
     m2 = par[at.ROD_MASS * W + i]
@@ -527,7 +527,7 @@ def both_ideal(effects, work, par, phi, omega, i, W):
     y2 = -far * ct * k
     dy2 = far * (st * k * k - ct * dk)
     g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, work, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
     torque = torque_of(effects.torque_table, work, par, i, W)
     v3 = x3 * omega
     inertia = (

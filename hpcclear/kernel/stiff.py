@@ -210,12 +210,6 @@ def new_jacobian(effects, size, m, torque_table, load_table, guessed):
 
 
 @scalar_function
-def kink_inside(effects, m):
-    """Whether the solution of this step shows a kink well before the end, and it was not cut too often already."""
-    return kink_fraction(effects, m, BEYOND) < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS
-
-
-@scalar_function
 def begin_step(effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings):
     """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
     follows = work[at.ACCEPT * W + lane] == 1.0
@@ -289,12 +283,13 @@ def implicit_step(
     h = m[mem.STEP]
     m[mem.POLYNOMIAL_STEP] = h
     m[mem.CONTINUES] = 0.0
-    if kink_inside(effects, m):
+    fraction = kink_fraction(effects, m, BEYOND)
+    if fraction < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS:
         # the guess did not show it; the solution is a good guess for the part before it
         m[mem.KINK_CUTS] += 1.0
         m[mem.RATE] = 1.0
         work[at.ERROR * W + lane] = 2.0
-        work[at.NEXT_STEP * W + lane] = h * max(kink_fraction(effects, m, BEYOND), LEAST_CUT)
+        work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
     else:
         m[mem.KINK_CUTS] = 0.0
         judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
