@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel.rhs import accelerations
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics.linkage.rhs import accelerations
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
 _X86 = re.compile(

@@ -22,11 +22,11 @@ from assembly import Arithmetic, executed_arithmetic, force_evaluation
 from numba import njit
 from scenes import Setup, ensemble, scene
 
-from hpcclear.dataset import provenance
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.kernel.rhs import accelerations
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.results.dataset import provenance
 
 WIDTHS = (1, 16, 32)
 YARDSTICK = "plain loop"

@@ -26,7 +26,7 @@ import numpy as np
 import xarray as xr
 from scenes import LAWS, Setup, ensemble, scene, single
 
-from hpcclear.dataset import provenance
+from hpcclear.results.dataset import provenance
 
 MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"

@@ -55,9 +55,9 @@ def launch(ranks: int, *arguments: object) -> list[dict[str, Any]]:
 
 def inside(task: str, count: int) -> int:
     """One rank: samples or statistics on all of them, then a line about itself."""
-    from hpcclear.comm import run_on_ranks
-    from hpcclear.ranks import COLUMNS, Ranks
-    from hpcclear.work import KIND, MAKERS, sample_points
+    from hpcclear.ensemble.simulate import KIND, MAKERS, sample_points
+    from hpcclear.ranks.boundary import run_on_ranks
+    from hpcclear.ranks.team import COLUMNS, Ranks
 
     line: dict[str, Any] = {}
 
@@ -79,7 +79,7 @@ def inside(task: str, count: int) -> int:
     def program(ranks: Ranks) -> None:
         scene, points = design(count)
         if task == "statistics":
-            from hpcclear.streaming import run_statistics
+            from hpcclear.ensemble.statistics import run_statistics
 
             with tempfile.TemporaryDirectory() as folder:
                 run_statistics(scene, Path(folder) / "out.nc", ranks, samples=count, style="quiet")
@@ -134,7 +134,7 @@ def measure(seconds: float, rounds: int) -> "xr.Dataset":
     """All rounds: start-up on 2 ranks, the design on 1, 2 and 4, statistics on 2."""
     import xarray as xr
 
-    from hpcclear.dataset import provenance
+    from hpcclear.results.dataset import provenance
 
     launch(2, "samples", 64)  # compiles
     count = int(seconds * 2 * SAMPLES_A_SECOND)

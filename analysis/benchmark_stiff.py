@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 from plain_loop import motion
 from scenes import JOB, Setup, setup
 
-from hpcclear.dataset import provenance
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import record as rec
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.results.dataset import provenance
 from hpcclear.scene import load_scene
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@
     python analysis/benchmark_swarms.py --quick      # 5 000 evaluations, seeds 1-2, about 1 min
 
 ZDT1 to 3 (30 variables) and DTLZ2 (12 variables, 3 objectives), populations of 100, the front of
-every method cut to 100 points by `hpcclear.pareto.cut`, hypervolume for the reference point 1.1 in
+every method cut to 100 points by `hpcclear.statistics.search.pareto.cut`, hypervolume for the reference point 1.1 in
 each objective. The peers run with their own defaults (OMOPSO has none
 for its epsilons: 0.005). Writes benchmark_swarms.nc and .png.
 Peers: pip install pymoo platypus-opt (one that is missing is reported and left out).
@@ -28,8 +28,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import NullFormatter
 
-from hpcclear.mopso import minimise
-from hpcclear.pareto import cut
+from hpcclear.statistics.search.mopso import minimise
+from hpcclear.statistics.search.pareto import cut
 
 POPULATION = 100
 FRONT = 100

@@ -15,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear import dataset
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.ideal import ideal_response
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import effects_of, parameters, problem_of, start_states
-from hpcclear.report import style
-from hpcclear.sampling import latin_hypercube
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.linkage.ideal import ideal_response
+from hpcclear.dynamics.lowering import effects_of, parameters, problem_of, start_states
+from hpcclear.report.figures import style
+from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.sampling import latin_hypercube
 
 JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 

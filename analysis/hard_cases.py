@@ -22,17 +22,17 @@ import numpy as np
 import xarray as xr
 
 from hpcclear import __version__
-from hpcclear.energy import energies
-from hpcclear.errors import InputError
-from hpcclear.evaluator import evaluate_records, outcome_records
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import record as rec
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states
-from hpcclear.response import simulate
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.energy import energies
+from hpcclear.dynamics.evaluator import evaluate_records, outcome_records
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.status import OUTCOME, Flag, Status
 
 LIBRARY = Path(__file__).parent.parent / "tests" / "hard_cases"
 TOLERANCES = (1e-3, 1e-6, 1e-8)
@@ -46,7 +46,7 @@ NOTHING = Points((), np.empty((1, 0)), ())
 class Run:
     """What one simulation came to."""
 
-    outcome: np.void  # a record of `hpcclear.status.OUTCOME`
+    outcome: np.void  # a record of `hpcclear.base.outcome.OUTCOME`
     residual: float
     implicit: float  # share of implicit steps
     seconds: float

@@ -19,10 +19,10 @@ import xarray as xr
 from hard_cases import balance, chunks, recorded
 
 from hpcclear import __version__
-from hpcclear.kernel import baumgarte
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import record as rec
-from hpcclear.lowering import topology
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import baumgarte
+from hpcclear.dynamics.lowering import topology
+from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

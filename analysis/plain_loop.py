@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.tableau import DORMAND_PRINCE
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE
 
 Array = NDArray[np.float64]
 
@@ -210,7 +210,7 @@ def run(
     latched: bool,
     floor: float = 1e-3,
 ) -> Array:
-    """Samples as `hpcclear.lowering` describes them (parameters, start states), one row of `OUTPUTS` each.
+    """Samples as `hpcclear.dynamics.lowering` describes them (parameters, start states), one row of `OUTPUTS` each.
 
     Parameters
     ----------

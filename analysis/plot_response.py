@@ -6,7 +6,8 @@ python analysis/plot_response.py results/response.nc -o results/figures
 import argparse
 from pathlib import Path
 
-from hpcclear import dataset, report
+from hpcclear import report
+from hpcclear.results import dataset
 
 FIGURES = {
     "response": report.response_figure,

@@ -6,7 +6,8 @@ python analysis/plot_samples.py results/quickstart.nc -o results/quickstart.png
 import argparse
 from pathlib import Path
 
-from hpcclear import dataset, report
+from hpcclear import report
+from hpcclear.results import dataset
 
 
 def main() -> None:

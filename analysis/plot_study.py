@@ -6,8 +6,9 @@ python analysis/plot_study.py results/robust -o results/robust/figures
 import argparse
 from pathlib import Path
 
-from hpcclear import dataset, report
-from hpcclear.errors import InputError
+from hpcclear import report
+from hpcclear.base.errors import InputError
+from hpcclear.results import dataset
 
 
 def main() -> None:

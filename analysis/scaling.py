@@ -6,7 +6,7 @@
 Measured on this machine, in the same run: what samples cost (the paper's box, ten revolutions), what root spends on
 each message, each sample handed out and each record taken in (statistics and checkpoints included), and
 start-up. A discrete-event simulation (`scaling_model.py`) then lets ranks ask, root answer one message after the
-other between quanta of its own work, and ranks run dry, with `hpcclear.schedule.allot` as the policy and
+other between quanta of its own work, and ranks run dry, with `hpcclear.ranks.schedule.allot` as the policy and
 others beside it. Start-up is shown apart: it is paid once, whatever the work.
 """
 
@@ -24,10 +24,10 @@ import numpy as np
 import xarray as xr
 from scaling_model import POLICIES, WORK, Costs, Outcome, simulate, simulate_sums
 
-from hpcclear.dataset import provenance
-from hpcclear.partials import part_length
-from hpcclear.schedule import HandOut, Need
-from hpcclear.status import OUTCOME
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ensemble.parts import part_length
+from hpcclear.ranks.schedule import HandOut, Need
+from hpcclear.results.dataset import provenance
 
 LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
@@ -44,7 +44,7 @@ def sample_costs(samples: int) -> np.ndarray:
     from benchmark_kernel import run_lanes
     from scenes import ensemble, scene
 
-    from hpcclear.kernel import layout as at
+    from hpcclear.dynamics import layout as at
 
     setup = ensemble(scene("lankarani-nikravesh", 1e-6, 5, 5), samples)
     run_lanes(setup, LANES)
@@ -66,7 +66,7 @@ def exchange(messages: int) -> None:
     """Both ranks of `message_cost`: one asks, root answers and prints the median of what it took."""
     from mpi4py import MPI
 
-    from hpcclear.mail import Mail, Tag
+    from hpcclear.ranks.mailbox import Mail, Tag
 
     mail = Mail(MPI, finalizes=False)
     if mail.rank == 1:
@@ -97,8 +97,8 @@ def seconds_each(action, repeats: int, items: int) -> float:
 
 def record_cost() -> float:
     """Seconds of root for a record in statistics mode: unpickled, summed up, checkpointed every five seconds."""
-    from hpcclear.accumulator import Accumulator
-    from hpcclear.checkpoint import Checkpoint
+    from hpcclear.results.checkpoint import Checkpoint
+    from hpcclear.statistics.streams.accumulator import Accumulator
 
     total, batch = 400_000, 500
     records = np.zeros(total, OUTCOME)
@@ -121,8 +121,8 @@ def handed_cost() -> float:
     """Seconds of root for a sample handed out: its point made and pickled."""
     from scenes import scene
 
-    from hpcclear.sampling import MonteCarloPoints
     from hpcclear.scene import load_scene
+    from hpcclear.scene.sampling import MonteCarloPoints
 
     content = scene("lankarani-nikravesh", 1e-6, 5, 5).resolved()
     content["study"]["method"] = "monte-carlo"
@@ -138,9 +138,9 @@ def handed_cost() -> float:
 
 def partial_cost() -> float:
     """Seconds of root for a part of a block that arrives summed up: unpickled and merged."""
-    from hpcclear.accumulator import Accumulator
-    from hpcclear.partials import packed, unpacked
-    from hpcclear.statistics import summarise
+    from hpcclear.ensemble.parts import packed, unpacked
+    from hpcclear.statistics.streams.accumulator import Accumulator
+    from hpcclear.statistics.streams.summary import summarise
 
     blocks, length = 40, 512
     sums = Accumulator((blocks + 1) * 4096)
@@ -167,7 +167,7 @@ def start_up() -> float:
     program = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from scenes import scene\nfrom hpcclear import evaluate\n"
-        "from hpcclear.evaluator import Evaluator\nfrom hpcclear.scene.points import Points\n"
+        "from hpcclear.dynamics.evaluator import Evaluator\nfrom hpcclear.scene.points import Points\n"
         "import numpy as np\n"
         "e = Evaluator(scene('lankarani-nikravesh', 1e-6, 0, 1), Points(('m3',), np.empty((0, 1)), "
         "(('mechanism.slider.mass',),)))\n"

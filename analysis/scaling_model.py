@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hpcclear.partials import part_length
-from hpcclear.ranks import FLUSH_INTERVAL
-from hpcclear.schedule import QUANTUM, TAIL, Allotment, Need, allot
-from hpcclear.statistics import BLOCK
+from hpcclear.ensemble.parts import part_length
+from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
+from hpcclear.ranks.team import FLUSH_INTERVAL
+from hpcclear.statistics.streams.summary import BLOCK
 
 LANES = 32
 LATENCY = 5e-6  # s, network
@@ -224,7 +224,7 @@ def simulate(
     costs : Costs
     ranks : int
     policy : callable
-        As `hpcclear.schedule.allot`.
+        As `hpcclear.ranks.schedule.allot`.
     work : float
         Seconds of work for each rank, on average.
     seed : int
@@ -265,7 +265,7 @@ def simulate_sums(
 ) -> Outcome:
     """`simulate` for statistics, whose ranks make their own points and send sums of parts of blocks.
 
-    Root's load goes with the parts, whose length is the package's own choice (`hpcclear.partials.part_length`).
+    Root's load goes with the parts, whose length is the package's own choice (`hpcclear.ensemble.parts.part_length`).
     """
     total = max(round(ranks * work / costs.mean), ranks)
     length = part_length(total, ranks, BLOCK, costs.mean)

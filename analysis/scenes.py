@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.lanes import Problem
-from hpcclear.lowering import Array, parameters, problem_of, start_states
-from hpcclear.sampling import latin_hypercube
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Problem
+from hpcclear.dynamics.lowering import Array, parameters, problem_of, start_states
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.sampling import latin_hypercube
 
 JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 

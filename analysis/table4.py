@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hpcclear import dataset
+from hpcclear.results import dataset
 
 COLUMNS = {"m2": 1.0, "m3": 1.0, "u2": 1.0, "I2": 1e4}
 """Design variables and the power of ten that makes them readable."""

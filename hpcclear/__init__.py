@@ -12,10 +12,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import evaluate
-    from .response import simulate
-    from .scene import Scene, load_scene
-    from .study import run_study
+    from hpcclear.dynamics.response import simulate
+    from hpcclear.ensemble.api import evaluate
+    from hpcclear.scene import Scene, load_scene
+    from hpcclear.study import run_study
 
 __version__ = "0.1.0"
 
@@ -24,8 +24,8 @@ __all__ = ["Scene", "evaluate", "load_scene", "run_study", "simulate"]
 _HOME = {
     "Scene": "scene",
     "load_scene": "scene",
-    "simulate": "response",
-    "evaluate": "api",
+    "simulate": "dynamics.response",
+    "evaluate": "ensemble.api",
     "run_study": "study",
 }
 

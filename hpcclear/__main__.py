@@ -1,6 +1,6 @@
 """``python -m hpcclear``."""
 
-from .cli import main
+from hpcclear.cli import main
 
 if __name__ == "__main__":
     main()

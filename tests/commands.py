@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from hpcclear import storage
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
+from hpcclear.results import files as storage
 
 ROOT = Path(__file__).parent.parent
 MPIEXEC = Path(sys.executable).parent / "mpiexec"

@@ -13,7 +13,7 @@ from typing import Any
 from markdown_it import MarkdownIt
 
 from hpcclear.scene import load_scene
-from hpcclear.scene.writing import to_toml
+from hpcclear.scene.toml import to_toml
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]

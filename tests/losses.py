@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from hpcclear.ranks import FLUSH_INTERVAL
+from hpcclear.ranks.team import FLUSH_INTERVAL
 
 UNSAVED = "readings: simulations"
 """The stage whose samples are kept a reading at a time."""

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hpcclear import dataset
-from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.surrogate.kriging import fit_kriging
+from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.results import dataset
+from hpcclear.statistics.surrogate.kriging import fit_kriging
 
 NAMES = ("m2", "m3", "u2", "I2", "C")
 LOWER = np.array([0.105, 0.07, 0.0, 1.3e-4, 0.3e-3])

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import record as rec
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

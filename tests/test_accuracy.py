@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from hpcclear import dataset
 from hpcclear.accuracy import averaging, integration, methods, random_inputs, surrogate
 from hpcclear.accuracy.methods import LARGEST_STEP, QUANTITIES
-from hpcclear.accuracy.printing import advice, describe, resolution
 from hpcclear.accuracy.profile import FULL, QUICK, Profile
 from hpcclear.accuracy.resting import MAKERS, Resting
 from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
-from hpcclear.comm import alone
-from hpcclear.errors import InputError
-from hpcclear.report import accuracy_figures, style
+from hpcclear.base.errors import InputError
+from hpcclear.cli.accuracy import advice, describe, resolution
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.figures import accuracy as accuracy_figures
+from hpcclear.report.figures import style
+from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.kriging import fit_kriging
 
 JOBS = Path(__file__).parent.parent / "jobs"
 PAPER = load_scene(JOBS / "slider_crank.toml")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hpcclear
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 
 SCENE = "jobs/slider_crank.toml"
 SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]

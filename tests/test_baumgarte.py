@@ -5,10 +5,10 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, run, scene_with
 from scipy.interpolate import CubicHermiteSpline
 
-from hpcclear.kernel import ideal
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.baumgarte import PHI1, X3, Y3, constraint_violation
-from hpcclear.lowering import effects_of
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import ideal
+from hpcclear.dynamics.linkage.baumgarte import PHI1, X3, Y3, constraint_violation
+from hpcclear.dynamics.lowering import effects_of
 
 IDEAL = {"joints.crank_rod": {"kind": "ideal"}, "joints.rod_slider": {"kind": "ideal"}}
 TORQUE = {"kind": "torque", "torque": 5.0, "initial_speed": "5000 rpm", "flywheel_inertia": 1e-2}

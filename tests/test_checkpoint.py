@@ -19,12 +19,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hpcclear import dataset, storage
-from hpcclear.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
-from hpcclear.errors import InputError, StorageError
-from hpcclear.lock import Holder, Lock
-from hpcclear.places import fresh_sibling
-from hpcclear.status import OUTCOME, Status, failed
+from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.outcome import OUTCOME, Status, failed
+from hpcclear.results import dataset
+from hpcclear.results import files as storage
+from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
+from hpcclear.results.lock import Holder, Lock
+from hpcclear.results.places import fresh_sibling
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
 
@@ -380,7 +381,7 @@ def kill_once(folder: Path, rounds: int, delay: float, context: BaseContext) -> 
 )
 def test_kills_at_random_moments_lose_nothing_that_was_safe(tmp_path, kills):
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["hpcclear.checkpoint", "pint"])
+    context.set_forkserver_preload(["hpcclear.results.checkpoint", "pint"])
     moments = random.Random(kills)
     for _ in range(kills):
         safe = kill_once(tmp_path, moments.randint(1, 3), moments.uniform(0.0, 0.06), context)
@@ -411,7 +412,7 @@ def test_a_second_run_is_refused_and_told_who_holds_the_lock(tmp_path):
     with Lock(tmp_path):
         with pytest.raises(InputError, match=f"process {os.getpid()} on "), Lock(tmp_path):
             pass
-        code = "from pathlib import Path\nfrom hpcclear.lock import Lock\n"
+        code = "from pathlib import Path\nfrom hpcclear.results.lock import Lock\n"
         code += f"Lock(Path({str(tmp_path)!r})).acquire()"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert done.returncode == 1
@@ -455,7 +456,7 @@ def test_a_stale_lock_is_recognised(tmp_path, flock, stale, monkeypatch):
 
 def test_the_lock_of_a_killed_process_is_stale_even_before_it_is_reaped(tmp_path):
     code = (
-        "from pathlib import Path\nfrom hpcclear.lock import Lock\nimport time\n"
+        "from pathlib import Path\nfrom hpcclear.results.lock import Lock\nimport time\n"
         f"Lock(Path({str(tmp_path)!r})).acquire()\nprint('held', flush=True)\ntime.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from hpcclear import dataset
 from hpcclear.cli import cli
+from hpcclear.results import dataset
 
 ROOT = Path(__file__).resolve().parent.parent
 SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.averaged_revolutions=1"]

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
 
-from hpcclear.errors import InputError
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import lobatto, record
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states
-from hpcclear.response import integrate
+from hpcclear.base.errors import InputError
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation import lobatto
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.response import integrate
+from hpcclear.dynamics.stepping import record
 from hpcclear.scene.points import Points
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"

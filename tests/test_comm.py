@@ -14,10 +14,11 @@ import time
 import numpy as np
 import pytest
 
-from hpcclear import comm, launcher
-from hpcclear.ranks import COLUMNS
-from hpcclear.status import OUTCOME
-from hpcclear.stopping import STOP_SIGNALS, StopSwitch
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ranks import boundary as comm
+from hpcclear.ranks import launcher
+from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
+from hpcclear.ranks.team import COLUMNS
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -320,7 +321,7 @@ def test_launchers_are_recognised(environment, size, rank):
 
 def test_every_library_is_kept_to_one_thread():
     script = (
-        "import numpy; from hpcclear.launcher import pin_threads; pin_threads()\n"
+        "import numpy; from hpcclear.ranks.launcher import pin_threads; pin_threads()\n"
         "import scipy.linalg, numba, threadpoolctl\n"
         "print({i['num_threads'] for i in threadpoolctl.threadpool_info()},"
         " numba.get_num_threads())"
@@ -331,7 +332,7 @@ def test_every_library_is_kept_to_one_thread():
 
 
 def test_importing_the_boundary_loads_no_mpi():
-    script = "import sys, hpcclear.comm; print('mpi4py' in sys.modules, 'numba' in sys.modules)"
+    script = "import sys, hpcclear.ranks.boundary; print('mpi4py' in sys.modules, 'numba' in sys.modules)"
     root = PROGRAMS.parent.parent
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
     assert run.stdout.split() == ["False", "False"], run.stderr

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from hpcclear.physics import contact, friction
+from hpcclear.dynamics.physics import contact, friction
 
 LATCHED = sorted(contact.LATCHED_LAWS)
 UNITS = pint.UnitRegistry()

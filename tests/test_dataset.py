@@ -18,10 +18,11 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hpcclear import dataset, storage
-from hpcclear.errors import InputError, StorageError
-from hpcclear.names import KINDS
-from hpcclear.status import JOINTS, OUTCOME, Flag, Status, failed
+from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status, failed
+from hpcclear.results import dataset
+from hpcclear.results import files as storage
+from hpcclear.results.names import KINDS
 
 SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
 HASH = "c0ffee" * 10 + "beef"

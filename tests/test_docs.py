@@ -13,7 +13,7 @@ import pytest
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
 
 from hpcclear.cli import cli
-from hpcclear.names import KINDS
+from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 
 NOT_RUN = [

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcclear.physics import contact
+from hpcclear.dynamics.physics import contact
 
 PACKAGE = Path(__file__).resolve().parent.parent / "hpcclear"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name != "__main__.py")
@@ -19,11 +19,11 @@ SHAPE = re.compile(
     r"shape|scalar|records?\b|rows?\b|[Ii]nd(ex|ices)|columns?\b|\(\w+(, ?[\w+ ]+)*,?\)"
 )
 PHYSICAL = (
-    "api",
-    "response",
-    "geometry",
+    "ensemble/api",
+    "dynamics/response",
+    "dynamics/linkage/geometry",
     "scene/points",
-    "scene/design_table",
+    "scene/table",
     "accuracy/equations",
 )
 UNIT = re.compile(r"\bSI\b|\b(m|m/s|N|N m|J|rad|s|kg)\b")
@@ -104,7 +104,7 @@ def test_input_errors_that_are_raised_are_announced(path):
 
 
 @pytest.mark.parametrize(
-    "path", sorted((PACKAGE / "physics").glob("[a-z]*.py")), ids=lambda p: p.stem
+    "path", sorted((PACKAGE / "dynamics" / "physics").glob("[a-z]*.py")), ids=lambda p: p.stem
 )
 def test_laws_name_their_source(path):
     assert [name.path for name in functions(path) if not SOURCE.search(name.all)] == []

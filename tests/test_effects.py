@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
 
-from hpcclear.errors import InputError
-from hpcclear.kernel import layout as at
-from hpcclear.lowering import effects_of
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lowering import effects_of
 from hpcclear.scene import load_scene
 
 TORQUE_CURVE = [[0.0, 2.0], [1.0, 9.0], [3.0, 4.0], [5.0, -1.0]]

@@ -17,9 +17,10 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from hpcclear import report
-from hpcclear.errors import InputError
-from hpcclear.report import accuracy_figures, labels, models, motion, style
-from hpcclear.surrogate.kriging import fit_kriging
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import accuracy as accuracy_figures
+from hpcclear.report.figures import labels, models, motion, style
+from hpcclear.statistics.surrogate.kriging import fit_kriging
 
 DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from running import HUNT_CROSSLEY, LATCHED, scene_with
 
-from hpcclear import dataset
-from hpcclear.comm import alone
-from hpcclear.evaluator import evaluate_records
-from hpcclear.names import KINDS
-from hpcclear.response import simulate
+from hpcclear.base.outcome import ON_REQUEST, RESPONSES
+from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.simulate import MAKERS, sample_points
+from hpcclear.ranks.boundary import alone
+from hpcclear.results import dataset
+from hpcclear.results.names import KINDS
 from hpcclear.scene.points import Points
-from hpcclear.status import ON_REQUEST, RESPONSES
-from hpcclear.work import MAKERS, sample_points
 
 NOTHING = Points((), np.empty((1, 0)), ())
 STUDY = {

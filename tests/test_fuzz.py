@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from commands import CHEAP, SCENE, Commands, overrides, run, sample
 
-from hpcclear import dataset
-from hpcclear.checkpoint import Checkpoint
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import load_scene
 from hpcclear.scene.paths import flatten
 

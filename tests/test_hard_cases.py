@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from hard_case_runs import hard_cases, long_run
 
-from hpcclear.errors import InputError
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.kernel.lifecycle import STATE
-from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.stepping.lifecycle import STATE
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points, check_points
-from hpcclear.status import Flag, Status
 
 CASES = sorted((Path(__file__).parent / "hard_cases").glob("*.toml"))
 # one open joint is a kernel of its own each, which takes long to compile

@@ -6,10 +6,10 @@ from dense_mechanism import PHI, THETA2, X2, X3, Y2, admissible, assembled
 from running import scene_with
 from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_of_parameters
 
-from hpcclear.ideal import ClosedForm, ideal_series
-from hpcclear.kernel import ideal
-from hpcclear.kernel import layout as at
-from hpcclear.lowering import parameters, periodic_cells, problem_of, start_states
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.linkage import ideal
+from hpcclear.dynamics.lowering import parameters, periodic_cells, problem_of, start_states
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
 ZERO = np.zeros(2)

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import memory as mem
-from hpcclear.kernel.jacobian import difference_jacobian, evaluate_bank
-from hpcclear.kernel.lanes import Lanes, Problem
-from hpcclear.kernel.lifecycle import ATOL, RTOL
-from hpcclear.kernel.observe import observe
-from hpcclear.kernel.radau import new_memory
-from hpcclear.kernel.stiff import fit_to_ramp
-from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
+from hpcclear.dynamics.implicit.radau import new_memory
+from hpcclear.dynamics.implicit.stiff import fit_to_ramp
+from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.stepping.lifecycle import ATOL, RTOL
 from hpcclear.scene import load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

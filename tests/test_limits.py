@@ -27,8 +27,8 @@ from commands import (
     start,
 )
 
-from hpcclear import dataset
-from hpcclear.ranks import COLUMNS
+from hpcclear.ranks.team import COLUMNS
+from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi
 OPTIONS = ("--checkpoint-interval", "0.2", "--progress", "quiet")

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from numba import njit, typeof, types
 
-from hpcclear.jit import FASTMATH, lane_function
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.rhs import accelerations
-from hpcclear.physics.angles import sincos
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.physics.angles import sincos
 
 FLAT = types.float64[::1]
 BARE = {"crank_rod", "rod_slider"}

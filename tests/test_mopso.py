@@ -4,10 +4,10 @@ import moocore
 import numpy as np
 import pytest
 
-from hpcclear import rng as rng_state
-from hpcclear.errors import InputError
-from hpcclear.mopso import Swarm, SwarmSettings, minimise
-from hpcclear.pareto import Archive, cut, hypervolume, relative_gain
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.search import generator_state as rng_state
+from hpcclear.statistics.search.mopso import Swarm, SwarmSettings, minimise
+from hpcclear.statistics.search.pareto import Archive, cut, hypervolume, relative_gain
 
 
 def zdt1(x):

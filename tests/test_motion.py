@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
 
-from hpcclear.kernel import baumgarte as bg
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.observe import observe
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import baumgarte as bg
+from hpcclear.dynamics.linkage.observe import observe
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}

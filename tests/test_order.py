@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import lifecycle as cycle
-from hpcclear.kernel.lanes import Lanes, Problem
-from hpcclear.kernel.tableau import TABLEAUS, Tableau
-from hpcclear.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.explicit.tableau import TABLEAUS, Tableau
+from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.stepping import lifecycle as cycle
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

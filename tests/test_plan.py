@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from hpcclear.accuracy.plan import RESERVE, Plan, Row, describe, measure, simulations_of, slurm
 from hpcclear.accuracy.resting import MAKERS
-from hpcclear.batch import design
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
-from hpcclear.comm import alone
-from hpcclear.errors import InputError
-from hpcclear.plan import RESERVE, Plan, Row, describe, measure, simulations_of, slurm
+from hpcclear.ensemble.samples import design
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
-from hpcclear.status import OUTCOME
-from hpcclear.work import sample_points
 
 JOBS = Path(__file__).parent.parent / "jobs"
 SCENE = load_scene(JOBS / "hunt_crossley.toml").with_(

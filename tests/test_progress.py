@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from hpcclear.progress import Progress, duration, launching_terminal, log_interval
-from hpcclear.status import OUTCOME
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ranks.progress import Progress, duration, launching_terminal, log_interval
 
 PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"

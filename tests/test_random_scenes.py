@@ -8,7 +8,7 @@ from hard_case_runs import hard_cases
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene
 
 CI = settings(

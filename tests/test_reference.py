@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear import evaluator
-from hpcclear.errors import InputError
-from hpcclear.evaluator import DEFAULT_LANES, evaluate_records
-from hpcclear.kernel import layout as at
-from hpcclear.kernel import record
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import parameters, problem_of, start_states
-from hpcclear.response import integrate
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import evaluator
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, evaluate_records
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.response import integrate
+from hpcclear.dynamics.stepping import record
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
-DATA = {"hpcclear/py.typed", "hpcclear/report/page.css", "hpcclear/report/page.js"}
+DATA = {"hpcclear/py.typed", "hpcclear/report/html/page.css", "hpcclear/report/html/page.js"}
 
 
 def run(*words: object, place: Path, patience: float = 600.0) -> str:
@@ -36,7 +36,12 @@ def run(*words: object, place: Path, patience: float = 600.0) -> str:
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with the source distribution and, made from that, the wheel."""
     place = tmp_path_factory.mktemp("release")
-    ignored = shutil.ignore_patterns(".*", "results", "site", "build", "*.egg-info", "__pycache__")
+    names = shutil.ignore_patterns(".*", "site", "build", "*.egg-info", "__pycache__")
+
+    def ignored(folder: str, entries: list[str]) -> set[str]:
+        results = {"results"} if Path(folder) == ROOT else set()  # not the package's room
+        return results | set(names(folder, entries))
+
     shutil.copytree(ROOT, place / "source", ignore=ignored)
     run(sys.executable, "-m", "build", "--outdir", place / "dist", place / "source", place=place)
     return place / "dist"

@@ -17,11 +17,11 @@ import pytest
 import report_data as data
 from browser import Browser
 
-from hpcclear import dataset
-from hpcclear.errors import InputError
-from hpcclear.report import markup, picture
-from hpcclear.report.content import read
-from hpcclear.report.page import write_report
+from hpcclear.base.errors import InputError
+from hpcclear.report.html import markup, picture
+from hpcclear.report.html.content import read
+from hpcclear.report.html.page import write_report
+from hpcclear.results import dataset
 
 
 class Tree(HTMLParser):
@@ -229,7 +229,7 @@ def test_data_for_the_script_cannot_end_its_element() -> None:
 
 def test_drawing_needs_neither_kernel_nor_mpi() -> None:
     code = (
-        "import sys, hpcclear.report.page\n"
+        "import sys, hpcclear.report.html.page\n"
         "bad = {'numba', 'mpi4py', 'sklearn', 'matplotlib', 'scipy'} & set(sys.modules)\n"
         "sys.exit(f'imported: {bad}' if bad else 0)"
     )

@@ -8,15 +8,15 @@ from scipy.special import stdtrit
 from sklearn.linear_model import LinearRegression
 from sklearn.preprocessing import PolynomialFeatures
 
-from hpcclear.errors import InputError
-from hpcclear.surrogate.metrics import accuracy, leave_one_out
-from hpcclear.surrogate.response_surface import (
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.metrics import accuracy, leave_one_out
+from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
     fit_response_surface,
     latin_hypercube,
     n_terms,
 )
-from hpcclear.surrogate.search import fit_until_accepted
+from hpcclear.statistics.surrogate.surface_search import fit_until_accepted
 
 MASSES = np.array([[0.105, 0.42], [0.07, 0.28]])  # kg, m2 and m3 of the paper
 INERTIAS = np.array([[3.1e-5, 1.25e-4], [1.3e-4, 5.0e-4], [0.0, 0.12]])  # badly scaled on purpose

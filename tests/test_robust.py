@@ -5,12 +5,18 @@ import pytest
 from scipy import stats
 from scipy.integrate import quad
 
-from hpcclear.distributions import Normal, TruncatedNormal, Uniform, nodes_needed, piece_rule
-from hpcclear.errors import InputError
-from hpcclear.random_inputs import Derived, RandomInput
-from hpcclear.robust import RobustObjective, sample_moments
-from hpcclear.surrogate.kriging import Kriging
-from hpcclear.surrogate.subintervals import PiecewiseKriging
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.random.distributions import (
+    Normal,
+    TruncatedNormal,
+    Uniform,
+    nodes_needed,
+    piece_rule,
+)
+from hpcclear.statistics.random.inputs import Derived, RandomInput
+from hpcclear.statistics.random.moments import RobustObjective, sample_moments
+from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
 
 LOWER, UPPER = np.array([1.0, -0.2, 5e-5, 3e-4]), np.array([2.0, 0.3, 8e-4, 1e-3])
 NAMES = ("m", "u", "I", "C")

@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from hpcclear.errors import InputError
-from hpcclear.sampling import (
+from hpcclear.base.errors import InputError
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.domain import box, to_coordinates, to_physical
+from hpcclear.scene.sampling import (
     Points,
     check_points,
     latin_hypercube,
@@ -17,8 +19,6 @@ from hpcclear.sampling import (
     read_points,
     unit_lhs,
 )
-from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.domain import box, to_coordinates, to_physical
 
 JOBS = Path(__file__).parent.parent / "jobs"
 ROBUST = load_scene(JOBS / "robust_slider_crank.toml")

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
 from hpcclear.scene import units as scene_units
 from hpcclear.scene.domain import box
@@ -467,7 +467,7 @@ def test_hostile_files_end_quickly(tmp_path: Path) -> None:
         (tmp_path / f"{index}.toml").write_text(text)
     # In a process of its own, because a parser that hangs in a pattern cannot be interrupted.
     code = (
-        "from hpcclear.errors import InputError\nfrom hpcclear.scene import load_scene\n"
+        "from hpcclear.base.errors import InputError\nfrom hpcclear.scene import load_scene\n"
         f"for index in range({len(HOSTILE)}):\n"
         f"    try:\n        load_scene(f'{tmp_path}/{{index}}.toml')\n"
         "    except InputError as error:\n        print(index, flush=True)"

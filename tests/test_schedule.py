@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hpcclear.schedule import QUANTUM, Desk, HandOut, Need, allot
+from hpcclear.ranks.schedule import QUANTUM, Desk, HandOut, Need, allot
 
 
 class SimulatedWorker:

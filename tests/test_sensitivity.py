@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from SALib.test_functions import Ishigami, Sobol_G
 
-from hpcclear.errors import InputError
-from hpcclear.sensitivity import (
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.sensitivity import (
     Influence,
     IntervalSettings,
     SensitivityHistory,

@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear import comm, dataset
-from hpcclear.accumulator import Accumulator
-from hpcclear.errors import InputError
-from hpcclear.partials import Parts, Summariser, packed, part_length, unpacked
-from hpcclear.sampling import MonteCarloPoints, monte_carlo
-from hpcclear.statistics import ROWS, Summary, columns, empty, merge, summarise
-from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.streaming import run_statistics, statistics_dataset
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpacked
+from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
+from hpcclear.ranks import boundary as comm
+from hpcclear.results import dataset
+from hpcclear.scene.sampling import MonteCarloPoints, monte_carlo
+from hpcclear.statistics.streams.accumulator import Accumulator
+from hpcclear.statistics.streams.summary import ROWS, Summary, columns, empty, merge, summarise
 
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
 sys.path.insert(0, str(PROGRAM.parent))

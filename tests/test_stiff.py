@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.lanes import Lanes
-from hpcclear.lowering import implicit_method, parameters, problem_of, start_states
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import implicit_method, parameters, problem_of, start_states
 from hpcclear.scene import Scene, load_scene
 
 ROOT = Path(__file__).parent.parent

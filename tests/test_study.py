@@ -10,21 +10,15 @@ import moocore
 import numpy as np
 import pytest
 
-from hpcclear import dataset
-from hpcclear.checkpoint import Checkpoint
-from hpcclear.comm import alone
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.ranks.stopping import Stopped
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import load_scene
-from hpcclear.stopping import Stopped
-from hpcclear.study import (
-    audit,
-    claims,
-    optimisation,
-    responses,
-    run_study,
-    simulations,
-    surrogates,
-)
+from hpcclear.study import optimisation, responses, run_study, simulations, surrogates
+from hpcclear.study.paper import claims
+from hpcclear.study.paper import readings as audit
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -414,10 +408,10 @@ def test_the_swarm_sees_the_exact_moments():
     """Mean and deviation on a model of the formula equal the exact ones, I2 entering as a ratio."""
     scene = scene_of()
     names = scene.study.optimisation
-    from hpcclear.sampling import latin_hypercube
     from hpcclear.scene.domain import box, to_coordinates
-    from hpcclear.surrogate.kriging import fit_kriging
-    from hpcclear.surrogate.subintervals import PiecewiseKriging
+    from hpcclear.scene.sampling import latin_hypercube
+    from hpcclear.statistics.surrogate.kriging import fit_kriging
+    from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
 
     widen = ("m2", "m3", "u2", "I2", "C")
     points = latin_hypercube(scene, 250, names=names, widen=widen)

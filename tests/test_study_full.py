@@ -8,13 +8,13 @@ import sys
 import numpy as np
 import pytest
 
-from hpcclear import dataset
-from hpcclear.evaluator import evaluate_records
-from hpcclear.sampling import generator, latin_hypercube
+from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.surrogate.kriging import fit_kriging
-from hpcclear.surrogate.metrics import accuracy
+from hpcclear.scene.sampling import generator, latin_hypercube
+from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.metrics import accuracy
 
 ROOT = pathlib.Path(__file__).parent.parent
 PROGRAM = pathlib.Path(sys.executable).parent / "hpcclear"

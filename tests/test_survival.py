@@ -32,8 +32,8 @@ from commands import (
 )
 from losses import Loss
 
-from hpcclear import dataset
-from hpcclear.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
 
 sys.path.insert(0, str(PROGRAM.parent))
 
@@ -209,7 +209,7 @@ def test_both_entry_points_obey_a_signal(tmp_path, undisturbed, program, ranks):
 def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturbed, ranks):
     words = sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     # the first interrupt finds a root that does not listen
-    job = start(words, ranks, TEST_FAIL="sleep hpcclear.checkpoint:Checkpoint.flush 3")
+    job = start(words, ranks, TEST_FAIL="sleep hpcclear.results.checkpoint:Checkpoint.flush 3")
     wait_for_parts(job, tmp_path)
     time.sleep(1.5)
     kill(job.pid, signal.SIGINT)
@@ -242,31 +242,31 @@ def _script() -> str:
 
 BEFORE = [
     "call hpcclear.cli:_scene",
-    "call hpcclear.batch:design",
-    "call hpcclear.lock:Lock.acquire",
-    "call hpcclear.checkpoint:Checkpoint._open",
-    "import hpcclear.batch",
+    "call hpcclear.ensemble.samples:design",
+    "call hpcclear.results.lock:Lock.acquire",
+    "call hpcclear.results.checkpoint:Checkpoint._open",
+    "import hpcclear.ensemble.samples",
     "import hpcclear.scene",
 ]
-DURING = ["import hpcclear.evaluator", "maker", "simulation"]
+DURING = ["import hpcclear.dynamics.evaluator", "maker", "simulation"]
 NO_MORE_SAVES = [
-    "call hpcclear.checkpoint:Checkpoint.flush 2",
-    "call hpcclear.dataset:samples_dataset 2",
+    "call hpcclear.results.checkpoint:Checkpoint.flush 2",
+    "call hpcclear.results.dataset:samples_dataset 2",
 ]
 AFTER = [
     *NO_MORE_SAVES,
-    "once hpcclear.checkpoint:Checkpoint.flush 2",
-    "once hpcclear.storage:write_bytes 3",
-    "call hpcclear.progress:Progress.add 5",
-    "call hpcclear.batch:discard",
-    "call hpcclear.batch:timing_of",
-    "call hpcclear.describe:describe_samples",
+    "once hpcclear.results.checkpoint:Checkpoint.flush 2",
+    "once hpcclear.results.files:write_bytes 3",
+    "call hpcclear.ranks.progress:Progress.add 5",
+    "call hpcclear.ensemble.samples:discard",
+    "call hpcclear.ensemble.samples:timing_of",
+    "call hpcclear.cli.printing:describe_samples",
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
 STUDY_CASES = [
     "call hpcclear.cli:_scene",
     "import hpcclear.study",
-    "call hpcclear.checkpoint:Checkpoint._open",
+    "call hpcclear.results.checkpoint:Checkpoint._open",
     "call hpcclear.study.sensitivities:analyse",
     "call hpcclear.study.sensitivities:_global",
     "call hpcclear.study.surrogates:fit_all",
@@ -274,11 +274,11 @@ STUDY_CASES = [
     "call hpcclear.study.optimisation:optimise",
     "call hpcclear.study.verification:moments",
     "call hpcclear.study.responses:simulate_all",
-    "call hpcclear.study.audit:_over_steps",
-    "call hpcclear.study.claims:judge",
-    "call hpcclear.checkpoint:Checkpoint.save_stage 2",
+    "call hpcclear.study.paper.readings:_over_steps",
+    "call hpcclear.study.paper.claims:judge",
+    "call hpcclear.results.checkpoint:Checkpoint.save_stage 2",
     "call hpcclear.study:_write_timing",
-    "call hpcclear.checkpoint:Checkpoint.finish",
+    "call hpcclear.results.checkpoint:Checkpoint.finish",
 ]
 
 

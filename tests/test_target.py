@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.api import evaluate
-from hpcclear.evaluator import evaluate_records
+from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.dynamics.target import STRICT, resolve
+from hpcclear.ensemble.api import evaluate
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.target import STRICT, resolve
 
 BASE = load_scene(Path(__file__).parent.parent / "jobs" / "hunt_crossley.toml")
 LAWS = (

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from hpcclear.api import as_points
-from hpcclear.evaluator import evaluate_records
-from hpcclear.sampling import latin_hypercube
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.ensemble.api import as_points
 from hpcclear.scene import load_scene
-from hpcclear.status import Flag, Status
+from hpcclear.scene.sampling import latin_hypercube
 
 SCENE = "jobs/quickstart.toml"
 

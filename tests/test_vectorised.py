@@ -7,8 +7,8 @@ import numba
 import numpy as np
 import pytest
 
-from hpcclear.evaluator import DEFAULT_LANES
-from hpcclear.kernel import layout as at
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"
 sys.path.insert(0, str(ANALYSIS))

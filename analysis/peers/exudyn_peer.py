@@ -10,11 +10,10 @@ from collections.abc import Callable
 
 import exudyn as exu
 import exudyn.itemInterface as items
+from hpcclear.system import end_time
 from scenes import Setup
 
-from hpcclear.kernel import layout as at
-
-from .system import end_time
+from hpcclear.dynamics import layout as at
 
 _HUGE = 1e12  # kg m^2
 

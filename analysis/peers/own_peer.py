@@ -6,13 +6,12 @@ from functools import cache
 
 import numpy as np
 import plain_loop
+from hpcclear.system import SLIDER, Array
 from scenes import Setup
 
-from hpcclear.kernel import layout as at
-from hpcclear.kernel.lanes import Lanes, Problem
-from hpcclear.kernel.tableau import TABLEAUS
-
-from .system import SLIDER, Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.explicit.tableau import TABLEAUS
+from hpcclear.dynamics.lanes import Lanes, Problem
 
 POSITION = at.OUT_STATE + SLIDER
 WIDTH = 32

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from plain_loop import motion
 from scenes import Setup
 
-from hpcclear.jit import FASTMATH
-from hpcclear.kernel import layout as at
+from hpcclear.base.jit import FASTMATH
+from hpcclear.dynamics import layout as at
 
 Array = NDArray[np.float64]
 STATES = 8

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from hpcclear.cli import cli
-from hpcclear.names import KINDS
+from hpcclear.results.names import KINDS
 from hpcclear.scene import scene_schema
 
 NOT_RUN = re.compile(r"^(`{3,})(\w+) no-run: (.*)$", re.MULTILINE)

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluator import DEFAULT_LANES
-from ..kernel import layout as at
-from ..kernel.lanes import Lanes
-from ..lowering import parameters, problem_of, start_states
-from ..scene import Scene
-from ..turns import objective, turn_by_turn
-from .methods import one_turn
-from .profile import Profile
+from hpcclear.accuracy.methods import one_turn
+from hpcclear.accuracy.profile import Profile
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.revolutions import objective, turn_by_turn
+from hpcclear.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jit import scalar_function
-from ..kernel import layout as at
-from ..kernel.lanes import Problem
-from ..kernel.rhs import accelerations
+from hpcclear.base.jit import scalar_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Problem
+from hpcclear.dynamics.linkage.rhs import accelerations
 
 Array = NDArray[np.float64]
 
@@ -123,7 +123,7 @@ class Equations:
     problem : Problem
     par : ndarray, shape (PARAMETERS,)
     start : ndarray, shape (STATE,)
-        As `hpcclear.lowering` makes them.
+        As `hpcclear.dynamics.lowering` makes them.
     """
 
     def __init__(self, problem: Problem, par: Array, start: Array) -> None:

@@ -10,10 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel import layout as at
-from ..scene import Scene
-from .methods import QUANTITIES, kernel_method, methods_of, solve_turn, systems, timed
-from .profile import Profile
+from hpcclear.accuracy.methods import (
+    QUANTITIES,
+    kernel_method,
+    methods_of,
+    solve_turn,
+    systems,
+    timed,
+)
+from hpcclear.accuracy.profile import Profile
+from hpcclear.dynamics import layout as at
+from hpcclear.scene import Scene
 
 Array = NDArray[np.float64]
 

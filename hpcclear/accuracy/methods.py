@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from .. import geometry
-from ..errors import InputError
-from ..evaluator import DEFAULT_LANES
-from ..kernel import layout as at
-from ..kernel.lanes import Lanes, Problem
-from ..lowering import parameters, problem_of, start_states, topology
-from ..scene import Scene
-from ..scene.points import Points
-from .equations import FORCE, OPEN, RATE, Equations
+from hpcclear.accuracy.equations import FORCE, OPEN, RATE, Equations
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.linkage import geometry
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states, topology
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
 
 Array = NDArray[np.float64]
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ranks import COLUMNS, Ranks
-from ..sampling import generator
-from ..scene import Scene
-from ..scene.domain import study_of, to_physical
-from ..scene.points import Points
-from ..work import payload_of
-from .profile import Profile
-from .resting import SOME_RANKS
-from .surrogate import region_of
+from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.resting import SOME_RANKS
+from hpcclear.accuracy.surrogate import region_of
+from hpcclear.ensemble.simulate import payload_of
+from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of, to_physical
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import generator
 
 Array = NDArray[np.float64]
 

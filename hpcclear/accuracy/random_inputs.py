@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from ..errors import InputError
-from ..ranks import Ranks
-from ..robust import sample_moments
-from ..sampling import generator, monte_carlo
-from ..scene import Scene
-from ..scene.domain import study_of
-from ..study.optimisation import problem_of
-from ..surrogate.kriging import Kriging
-from .profile import Profile
-from .surrogate import objectives
+from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.surrogate import objectives
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.team import Ranks
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of
+from hpcclear.scene.sampling import generator, monte_carlo
+from hpcclear.statistics.random.moments import sample_moments
+from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.study.optimisation import problem_of
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ranks import Maker, Ranks
-from ..schedule import Worker
-from ..status import OUTCOME
-from ..work import MAKERS as WORK_MAKERS
-from ..work import make_evaluator
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ensemble.simulate import MAKERS as WORK_MAKERS
+from hpcclear.ensemble.simulate import make_evaluator
+from hpcclear.ranks.schedule import Worker
+from hpcclear.ranks.team import Maker, Ranks
 
 SOME_RANKS = "points on some ranks"
 
@@ -39,4 +39,4 @@ def make_on_some(payload: Mapping[str, Any], ranks: Ranks) -> Worker:
 
 
 MAKERS: Mapping[str, Maker] = {**WORK_MAKERS, SOME_RANKS: make_on_some}
-"""For `hpcclear.comm.run_on_ranks`."""
+"""For `hpcclear.ranks.boundary.run_on_ranks`."""

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from .. import dataset, storage
-from ..errors import InputError
-from ..ranks import Ranks
-from ..scene import Scene
-from . import averaging, integration, parallel, random_inputs, surrogate
-from .methods import QUANTITIES
-from .profile import Profile
-from .standin import with_case
+from hpcclear.accuracy import averaging, integration, parallel, random_inputs, surrogate
+from hpcclear.accuracy.methods import QUANTITIES
+from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.standin import with_case
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results import files as storage
+from hpcclear.scene import Scene
 
 
 def measure(
@@ -151,8 +152,9 @@ def run_accuracy(scene: Scene, directory: Path, ranks: Ranks, profile: Profile) 
     ------
     InputError, StorageError, Stopped, RankFailed
     """
-    from ..report import accuracy_figures, style
-    from .printing import describe
+    from hpcclear.cli.accuracy import describe
+    from hpcclear.report.figures import accuracy as accuracy_figures
+    from hpcclear.report.figures import style
 
     style.matplotlib()  # said before the measuring, not after
     place = directory / "accuracy.nc"

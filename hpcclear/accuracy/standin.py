@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from ..scene import Scene
-from ..scene.variables import PAPER_PATHS
+from hpcclear.scene import Scene
+from hpcclear.scene.variables import PAPER_PATHS
 
 CASE = "about_the_scene"
 WIDTH = 0.2

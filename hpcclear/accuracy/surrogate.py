@@ -6,19 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ranks import Ranks
-from ..sampling import generator, unit_lhs
-from ..scene import Scene
-from ..scene.domain import Box, box, study_of, to_physical
-from ..scene.points import Points
-from ..status import Status
-from ..study.simulations import objective_of
-from ..study.surrogates import coordinate
-from ..surrogate.kriging import Kriging, fit_kriging
-from ..surrogate.metrics import accuracy
-from ..surrogate.response_surface import fit_response_surface, n_terms
-from ..work import sample_points
-from .profile import Profile
+from hpcclear.accuracy.profile import Profile
+from hpcclear.base.outcome import Status
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.team import Ranks
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import Box, box, study_of, to_physical
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
+from hpcclear.study.simulations import objective_of
+from hpcclear.study.surrogates import coordinate
 
 Array = NDArray[np.float64]
 

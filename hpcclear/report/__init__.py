@@ -3,25 +3,30 @@
 Figures need matplotlib (the extra ``analysis``), which is imported when the first one is drawn.
 """
 
-from .designs import comparison_figure, front_figure
-from .portraits import force_polar_figure, orbit_figure, phase_figure, poincare_figure
-from .response import (
+from hpcclear.report.figures.designs import comparison_figure, front_figure
+from hpcclear.report.figures.portraits import (
+    force_polar_figure,
+    orbit_figure,
+    phase_figure,
+    poincare_figure,
+)
+from hpcclear.report.figures.response import (
     bifurcation_figure,
     energy_figure,
     penetration_figure,
     response_figure,
     spectrum_figure,
 )
-from .samples import samples_figure
-from .style import save
-from .surrogates import (
+from hpcclear.report.figures.samples import samples_figure
+from hpcclear.report.figures.style import save
+from hpcclear.report.figures.surrogates import (
     fit_figure,
     parity_figure,
     sensitivity_figure,
     sobol_figure,
     surfaces_figure,
 )
-from .timing import timing_figure
+from hpcclear.report.figures.timing import timing_figure
 
 __all__ = [
     "bifurcation_figure",

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from hpcclear.scene.models import ClearanceJoint, TorqueDrive
+from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
 from hpcclear.scene.paths import flatten
 
 if TYPE_CHECKING:

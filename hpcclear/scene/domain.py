@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.paths import quantities, replace
 from hpcclear.scene.scene import Scene

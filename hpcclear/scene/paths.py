@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import CurveOf, Quantity
-from hpcclear.scene.models import Drive, Joints, Mechanism
+from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 
 PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
 """The tables whose numbers describe the mechanism and what acts on it."""

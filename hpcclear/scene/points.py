@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import entries
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.scene import Scene

@@ -7,17 +7,17 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr, ValidationError, field_validator, model_validator
 
-from hpcclear.errors import InputError
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene import describing, domain
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, nearest, problem
-from hpcclear.scene.models import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.study import Study
+from hpcclear.scene.toml import to_toml
 from hpcclear.scene.variables import PAPER_PATHS
-from hpcclear.scene.writing import to_toml
-from hpcclear.status import RESPONSES
 
 
 class Scene(Table):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import model_validator
 
 from hpcclear.scene.fields import Count, NamedRows, Table, nearest, problem
-from hpcclear.scene.settings import Names, Sensitivity, Surrogate, Swarm, Verification
+from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
 from hpcclear.scene.variables import Case, RandomInput, Variable
 
 PAPER_GROUPS = (("m1", "m2"), ("m2", "m3"), ("u1", "u2"), ("I1", "I2"))

@@ -7,9 +7,9 @@ from typing import Any, Literal
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.outcome import ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, nearest, problem
 from hpcclear.scene.paths import quantities
-from hpcclear.status import ON_REQUEST
 
 PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
     "m1": ("mechanism.crank.mass",),

@@ -23,23 +23,27 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import dataset, storage
-from ..checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
-from ..errors import InputError
-from ..lock import Lock
-from ..places import fresh_sibling
-from ..progress import Style
-from ..ranks import COLUMNS, Ranks
-from ..scene import Scene
-from ..scene.domain import study_of
-from ..scene.points import Points
-from ..surrogate.subintervals import PiecewiseKriging
-from ..work import run_key
-from . import audit, claims, optimisation, paper, responses, sensitivities, surrogates, verification
-from .compiling import compile_ahead
-from .optimisation import Choice
-from .run import Result, Run
-from .simulations import Simulations
+from hpcclear.base.errors import InputError
+from hpcclear.ensemble.compiling import compile_ahead
+from hpcclear.ensemble.simulate import run_key
+from hpcclear.ranks.progress import Style
+from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.results import dataset
+from hpcclear.results import files as storage
+from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
+from hpcclear.results.lock import Lock
+from hpcclear.results.places import fresh_sibling
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of
+from hpcclear.scene.points import Points
+from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.study import optimisation, responses, sensitivities, surrogates, verification
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.paper import claims
+from hpcclear.study.paper import printed as paper
+from hpcclear.study.paper import readings as audit
+from hpcclear.study.run import Result, Run
+from hpcclear.study.simulations import Simulations
 
 __all__ = ["run_study"]
 
@@ -53,7 +57,7 @@ def run_study(
     progress_style: Style = "auto",
     tell: Callable[[str], object] = lambda text: None,
 ) -> int | None:
-    """Carry a study through; call it on root, under `hpcclear.comm.run_on_ranks`.
+    """Carry a study through; call it on root, under `hpcclear.ranks.boundary.run_on_ranks`.
 
     Parameters
     ----------
@@ -63,7 +67,7 @@ def run_study(
         Where results go; made if its parent exists. What an earlier run of the same study finished
         there is not done again.
     ranks : Ranks
-        Made with `hpcclear.work.MAKERS`.
+        Made with `hpcclear.ensemble.simulate.MAKERS`.
     fresh : bool
         Start anew in a directory beside it, if there is one already.
     progress_style : {"auto", "bar", "log", "quiet"}

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import dataset
-from ..distributions import Distribution, Normal, TruncatedNormal, Uniform
-from ..errors import InputError
-from ..mopso import SwarmSettings, minimise
-from ..pareto import cut, hypervolume
-from ..random_inputs import Derived, RandomInput
-from ..robust import RobustObjective
-from ..sampling import generator, unit_lhs
-from ..scene import Scene
-from ..scene import variables as scene_variables
-from ..scene.domain import Box, box, study_of, to_physical
-from ..surrogate.subintervals import PiecewiseKriging
-from .run import Result, Run
-from .surrogates import coordinate
+from hpcclear.base.errors import InputError
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene import variables as scene_variables
+from hpcclear.scene.domain import Box, box, study_of, to_physical
+from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.statistics.random.distributions import Distribution, Normal, TruncatedNormal, Uniform
+from hpcclear.statistics.random.inputs import Derived, RandomInput
+from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.search.mopso import SwarmSettings, minimise
+from hpcclear.statistics.search.pareto import cut, hypervolume
+from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.study.run import Result, Run
+from hpcclear.study.surrogates import coordinate
 
 Array = NDArray[np.float64]
 PROBES = 64

@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..dataset import variable_name
-from ..errors import InputError
-from ..response import simulate
-from ..scene import Scene
-from .optimisation import Choice
-from .run import Result, Run
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.response import simulate
+from hpcclear.results.dataset import variable_name
+from hpcclear.scene import Scene
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, Run
 
 Array = NDArray[np.float64]
 

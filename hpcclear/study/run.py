@@ -9,14 +9,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from .. import dataset
-from ..checkpoint import Checkpoint
-from ..ranks import Ranks
-from ..sampling import generator
-from ..scene import Scene
-from ..scene.domain import study_of
-from ..scene.study import Study
-from .simulations import Simulations, objective_of
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of
+from hpcclear.scene.sampling import generator
+from hpcclear.scene.study import Study
+from hpcclear.study.simulations import Simulations, objective_of
 
 Result = dict[str, np.ndarray]
 

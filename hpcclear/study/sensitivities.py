@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .. import dataset
-from ..scene.domain import box
-from ..sensitivity import (
+from hpcclear.results import dataset
+from hpcclear.scene.domain import box
+from hpcclear.statistics.sensitivity import (
     IntervalDesign,
     IntervalSettings,
     analyse_intervals,
@@ -19,10 +19,10 @@ from ..sensitivity import (
     select_influential,
     sobol_design,
 )
-from ..surrogate.metrics import Accuracy, accuracy
-from ..surrogate.response_surface import fit_response_surface, n_terms
-from ..surrogate.search import fit_until_accepted
-from .run import Result, Run
+from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
+from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
+from hpcclear.statistics.surrogate.surface_search import fit_until_accepted
+from hpcclear.study.run import Result, Run
 
 Array = NDArray[np.float64]
 STAGE = "sensitivity"

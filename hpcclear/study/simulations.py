@@ -5,16 +5,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checkpoint import Checkpoint
-from ..errors import InputError
-from ..progress import Progress, Style
-from ..ranks import Ranks
-from ..sampling import check_points
-from ..scene import Scene
-from ..scene.domain import study_of, to_physical
-from ..scene.points import Points
-from ..status import Status
-from ..work import sample_points
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.progress import Progress, Style
+from hpcclear.ranks.team import Ranks
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of, to_physical
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 
 Array = NDArray[np.float64]
 

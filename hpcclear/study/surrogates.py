@@ -6,15 +6,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import dataset
-from ..errors import InputError
-from ..sampling import unit_lhs
-from ..scene.domain import Box, box
-from ..scene.variables import Variable
-from ..surrogate.kriging import Kriging, fit_kriging
-from ..surrogate.metrics import accuracy
-from ..surrogate.subintervals import PIECEWISE_FIELDS, PiecewiseKriging, fit_subintervals
-from .run import Result, Run
+from hpcclear.base.errors import InputError
+from hpcclear.results import dataset
+from hpcclear.scene.domain import Box, box
+from hpcclear.scene.sampling import unit_lhs
+from hpcclear.scene.variables import Variable
+from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.subintervals import (
+    PIECEWISE_FIELDS,
+    PiecewiseKriging,
+    fit_subintervals,
+)
+from hpcclear.study.run import Result, Run
 
 Array = NDArray[np.float64]
 STAGE = "kriging"
@@ -33,7 +37,7 @@ def domain(run: Run, names: Sequence[str]) -> Box:
 
 
 def fit_all(run: Run) -> Result:
-    """Fit every model of the study (method: `hpcclear.surrogate.subintervals`), and check each.
+    """Fit every model of the study (method: `hpcclear.statistics.surrogate.subintervals`), and check each.
 
     Returns
     -------

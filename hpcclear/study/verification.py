@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from .. import dataset
-from ..robust import sample_moments
-from ..sampling import monte_carlo
-from ..scene.domain import to_coordinates
-from ..scene.points import Points
-from ..surrogate.subintervals import PiecewiseKriging
-from . import surrogates
-from .optimisation import Choice, problem_of
-from .run import Result, Run
+from hpcclear.results import dataset
+from hpcclear.scene.domain import to_coordinates
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.statistics.random.moments import sample_moments
+from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.study import surrogates
+from hpcclear.study.optimisation import Choice, problem_of
+from hpcclear.study.run import Result, Run
 
 Array = NDArray[np.float64]
 _COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")

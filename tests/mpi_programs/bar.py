@@ -4,9 +4,9 @@ import sys
 
 from synthetic import design, make_sleeping
 
-from hpcclear.comm import run_on_ranks
-from hpcclear.progress import Progress
-from hpcclear.ranks import Ranks
+from hpcclear.ranks.boundary import run_on_ranks
+from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.team import Ranks
 
 
 def program(ranks: Ranks) -> None:

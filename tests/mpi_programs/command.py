@@ -20,7 +20,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hpcclear import checkpoint, cli, launcher, ranks, stopping, work
+from hpcclear import cli
+from hpcclear.ensemble import simulate as work
+from hpcclear.ranks import launcher, stopping
+from hpcclear.ranks import team as ranks
+from hpcclear.results import checkpoint
 
 RANK = launcher.launched_rank() or 0
 FAIL = os.environ.get("TEST_FAIL", "")

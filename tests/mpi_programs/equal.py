@@ -5,8 +5,8 @@ import sys
 import numpy as np
 from synthetic import design, make_sleeping
 
-from hpcclear.comm import run_on_ranks
-from hpcclear.ranks import COLUMNS, Ranks
+from hpcclear.ranks.boundary import run_on_ranks
+from hpcclear.ranks.team import COLUMNS, Ranks
 
 
 def program(ranks: Ranks) -> None:

@@ -10,9 +10,9 @@ import time
 import numpy as np
 from synthetic import SleepingWorker, design
 
-from hpcclear.comm import run_on_ranks
-from hpcclear.errors import InputError
-from hpcclear.ranks import Ranks
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import run_on_ranks
+from hpcclear.ranks.team import Ranks
 
 HOW, MARK = sys.argv[1], pathlib.Path(sys.argv[2])
 OTHER = 1

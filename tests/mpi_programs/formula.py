@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear import dataset
-from hpcclear.ranks import Ranks
+from hpcclear.base.outcome import OUTCOME, Status, failed
+from hpcclear.ranks.stopping import Stopped
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.status import OUTCOME, Status, failed
-from hpcclear.stopping import Stopped
-from hpcclear.study import audit, responses, run_study
+from hpcclear.study import responses, run_study
+from hpcclear.study.paper import readings as audit
 from hpcclear.study.run import Run
 
 PHYSICS = """
@@ -215,7 +216,7 @@ def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
 
 
 if __name__ == "__main__":
-    from hpcclear.comm import run_on_ranks
+    from hpcclear.ranks.boundary import run_on_ranks
 
     replace_dynamics()
 

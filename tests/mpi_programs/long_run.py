@@ -11,8 +11,8 @@ import time
 import numpy as np
 from synthetic import SleepingWorker, design, make_sleeping
 
-from hpcclear.ranks import Ranks
-from hpcclear.status import OUTCOME
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ranks.team import Ranks
 
 WHERE, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
 

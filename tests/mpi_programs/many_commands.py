@@ -15,7 +15,12 @@ from pathlib import Path
 import numpy  # noqa: F401
 import xarray  # noqa: F401
 
-from hpcclear import batch, cli, comm, dataset, describe, evaluator, scene  # noqa: F401
+from hpcclear import cli, scene
+from hpcclear.cli import printing  # noqa: F401
+from hpcclear.dynamics import evaluator  # noqa: F401
+from hpcclear.ensemble import samples
+from hpcclear.ranks import boundary
+from hpcclear.results import dataset  # noqa: F401
 
 PATIENCE = 120.0  # s; a hang lasts for ever, a crowded machine does not
 
@@ -61,9 +66,9 @@ def run(words: list[str], user: int | None) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    comm.describe_mpi()  # loads the library once for all; the rest is what another user may not read
+    boundary.describe_mpi()  # loads the library once for all; the rest is what another user may not read
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
-    batch.sample_key(shipped, batch.design(shipped, None))
+    samples.sample_key(shipped, samples.design(shipped, None))
     for line in sys.stdin:
         asked = json.loads(line)
         print(json.dumps(run(asked["words"], asked["user"])), flush=True)

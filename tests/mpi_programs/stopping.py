@@ -2,14 +2,14 @@
 
 import sys
 
-from hpcclear.stopping import StopSwitch
+from hpcclear.ranks.stopping import StopSwitch
 
 
 def main() -> int:
     with StopSwitch(ends_process=True) as stop:  # before the slow imports
         from long_run import MAKERS, program
 
-        from hpcclear.comm import run_on_ranks
+        from hpcclear.ranks.boundary import run_on_ranks
 
         if len(sys.argv) > 3:
             stop.limit_time(float(sys.argv[3]))

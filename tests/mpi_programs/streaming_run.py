@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcclear import comm
+from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.ensemble.simulate import KIND, MAKERS
+from hpcclear.ensemble.statistics import run_statistics
+from hpcclear.ranks import boundary as comm
+from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.scene import load_scene
-from hpcclear.status import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.stopping import StopSwitch
-from hpcclear.streaming import run_statistics
-from hpcclear.work import KIND, MAKERS
 
 SCENE = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
 

@@ -4,8 +4,8 @@ import time
 
 import numpy as np
 
-from hpcclear.ranks import Ranks
-from hpcclear.status import OUTCOME
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ranks.team import Ranks
 
 
 def design(samples: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from hpcclear import dataset
+from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

@@ -1,0 +1,301 @@
+"""The `plan` command: error against core-hours, measured on some of the samples, and the job to ask for."""
+
+import math
+import multiprocessing
+import os
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from hpcclear.accuracy.parallel import process_age_at_start
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.cli.printing import console, table
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
+from hpcclear.dynamics.target import resolve
+from hpcclear.ensemble.samples import design
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.progress import duration
+from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points
+
+TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
+"""Errors of the ladder."""
+
+PROBE = 2 * DEFAULT_LANES
+"""Samples of the first look at what one costs."""
+
+FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
+"""How long the settings of the file, and each rung of the ladder, are measured on every rank."""
+
+LARGEST_DESIGN = 4096
+"""Points of the design that are drawn for measuring: the cost of a sample depends on where it lies."""
+
+EFFICIENCY = 0.95
+"""Of ranks that share out samples: the rest is waiting at the end."""
+
+RESERVE = 1.5
+"""Wall time asked for over wall time expected."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the plan.
+
+    Attributes
+    ----------
+    error : float or None
+        Target error of f; None: the settings of the file.
+    scene : Scene
+        With the settings.
+    seconds : float
+        Core-seconds of one sample.
+    reason : str
+        What the settings were chosen for; empty for those of the file.
+    """
+
+    error: float | None
+    scene: Scene
+    seconds: float
+    reason: str
+
+    def settings(self) -> str:
+        """Tolerance and revolutions in words."""
+        n = self.scene.numerics
+        return f"rtol {n.rtol:.1e}, {n.transient_revolutions}+{n.averaged_revolutions} rev"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was measured.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        The file's own settings first, then the ladder.
+    samples : int
+        Simulations of `sample`.
+    study : int or None
+        Simulations of `run`, at least; None if the study has no case.
+    startup : float
+        Seconds each rank needs before it simulates.
+    memory : float
+        Bytes a rank.
+    columns : int
+        Study variables.
+    """
+
+    rows: tuple[Row, ...]
+    samples: int
+    study: int | None
+    startup: float
+    memory: float
+    columns: int
+
+    def core_seconds(self, row: Row, simulations: int, ranks: int) -> float:
+        """Core-seconds of a job, start-up on every rank included."""
+        return simulations * row.seconds + ranks * self.startup
+
+    def wall_seconds(self, row: Row, simulations: int, ranks: int) -> float:
+        """Wall time of a job."""
+        return (
+            simulations * row.seconds / (ranks * (EFFICIENCY if ranks > 1 else 1.0)) + self.startup
+        )
+
+    def disk(self, simulations: int) -> float:
+        """Bytes of the samples and of the checkpoint that stands beside them meanwhile."""
+        return 2.0 * simulations * (OUTCOME.itemsize + 8 * self.columns)
+
+
+def measure(
+    scene: Scene, ranks: Ranks, errors: tuple[float, ...] = TARGETS, workers: int = 1
+) -> Plan:
+    """Measure what samples cost at the settings of the file and at those chosen for each error; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    ranks : Ranks
+        Made with `hpcclear.ensemble.simulate.MAKERS`.
+    errors : tuple of float
+        Target errors of the ladder.
+    workers : int
+        Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
+        clock are slower together.
+
+    Raises
+    ------
+    InputError
+        If the scene has no study.
+    """
+    study = scene.study
+    few = scene
+    if study is not None and study.samples > LARGEST_DESIGN:
+        few = scene.with_({"study.samples": LARGEST_DESIGN})
+    points = design(few, None)
+    assert study is not None  # refused by `design`
+    wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
+    chosen = [(error, *resolve(one, points)) for error, one in wanted]
+    rows = []
+    with _company(scene, points, workers if ranks.size == 1 else 1):
+        for k, (error, one, reason) in enumerate(chosen):
+            seconds = cost(
+                one, points, ranks, FILE_SECONDS if error is None else RUNG_SECONDS, str(k)
+            )
+            rows.append(Row(error, one, seconds, reason))
+    peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    startup = process_age_at_start()
+    return Plan(
+        tuple(rows), study.samples, simulations_of(scene), startup, peak, len(study.variables)
+    )
+
+
+def cost(scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str) -> float:
+    """Core-seconds of one sample in a long batch, measured for about `seconds` on every rank."""
+
+    def busy(count: int, stage: str) -> float:
+        sample_points(scene, points.take(np.arange(count) % len(points)), ranks, stage=stage)
+        return float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum()) / count
+
+    once = busy(PROBE * ranks.size, f"plan {label}: probe")
+    block = DEFAULT_LANES * ranks.size
+    count = block * int(np.clip(seconds * ranks.size / (once * block), 2, 2000))
+    return busy(count, f"plan {label}")
+
+
+@contextmanager
+def _company(scene: Scene, points: Points, workers: int) -> Iterator[None]:
+    """Keep other cores busy with the same work, as the ranks of the job will."""
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
+    others = max(min(workers, cores) - 1, 0)
+    context = multiprocessing.get_context("spawn")
+    stop, ready = context.Event(), context.Semaphore(0)
+    content = {k: v for k, v in scene.resolved().items() if k != "study"}
+    processes = [
+        context.Process(target=_keep_busy, args=(content, points, stop, ready), daemon=True)
+        for _ in range(others)
+    ]
+    for process in processes:
+        process.start()
+    try:
+        for process in processes:
+            while not ready.acquire(timeout=1.0) and process.is_alive():
+                pass
+        yield
+    finally:
+        stop.set()
+        for process in processes:
+            process.join()
+
+
+def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
+    """Simulate points over and over until told to stop."""
+    evaluator = Evaluator(load_scene(content).with_({"numerics.target_error": None}), points)
+    evaluator.advance(0.0)
+    ready.release()
+    while not stop.is_set():
+        if evaluator.pending < 2 * DEFAULT_LANES:
+            evaluator.submit(np.arange(len(points)), points.values)
+        evaluator.advance(0.2)
+
+
+def simulations_of(scene: Scene) -> int | None:
+    """Simulations of a whole study, the least there can be: surrogates that are refused take more."""
+    study = scene.study
+    if study is None or not study.cases:
+        return None
+    s, v = study.sensitivity, study.verification
+    count = len(study.models) * (study.samples + 2 * max(study.test_samples, 2))
+    if study.groups:
+        each = len(study.groups) * (s.samples + s.test_samples)
+        together = s.together_samples + max(s.test_samples, 20) if len(study.groups) > 1 else 0
+        count += s.rounds * s.levels * (each + together)
+        count += s.sobol_samples * (len(study.names) + 2)
+    # alpha and beta, what lies between, and the original, in each case
+    return count + len(study.cases) * (2 + v.designs + 1) * v.samples
+
+
+# ---- printing -------------------------------------------------------------------------------------
+
+
+def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
+    """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
+    out = console()
+    simulations = plan.samples if plan.study is None else plan.study
+    command = "sample" if plan.study is None else "run"
+    made = Table(
+        title=f"{command}: {simulations} simulations on {ranks} ranks", title_justify="left",
+        box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
+    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+        made.add_column(name, no_wrap=True, justify="right" if name != "settings" else "left")
+    for row in plan.rows:
+        total = plan.core_seconds(row, simulations, ranks)
+        made.add_row(
+            "file" if row.error is None else f"{row.error:.0e}",
+            row.settings(),
+            f"{1e3 * row.seconds:.3g}",
+            f"{total:.4g}",
+            f"{total / 3600:.2g}",
+            duration(plan.wall_seconds(row, simulations, ranks)),
+        )
+    out.print(made)
+    row = next((row for row in plan.rows if row.error == error), plan.rows[0])
+    out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
+    overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
+    for line in slurm(plan, row, simulations, ranks):
+        out.print(line, markup=False, soft_wrap=True)
+    place = "results/samples.nc" if command == "sample" else "results"
+    out.print(f"srun hpcclear {command} {file} -o {place}{overrides}", markup=False, soft_wrap=True)
+
+
+def _needs(
+    plan: Plan, row: Row, simulations: int, command: str, ranks: int
+) -> list[tuple[str, str]]:
+    rows = [
+        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.4g}"),
+        ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
+        ("start-up", f"{plan.startup:.1f} s a rank, and once a node up to a minute to compile"),
+        (
+            "memory",
+            f"{plan.memory / 2**20:.0f} MB a rank, {simulations * 1e-6:.2g} GB more on rank 0",
+        ),
+        ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
+    ]
+    if row.reason:
+        rows.append(("settings", row.reason))
+    if command == "run":
+        text = "at least: refused surrogates and misses take more; fits and swarm run on one core"
+        rows.append(("simulations", f"{simulations}, {text}"))
+        rows.append(("sample alone", f"{plan.samples} simulations"))
+    return rows
+
+
+def slurm(plan: Plan, row: Row, simulations: int, ranks: int) -> list[str]:
+    """The head of a batch script for this job."""
+    minutes = math.ceil((RESERVE * plan.wall_seconds(row, simulations, ranks) + 120.0) / 60.0)
+    memory = 256 * math.ceil(1.5 * plan.memory / 2**20 / 256)
+    return [
+        "#!/bin/bash",
+        f"#SBATCH --ntasks={ranks}",
+        "#SBATCH --cpus-per-task=1",
+        f"#SBATCH --mem-per-cpu={memory}M",
+        f"#SBATCH --time={minutes // 60:02d}:{minutes % 60:02d}:00",
+        "#SBATCH --signal=USR1@60  # saves in time; the same command goes on",
+    ]
+
+
+def run_plan(scene: Scene, file: str, ranks: Ranks, error: float | None, workers: int) -> int:
+    """Measure and print; exit code 0."""
+    errors = TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
+    describe(measure(scene, ranks, errors, workers), file, error, workers)
+    return 0

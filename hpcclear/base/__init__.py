@@ -1,0 +1,1 @@
+"""What every room stands on: errors, outcome codes, how code is compiled."""

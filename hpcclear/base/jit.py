@@ -1,0 +1,92 @@
+"""How this package compiles: the decorators, and a private cache that notices every change of source.
+
+Numba's own cache looks at one file only and serves stale code when a function in another file was edited. Here
+the folder's name holds a hash of all sources and of the versions that shape the code. The cache is pickle,
+so the folder must belong to the user and be closed to others.
+"""
+
+import getpass
+import hashlib
+import os
+import platform
+import stat
+import tempfile
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding
+import numba
+import numpy as np
+from numba import config, njit
+
+FASTMATH = {"contract", "nsz", "arcp"}
+"""Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
+
+
+def _compiled_sources(root: Path) -> list[Path]:
+    """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
+    parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
+    parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
+    return sorted(parts | {root / "base" / "outcome.py"})
+
+
+def source_key() -> str:
+    """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits)."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in _compiled_sources(root):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
+    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
+    for version in versions:
+        digest.update(version.encode())
+    digest.update(str(root).encode())
+    return digest.hexdigest()[:16]
+
+
+def _is_private(folder: Path) -> bool:
+    info = folder.lstat()
+    mine = info.st_uid == os.getuid()
+    return mine and stat.S_ISDIR(info.st_mode) and not info.st_mode & 0o077
+
+
+def cache_folder() -> Path:
+    """Return this user's private cache folder on node-local disk, made if need be.
+
+    ``HPCCLEAR_CACHE`` names another parent. A folder that somebody else owns or may write to is not used: a new one
+    is made for this process instead.
+    """
+    parent = Path(os.environ.get("HPCCLEAR_CACHE", tempfile.gettempdir()))
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):
+        user = str(os.getuid())
+    base = parent / f"hpcclear-{user}"
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if _is_private(base):
+            folder = base / source_key()
+            folder.mkdir(mode=0o700, exist_ok=True)
+            return folder
+    except OSError:
+        pass  # read-only or full: compile without a shared cache
+    return Path(tempfile.mkdtemp(prefix="hpcclear-"))
+
+
+def doubles_in_a_vector() -> int:
+    """Numbers that a vector register of this processor holds: 8, 4 or 2."""
+    features = llvmlite.binding.get_host_cpu_features()
+    if features.get("avx512f", False):
+        return 8
+    return 4 if features.get("avx", False) else 2
+
+
+# Decided before the first decorator runs; an explicit NUMBA_CACHE_DIR of the user's own wins.
+if not os.environ.get("NUMBA_CACHE_DIR"):
+    config.CACHE_DIR = str(cache_folder())
+
+lane_function = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)
+"""Runs inside a loop over lanes: inlined, branch-free, vectorised there."""
+
+scalar_function = njit(error_model="numpy", cache=True)
+"""Runs for one lane or one point at a time."""

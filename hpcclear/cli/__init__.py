@@ -1,0 +1,365 @@
+"""The commands. Each parses its words, calls one function of the package, and prints what a person wants to know.
+
+Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goes on from there).
+"""
+
+import contextlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcclear import __version__
+from hpcclear.base.errors import InputError, StorageError
+from hpcclear.ranks.launcher import launched_rank, pin_threads
+from hpcclear.ranks.stopping import Exit, StopSwitch
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.team import Ranks
+    from hpcclear.scene import Scene
+
+_FILE = click.argument("file", type=click.Path(path_type=Path))
+_SET = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY.PATH=VALUE",
+    help="Override an entry of the file; repeatable.",
+)
+_FRESH = click.option(
+    "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
+)
+_LIMIT = click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="Stop early, resumable, after this time.",
+)
+_INTERVAL = click.option(
+    "--checkpoint-interval",
+    "interval",
+    type=click.FloatRange(min=0.0),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Save finished samples this often: what a crash costs at most.",
+)
+_PROGRESS = click.option(
+    "--progress",
+    type=click.Choice(["auto", "bar", "log", "quiet"]),
+    default="auto",
+    show_default=True,
+    help="How progress is shown.",
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="hpcclear")
+def cli() -> None:
+    """Robust design of mechanisms with clearance joints.
+
+    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy
+    and plan under mpiexec to use more than one core:
+
+        mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
+    """
+
+
+def _scene(file: Path, overrides: tuple[str, ...]) -> "Scene":
+    from hpcclear.scene import load_scene
+
+    return load_scene(file, overrides)
+
+
+def _place(output: Path) -> Path:
+    """The place for results, made if it lies below here or beside what is there; else a slip of the pen is likelier."""
+    parent = output.parent
+    if not output.is_absolute() or parent.parent.is_dir():
+        with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
+            parent.mkdir(parents=True, exist_ok=True)
+    return output
+
+
+def _is_root() -> bool:
+    return launched_rank() in (0, None)
+
+
+def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
+    """Run a command that uses every rank."""
+    from hpcclear.accuracy.resting import MAKERS
+    from hpcclear.ranks.boundary import run_on_ranks
+
+    stop: StopSwitch = click.get_current_context().obj
+    if time_limit is not None:
+        stop.limit_time(time_limit)
+    return run_on_ranks(program, MAKERS, stop)
+
+
+@cli.command(short_help="Say what a file would simulate, at what cost.")
+@_FILE
+@_SET
+@click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
+def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
+    """Validate a scene or study and say what would be simulated.
+
+    Example: hpcclear check jobs/slider_crank.toml --set effects.gravity=9.81
+    """
+    if not _is_root():
+        return Exit.DONE
+    from hpcclear.cli.printing import describe_scene
+
+    describe_scene(_scene(file, overrides), cost)
+    return Exit.DONE
+
+
+@cli.command(short_help="Simulate one response.")
+@_FILE
+@_SET
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
+)
+def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
+    """Simulate one response: time series, forces, energies, objective.
+
+    Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
+    """
+    if not _is_root():
+        return Exit.DONE
+    from hpcclear.cli.printing import describe_response
+    from hpcclear.dynamics.response import simulate as simulate_scene
+    from hpcclear.results import dataset
+    from hpcclear.results import files as storage
+
+    scene = _scene(file, overrides)
+    storage.probe(_place(output))
+    response = simulate_scene(scene)
+    dataset.write(response, output)
+    describe_response(response, output)
+    return Exit.DONE
+
+
+def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None:
+    """Raise InputError where options name two kinds of sampling at once."""
+    if statistics and points is not None:
+        reason = "--statistics makes the study's Monte Carlo points on demand"
+        raise InputError("--points", str(points), reason, "Drop one of the two")
+    if raw is not None and not statistics:
+        reason = "without --statistics the samples are what is written"
+        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
+
+
+@cli.command(short_help="Simulate many designs.")
+@_FILE
+@_SET
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
+)
+@click.option(
+    "--points",
+    type=click.Path(path_type=Path),
+    help="CSV table of designs instead of the study's sampling.",
+)
+@click.option(
+    "--statistics",
+    is_flag=True,
+    help="Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
+)
+@click.option(
+    "--raw",
+    type=click.Path(path_type=Path),
+    help="With --statistics: directory for the samples themselves.",
+)
+@_FRESH
+@_LIMIT
+@_INTERVAL
+@_PROGRESS
+def sample(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    points: Path | None,
+    statistics: bool,
+    raw: Path | None,
+    fresh: bool,
+    time_limit: float | None,
+    interval: float,
+    progress: Any,
+) -> int:
+    """Send the study's points, or a table of yours, through the dynamics.
+
+    Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from hpcclear.ensemble.samples import run_sample, run_summary
+
+        scene, place = _scene(file, overrides), _place(output)
+        how: dict[str, Any] = {"fresh": fresh, "interval": interval, "style": progress}
+        if statistics:
+            return run_summary(scene, place, ranks, raw=raw and _place(raw), **how)
+        return run_sample(scene, place, ranks, table=points, **how)
+
+    _check_kind(points, statistics, raw)
+    return _on_ranks(program, time_limit)
+
+
+@cli.command(short_help="Carry a whole study.")
+@_FILE
+@_SET
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Directory for the results.",
+)
+@_FRESH
+@_LIMIT
+@_PROGRESS
+def run(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    fresh: bool,
+    time_limit: float | None,
+    progress: Any,
+) -> int:
+    """Carry a whole study: sensitivity, surrogates, robust optimisation, verified designs.
+
+    Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from hpcclear.study import run_study
+
+        return run_study(
+            _scene(file, overrides),
+            _place(output),
+            ranks,
+            fresh=fresh,
+            progress_style=progress,
+            tell=lambda text: click.echo(text, err=True),
+        )
+
+    return _on_ranks(program, time_limit)
+
+
+@cli.command(short_help="Show what accuracy costs in time.")
+@_FILE
+@_SET
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Directory for accuracy.nc and the figures.",
+)
+@click.option(
+    "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
+)
+def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) -> int:
+    """Show what accuracy costs in time: integration, averaging, surrogates, Monte Carlo, ranks.
+
+    Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from hpcclear.accuracy.profile import PROFILES
+        from hpcclear.accuracy.run import run_accuracy
+
+        profile = PROFILES["quick" if quick else "full"]
+        return run_accuracy(_scene(file, overrides), _place(output), ranks, profile)
+
+    return _on_ranks(program)
+
+
+@cli.command(short_help="Say what a run will cost.")
+@_FILE
+@_SET
+@click.option(
+    "--error",
+    type=click.FloatRange(0.0, 0.5, min_open=True),
+    metavar="RELATIVE",
+    help="Error of the objective to plan for; by default the settings of the file.",
+)
+@click.option(
+    "--ranks",
+    "workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Ranks to plan for; by default those it runs on.",
+)
+def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: int | None) -> int:
+    """Measure some samples and say what a run costs: settings, core-hours, ranks, wall time.
+
+    Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
+    """
+
+    def program(ranks: "Ranks") -> int | None:
+        from hpcclear.accuracy.plan import run_plan
+
+        planned = ranks.size if workers is None else workers
+        return run_plan(_scene(file, overrides), str(file), ranks, error, planned)
+
+    return _on_ranks(program)
+
+
+@cli.command(short_help="Write figures and an HTML page.")
+@click.argument("directory", type=click.Path(path_type=Path))
+def report(directory: Path) -> int:
+    """Write figures and a self-contained HTML page about a directory of results.
+
+    Example: hpcclear report results/quickstart
+    """
+    if not _is_root():
+        return Exit.DONE
+    from hpcclear.report.html.page import write_report
+
+    click.echo(f"report  {write_report(directory)}")
+    return Exit.DONE
+
+
+@cli.command()
+def schema() -> int:
+    """Print the JSON schema of scene files, for editors.
+
+    Example: hpcclear schema > hpcclear.schema.json
+    """
+    import json
+
+    from hpcclear.scene import scene_schema
+
+    click.echo(json.dumps(scene_schema(), indent=2))
+    return Exit.DONE
+
+
+def _say(text: str) -> None:
+    """An error message, from root only."""
+    if _is_root():
+        click.echo(text, err=True)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
+    pin_threads()  # before numpy is imported: ranks fill the cores, not threads
+    with StopSwitch(ends_process=True) as stop:
+        try:
+            code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
+        except click.ClickException as error:
+            if _is_root():
+                error.show()
+            code = Exit.BAD_INPUT
+        except (click.Abort, KeyboardInterrupt):
+            code = Exit.STOPPED
+        except InputError as error:
+            _say(f"Error: {error}")
+            code = Exit.BAD_INPUT
+        except StorageError as error:
+            _say(f"Error: {error}")
+            code = Exit.FAILED
+        except BrokenPipeError:  # the reader of a pipe has seen enough
+            sys.stderr.close()
+            code = Exit.DONE
+    sys.exit(int(code or 0))

@@ -1,0 +1,132 @@
+"""The tables of the `accuracy` command, and the advice that follows from them."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from hpcclear.accuracy.integration import MARGIN
+from hpcclear.cli.printing import console, table
+
+TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
+
+
+def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
+    """Print every panel as a table, the cheapest settings, and where the files are."""
+    out = console()
+    out.print(_integration(found))
+    out.print(table("Cheapest way to an error of f, one revolution", advice(found)))
+    out.print(table("Averaging", _averaging(found)))
+    out.print(_surrogates(found))
+    out.print(table("Random inputs, at the middle of the design space", _random(found)))
+    out.print(table("Ranks", _ranks(found)))
+    out.print(f"{found.attrs['versions']}\n{found.attrs['processor']}; {found.attrs['repeats']}")
+    for what, path in files.items():
+        out.print(f"{what:14} {path}", soft_wrap=True)
+
+
+def _integration(found: xr.Dataset) -> Table:
+    made = _grid("One revolution: error of f, force evaluations, time")
+    for name in ("integrator", "order", "setting", "error", "evaluations", "ms"):
+        made.add_column(name, no_wrap=True, justify="left" if name == "integrator" else "right")
+    for method in found["integrator"].to_numpy():
+        row = found.sel(integrator=method, quantity="objective")
+        for k in range(0, row.sizes["rung"], 2):
+            made.add_row(
+                method if k == 0 else "",
+                f"{float(row['order']):.1f}" if k == 0 else "",
+                f"{float(row['setting'][k]):.1e}",
+                f"{float(row['error'][k]):.1e}",
+                f"{float(row['evaluations'][k]):.0f}",
+                f"{1e3 * float(row['seconds'][k]):.3g}",
+            )
+    return made
+
+
+def _grid(title: str) -> Table:
+    return Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+
+
+def advice(found: xr.Dataset) -> list[tuple[str, str]]:
+    """The cheapest method and setting for each target error of f, and what the reference resolves."""
+    here = found.sel(quantity="objective")
+    error, seconds = here["error"].to_numpy(), here["seconds"].to_numpy()
+    rows = []
+    for target in TARGETS:
+        price = np.where(error <= target, seconds, np.inf)
+        if np.isfinite(price).any():
+            m, r = np.unravel_index(price.argmin(), price.shape)
+            setting = float(here["setting"][m, r])
+            text = f"{here['integrator'].to_numpy()[m]}, {setting:.0e}: {1e3 * price[m, r]:.3g} ms"
+        else:
+            text = "not reached on this ladder"
+        rows.append((f"{target:.0e}", text))
+    return [*rows, ("reference", resolution(found))]
+
+
+def resolution(found: xr.Dataset, quantity: str = "objective") -> str:
+    """What the reference of one quantity can tell apart, in words."""
+    own = float(found["reference_error"].sel(quantity=quantity))
+    least = float(found["error"].sel(quantity=quantity).min())
+    if own * MARGIN <= least:
+        return f"its own error is {own:.0e}, {MARGIN:.0f} times below all errors shown"
+    return f"its own error is {own:.0e}: errors below {MARGIN * own:.0e} are not resolved"
+
+
+def _averaging(found: xr.Dataset) -> list[tuple[str, str]]:
+    error, floor = found["averaging_error"], float(found["averaging_floor"])
+    rows = []
+    for transient in (0, 2, 8):
+        for averaged in (1, 8):
+            if transient in error["transient"] and averaged in error["averaged"]:
+                value = float(error.sel(transient=transient, averaged=averaged))
+                rows.append((f"{transient} + {averaged} revolutions", f"error of f {value:.1e}"))
+    text = f"{floor:.1e}: scatter of long averages between copies, which no average removes"
+    return [*rows, ("floor", text)]
+
+
+def _surrogates(found: xr.Dataset) -> Table:
+    made = _grid("Surrogates")
+    for name in ("surrogate", "samples", "simulation", "R2", "RMAE", "leave-one-out"):
+        made.add_column(name, no_wrap=True, justify="left" if name == "surrogate" else "right")
+    each = float(found["sample_seconds"])
+    for surrogate in found["surrogate"].to_numpy():
+        row = found.sel(surrogate=surrogate)
+        for k, size in enumerate(found["training"].to_numpy()):
+            values = [f"{float(row[name][k]):.3g}" for name in ("r2", "rmae", "leave_one_out")]
+            made.add_row(surrogate if k == 0 else "", str(size), f"{each * size:.2g} s", *values)
+    return made
+
+
+def _random(found: xr.Dataset) -> list[tuple[str, str]]:
+    rows = []
+    for estimate in found["estimate"].to_numpy():
+        error = found["moment_error"].sel(estimate=estimate)
+        known = np.flatnonzero(np.isfinite(error.sel(moment="mean").to_numpy()))
+        for k in {known[0], known[-1]} if known.size else ():
+            mean, deviation = (float(error.sel(moment=m)[k]) for m in ("mean", "deviation"))
+            seconds = float(found["moment_seconds"].sel(estimate=estimate)[k])
+            what = f"{estimate}, {int(found['draws'][k])} draws"
+            rows.append((what, f"mean {mean:.1e}, deviation {deviation:.1e}, {seconds:.2g} s"))
+    for moment in found["moment"].to_numpy():
+        bias, own = (float(found[n].sel(moment=moment)) for n in ("moment_bias", "bias_error"))
+        rows.append((f"bias of the {moment}", f"{bias:+.1e} +- {own:.1e}, surrogate to simulation"))
+    text = f"{1e3 * float(found['quadrature_seconds']):.2g} ms, no sampling error"
+    return [*rows, ("quadrature", text)]
+
+
+def _ranks(found: xr.Dataset) -> list[tuple[str, str]]:
+    strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
+    rows = []
+    for number, one, other in zip(found["ranks"].to_numpy(), strong, weak, strict=True):
+        text = f"speed-up {strong[0] / one:.2f}, weak efficiency {weak[0] / other:.2f}"
+        rows.append((f"{number} rank{'s' if number > 1 else ''}", text))
+    if len(rows) == 1:
+        rows.append(("more ranks", "start with mpiexec -n N to measure them"))
+    for loss, seconds in zip(
+        found["loss"].to_numpy(), found["lost_seconds"].to_numpy(), strict=True
+    ):
+        rows.append((f"lost to {loss}", f"{seconds:.2g} core-seconds"))
+    return rows

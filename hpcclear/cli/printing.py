@@ -1,0 +1,238 @@
+"""What the commands print: tables that fit 80 columns, plain when piped."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.scene import Scene
+
+WIDTH = 80
+
+
+def console() -> Console:
+    """Standard output; at most 80 columns, colours only on a terminal."""
+    screen = Console(highlight=False, soft_wrap=False)
+    return Console(highlight=False, width=min(WIDTH, screen.width) if screen.is_terminal else WIDTH)
+
+
+def table(title: str, rows: list[tuple[str, str]]) -> Table:
+    """Two columns: what, and its value."""
+    made = Table(
+        title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=False, pad_edge=False
+    )
+    made.add_column(no_wrap=True)
+    made.add_column(overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def quantity(value: float, unit: str, digits: int = 4) -> str:
+    """A number for people, "nan" where there is none."""
+    return f"{value:.{digits}g} {unit}".strip()
+
+
+def describe_scene(scene: Scene, cost: bool) -> None:
+    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
+    out = console()
+    from hpcclear.dynamics.lowering import coordinate_count, integrator_of, problem_of
+
+    problem_of(scene)  # refuses what cannot be simulated
+    states = 2 * coordinate_count(scene)
+    open_joints = len(scene.clearance_joints())
+    rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
+    method = integrator_of(scene)
+    if (alone := integrator_of(scene, single=True)) != method:
+        method += f" ({alone} for a single response)"
+    rows += [
+        ("states", f"{states} (positions and velocities) + {open_joints} integrals of the gaps"),
+        ("method", f"{method}, rtol {scene.numerics.rtol:g}"),
+        (
+            "revolutions",
+            f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
+        ),
+        ("scene hash", scene.hash[:16]),
+        ("MPI", _mpi()),
+    ]
+    out.print(table("What would be simulated", rows))
+    for warning in scene.warnings:
+        out.print(f"[yellow]Warning:[/] {warning}")
+    if scene.study is not None:
+        out.print(table("Study", _study_rows(scene)))
+    if cost:
+        out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
+
+
+def _mpi() -> str:
+    from hpcclear.ranks.boundary import describe_mpi
+    from hpcclear.ranks.launcher import launched_size
+
+    try:
+        library = describe_mpi()
+    except InputError:
+        return "none found: one process"
+    cores = _cores()
+    copies = launched_size()[1]
+    crowded = (
+        f"; {copies} ranks on {cores} cores: more ranks than cores are slower"
+        if copies > cores
+        else ""
+    )
+    return f"{library}; {cores} cores here{crowded}"
+
+
+def _cores() -> int:
+    import os
+
+    return (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    )
+
+
+def _study_rows(scene: Scene) -> list[tuple[str, str]]:
+    study = scene.study
+    assert study is not None
+    rows = [("samples", f"{study.samples} ({study.method}), seed {study.seed}")]
+    for variable in study.variables:
+        if variable.range is not None:
+            unit = scene.unit(variable.paths[0])
+            rows.append((variable.name, f"{variable.range[0]:g} to {variable.range[1]:g} {unit}"))
+        elif variable.ratio is not None:
+            rows.append(
+                (variable.name, f"{variable.ratio[0]:g} to {variable.ratio[1]:g} times m L^2/12")
+            )
+    return rows
+
+
+def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
+    """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
+    from hpcclear.dynamics.evaluator import DEFAULT_LANES, evaluate_records
+    from hpcclear.scene.points import Points
+
+    path = "mechanism.slider.mass"
+    columns = Points(("m3",), np.full((DEFAULT_LANES, 1), scene.number(path)), ((path,),))
+    start = time.perf_counter()
+    record = evaluate_records(scene, columns)[0]
+    first = time.perf_counter() - start
+    start = time.perf_counter()
+    evaluate_records(scene, columns)
+    each = (time.perf_counter() - start) / DEFAULT_LANES
+    evaluations = int(record["rhs_evaluations"])
+    rows = [
+        ("force evaluations", f"{evaluations}"),
+        ("time a sample", f"{each * 1e3:.3g} ms on one core, {DEFAULT_LANES} in lockstep"),
+        ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (kept for the next run)"),
+    ]
+    if scene.study is not None:
+        rows.append(("all samples", f"{each * scene.study.samples:.3g} core-seconds"))
+    return rows
+
+
+def describe_response(response: xr.Dataset, output: Path) -> None:
+    """Print the outcome of one response and where it went."""
+    out = console()
+    status = Status(int(response["status"]))
+    rows = [("status", f"{status.name.lower()}: {status.message}")]
+    if status is not Status.OK:
+        rows.append(("remedy", status.remedy))
+    f, spread = float(response["objective"]), float(response["objective_spread"])
+    rows += [
+        ("objective f", quantity(f * 1e3, "mm", 6)),
+        ("its spread between revolutions", quantity(spread * 1e3, "mm", 2)),
+        ("force evaluations", f"{int(response['rhs_evaluations'])}"),
+    ]
+    for k, joint in enumerate(response["joint"].to_numpy()):
+        peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
+        rows.append((f"{joint}", f"mean gap {gap * 1e3:.4g} mm, peak contact force {peak:.4g} N"))
+    out.print(table("Response", rows))
+    for text in flag_remarks(int(response["flags"])):
+        out.print(f"[yellow]Mind:[/] {text}")
+    out.print(f"written  {output}")
+
+
+REMARKS = {
+    Flag.LATCHED: "a joint never left contact: its damping kept an old impact speed, f may depend on the tolerance",
+    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
+    Flag.STIFF: "the implicit method was used for part of the run",
+}
+
+
+def flag_remarks(flags: int) -> list[str]:
+    """A sentence for each flag that is set."""
+    return [text for flag, text in REMARKS.items() if flags & flag]
+
+
+def _load(spent: Any, wall: float) -> list[tuple[str, str]]:
+    """Wall time, and how every rank spent it."""
+    words = "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s"
+    ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(spent)]
+    return [("wall time", f"{wall:.1f} s"), *ranks]
+
+
+def describe_statistics(content: xr.Dataset, ranks: Any, wall: float, path: Path) -> None:
+    """Print mean and deviation of f with the error of the mean, failures and load of a streamed Monte Carlo."""
+    out = console()
+    by_status = content["samples_by_status"]
+    total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
+    rows = [("simulated", f"{good} of {total} without failure")]
+    if int(content["objective_count"]) > 1:
+        mean, deviation = (float(content[f"objective_{n}"]) * 1e3 for n in ("mean", "deviation"))
+        error = deviation / int(content["objective_count"]) ** 0.5
+        rows.append(("mean of f", f"{mean:.6g} mm, standard error {error:.1e} mm"))
+        rows.append(("deviation of f", f"{deviation:.4g} mm"))
+    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
+    out.print(table("Statistics", rows + _load(spent, wall)))
+    out.print(f"statistics {path}")
+
+
+def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[str, Path]) -> None:
+    """Print throughput, range of f, failures and load of a batch of samples."""
+    out = console()
+    f = samples["objective"].to_numpy()
+    status = samples["status"].to_numpy()
+    good = f[status == Status.OK]
+    made = f"{len(good)} of {len(f)}"
+    rows = [("simulated", f"{made} without failure")]
+    for code in Status:
+        count = int((status == code).sum())
+        if count and code is not Status.OK:
+            rows.append((f"  {code.name.lower()}", f"{count}: {code.message}; {code.remedy}"))
+    if len(good):
+        rows.append(
+            (
+                "f",
+                f"{good.min() * 1e3:.4g} to {good.max() * 1e3:.4g} mm, median {np.median(good) * 1e3:.4g} mm",
+            )
+        )
+        spread = samples["objective_spread"].to_numpy()[status == Status.OK] / good
+        rows.append(
+            (
+                "spread of f between revolutions",
+                f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f",
+            )
+        )
+    latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
+    rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
+    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
+    busy = spent[:, 0]
+    evaluations = int(samples["rhs_evaluations"].sum())
+    if busy.sum() > 0.0:
+        rows.append(
+            (
+                "throughput",
+                f"{len(f) / busy.sum():.0f} samples a second and core, "
+                f"{busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
+            )
+        )
+    rows += _load(spent, wall)
+    out.print(table("Samples", rows))
+    for what, path in files.items():
+        out.print(f"{what:8} {path}")

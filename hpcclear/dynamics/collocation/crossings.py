@@ -1,0 +1,79 @@
+"""Contacts that begin or end inside a step of collocation: found between its nodes, and the step cut to end there."""
+
+from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation import lobatto as lob
+from hpcclear.dynamics.collocation.lobatto import STAGES
+from hpcclear.dynamics.stepping.events import impact_fraction, root
+from hpcclear.dynamics.stepping.lifecycle import GAP_TOLERANCE, cut_or_latch, latch_at_start
+
+
+@scalar_function
+def gap_before(work, m, gap, i):
+    """A gap between node i and the one before, for a cubic: its start and length as parts of the step, gap and slope
+    times length at its start, then at its end."""
+    h = work[at.STEP]
+    start, d0, m0 = 0.0, work[at.RATE_OLD + gap], h * work[at.RATE_OLD + gap + 2]
+    if i > 0:
+        start = m[lob.NODE * STAGES + i - 1]
+        d0 = m[(at.RATE_NOW + gap) * STAGES + i - 1]
+        m0 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i - 1]
+    length = m[lob.NODE * STAGES + i] - start
+    d1 = m[(at.RATE_NOW + gap) * STAGES + i]
+    m1 = h * m[(at.RATE_NOW + gap + 2) * STAGES + i]
+    return start, length, d0, length * m0, d1, length * m1
+
+
+@scalar_function
+def impact_in(work, m, gap, active, inverse, settings):
+    """Where in this step a joint in flight strikes, as a fraction; 2 if it does not, 1 if at the end; as `meet_impact`."""
+    tolerance = settings[GAP_TOLERANCE]
+    for i in range(STAGES):
+        start, length, d0, m0, d1, m1 = gap_before(work, m, gap, i)
+        if i == STAGES - 1 and abs(d1) <= tolerance and m1 > 0.0:
+            return 1.0
+        fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
+        if fraction == 0.0 and i == 0:
+            latch_at_start(0, 1, work, settings, gap, active, inverse)
+            return 0.0
+        if fraction <= 1.0:
+            fraction = start + length * fraction
+            return 1.0 if fraction > 1.0 - 1e-7 and m1 > 0.0 else fraction
+    return 2.0
+
+
+@scalar_function
+def kink_in(work, m, gap, tolerance):
+    """Where in this step a gap changes sign, as a fraction; 2 if it does not, or so near an end that it does no harm."""
+    for i in range(STAGES):
+        start, length, d0, m0, d1, m1 = gap_before(work, m, gap, i)
+        at_end = (i == 0 and abs(d0) <= tolerance) or (i == STAGES - 1 and abs(d1) <= tolerance)
+        if d0 * d1 < 0.0 and not at_end:
+            return start + length * root(d0, m0, d1, m1, 1.0)
+    return 2.0
+
+
+@lane_function
+def contact_change(flag, latched, work, m, gap, active, inverse, settings):
+    """Fraction of the step at which a joint's contact begins or ends; 2 if it does not, 1 if an impact ends the step."""
+    if flag is not None:
+        if latched is not None and work[active] == 0.0:
+            return impact_in(work, m, gap, active, inverse, settings)
+        return kink_in(work, m, gap, settings[GAP_TOLERANCE])
+    else:
+        return 2.0
+
+
+@lane_function
+def stop_at_contacts(effects, work, m, settings):
+    """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
+    first = contact_change(
+        effects.crank_rod, effects.latched, work, m,
+        at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12, settings,
+    )  # fmt: skip
+    second = contact_change(
+        effects.rod_slider, effects.latched, work, m,
+        at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23, settings,
+    )  # fmt: skip
+    if cut_or_latch(0, 1, work, settings, first, second):
+        m[lob.KINK] = lob.KINK_AT_END

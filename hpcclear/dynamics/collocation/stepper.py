@@ -1,0 +1,330 @@
+"""The stepper of a single response: one step of Lobatto collocation after the other.
+
+State, books and outcome are those of the block stepper with one lane, and so are the functions around a step; what
+differs is the step itself, and that contacts which begin or end inside it are found at its nodes.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba import njit
+
+from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation import lobatto as lob
+from hpcclear.dynamics.collocation.crossings import stop_at_contacts
+from hpcclear.dynamics.collocation.lobatto import STAGES
+from hpcclear.dynamics.explicit.stepper import free_crank_turn, wrap_crank
+from hpcclear.dynamics.stepping.control import choose_step, commit
+from hpcclear.dynamics.stepping.lifecycle import (
+    ATOL,
+    MAX_STEPS,
+    OK,
+    RTOL,
+    UNFINISHED,
+    end_revolution,
+    failure,
+    finish,
+    integrate_gap,
+    load,
+)
+from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
+
+SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
+EXPONENT = (
+    -0.5 / 11.0
+)  # of the square of the error: the last coefficients over the step go with h^9, their fall with h^2
+LOG_SAFETY = -0.32  # log2(0.8)
+LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
+FAILED_SHRINK = 0.7  # after the sweeps did not converge
+UNTESTED = 0.5  # what one sweep leaves unmeasured is taken to have fallen so far, or steps might stay small for ever
+BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they save
+
+
+@lane_function
+def replicate(work, par, m):
+    """Give every stage the sample's parameters."""
+    for r in range(at.PARAMETERS):
+        for i in range(STAGES):
+            m[(lob.PAR + r) * STAGES + i] = par[r]
+    for s in range(lob.SCALARS * STAGES, lob.MEMORY):
+        m[s] = 0.0
+    m[lob.CONTRACTION] = 0.1
+    m[lob.CONTRACTION_STEP] = par[at.FIRST_STEP]
+    m[lob.KINK] = lob.KINK_AT_START
+    m[lob.AFTER_KINK] = par[at.FIRST_STEP]
+
+
+@lane_function
+def begin_contacts(work, m):
+    """Contact states of the step, for every stage."""
+    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+        for i in range(STAGES):
+            m[row * STAGES + i] = work[row]
+
+
+@lane_function
+def evaluate_start(effects, work, stages, m, torque_table, load_table, n):
+    """Accelerations and rates at the start of the step, where they are not known."""
+    for i in range(STAGES):
+        m[at.STAGE_TIME * STAGES + i] = work[at.TIME]
+        for k in range(n):
+            m[(at.QS + k) * STAGES + i] = work[at.Q + k]
+            m[(at.VS + k) * STAGES + i] = work[at.V + k]
+    lob.accelerations_of_stages(effects, m, torque_table, load_table)
+    for k in range(n):
+        stages[k] = m[(at.ACC + k) * STAGES]
+    for r in range(at.RATES):
+        work[at.RATE_OLD + r] = m[(at.RATE_NOW + r) * STAGES]
+    work[at.FRESH] = 0.0
+    work[at.EVALUATIONS] += 1.0
+
+
+@lane_function
+def weigh(work, stages, m, settings, strictness, n):
+    """What an error of each coordinate's acceleration, kept up over the step, counts."""
+    h = work[at.STEP]
+    rtol = settings[RTOL]
+    for k in range(n):
+        a = stages[k]
+        m[lob.START_ACC * STAGES + k] = a
+        v = max(abs(work[at.V + k]), abs(work[at.V + k] + h * a))
+        by_v = h / (settings[ATOL + at.MAX_COORDINATES + k] + rtol * v)
+        by_q = h * h / (settings[ATOL + k] + rtol * abs(work[at.Q + k]))
+        m[lob.WEIGHT * STAGES + k] = strictness * (0.5 / n) * (by_v * by_v + by_q * by_q)
+
+
+@lane_function
+def sweep(effects, work, m, torque_table, load_table, n):
+    """Iterate the stages of the step until they have converged. Returns False when they will not in `MOST_SWEEPS`."""
+    h = work[at.STEP]
+    ratio = h / m[lob.CONTRACTION_STEP]
+    # of forces that depend on positions it goes with the square of the step, of damping with the step
+    rate = min(m[lob.CONTRACTION] * ratio * max(ratio, 1.0), 0.9)
+    before = 0.0
+    found = UNTESTED * rate
+    left = lob.MOST_SWEEPS
+    while left > 0.0:
+        left -= 1.0
+        lob.set_stages(m, work, n, h)
+        lob.accelerations_of_stages(effects, m, torque_table, load_table)
+        change = lob.take_accelerations(m, n)
+        work[at.EVALUATIONS] += STAGES
+        if before > 0.0:
+            rate = change / before
+            found = rate
+        before = change
+        # what the stages still miss, and will miss after the last sweep, if the changes go on to fall at this rate
+        if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
+            left = -1.0
+        elif not rough_log2(rate) * left + rough_log2(change) < 0.0:
+            left = 0.0
+    m[lob.CONTRACTION] = min(max(found, 1e-4), 1e4)
+    m[lob.CONTRACTION_STEP] = h
+    return left < 0.0
+
+
+@lane_function
+def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
+    """Add the last coefficients of a gap, scaled as its integral's error is, to those of the accelerations."""
+    if flag is not None:
+        row = lob.GAP_COEFFICIENT + (gap - at.GAP_12) // 3
+        lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
+        scale = work[at.STEP] / (
+            rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES]
+        )
+        last, before = lob.tail(m, row)
+        weight = strictness * scale * scale
+        return high + weight * last, low + weight * before
+    else:
+        return high, low
+
+
+@lane_function
+def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
+    """Square of the scaled error of a converged step.
+
+    The last two coefficients bound the error of the polynomial. At the end of the step the method is far better, and
+    the faster they fall the more: the bound is taken to fall once more by as much as from the two before to the last.
+    """
+    high = 0.0
+    low = 0.0
+    for k in range(n):
+        last, before = lob.tail(m, lob.COEFFICIENT + k)
+        high += m[lob.WEIGHT * STAGES + k] * last
+        low += m[lob.WEIGHT * STAGES + k] * before
+    high, low = gap_tail(
+        crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low
+    )
+    high, low = gap_tail(
+        rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low
+    )
+    return high * min(high / (low + 1e-300), 1.0)
+
+
+@lane_function
+def quadrature(work, m, rate):
+    """Integral of a rate over the step, over h."""
+    row = lob.row_of(m, at.RATE_NOW + rate)
+    work[at.RATE_SUM + rate] = lob.weighted(
+        m, lob.MATRIX, work[at.RATE_OLD + rate], row, STAGES - 1
+    )
+
+
+@lane_function
+def end_of_step(effects, work, m, n):
+    """Put the end of the step, and the integrals over it, where the block stepper would leave them."""
+    last = STAGES - 1
+    h = work[at.STEP]
+    for k in range(n):
+        start = m[lob.START_ACC * STAGES + k]
+        a = lob.row_of(m, lob.NODE_ACC + k)
+        v = work[at.V + k]
+        work[at.VS + k] = v + h * lob.weighted(m, lob.MATRIX, start, a, last)
+        work[at.QS + k] = work[at.Q + k] + h * (v + h * lob.weighted(m, lob.SQUARE, start, a, last))
+        work[at.ACC + k] = a[7]
+    for r in range(at.RATES):
+        work[at.RATE_NOW + r] = m[(at.RATE_NOW + r) * STAGES + last]
+    if effects.crank_rod is not None:
+        quadrature(work, m, at.GAP_12)
+    if effects.rod_slider is not None:
+        quadrature(work, m, at.GAP_23)
+    if effects.ledger is not None:
+        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
+            quadrature(work, m, r)
+    if effects.responses is not None:
+        for r in (at.FORCE_12, at.FORCE_23, at.SLIDER_ACCELERATION, at.SLIDER_SQUARE):
+            quadrature(work, m, r)
+
+
+@lane_function
+def peaks_inside(flag, work, m, gap, peak, deepest):
+    """Extremes of a joint at the nodes of an accepted step, its end left to `commit`."""
+    if flag is not None and work[at.AVERAGING] == 1.0:
+        for i in range(STAGES):
+            work[peak] = max(work[peak], m[(at.RATE_NOW + gap + 1) * STAGES + i])
+            work[deepest] = max(work[deepest], m[(at.RATE_NOW + gap) * STAGES + i])
+
+
+@lane_function
+def propose(work, m, error):
+    """The step to try next after one that was tried to its end, and whether it is accepted."""
+    h = work[at.STEP]
+    factor = rough_exp2(LOG_SAFETY + EXPONENT * rough_log2(error + 1e-60))
+    factor = min(factor, math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION]))
+    if error <= 1.0:
+        work[at.ACCEPT] = 1.0
+        proposal = h * min(max(factor, 0.3), LARGEST_GROWTH)
+        # a step cut short by the end of the revolution says little about the next one
+        work[at.NEXT_STEP] = (
+            max(proposal, work[at.NEXT_STEP]) if work[at.ENDING] == 1.0 else proposal
+        )
+    else:
+        work[at.ACCEPT] = 0.0
+        work[at.NEXT_STEP] = h * min(max(factor, LARGEST_SHRINK), 0.7)
+
+
+@lane_function
+def after_step(work, m):
+    """Where the next step begins, and how long it is after a kink."""
+    m[lob.FOLLOWS] = 1.0
+    if m[lob.KINK] == lob.KINK_AT_START:
+        m[lob.AFTER_KINK] = work[at.STEP]
+        m[lob.KINK] = lob.KINK_BEHIND
+    elif m[lob.KINK] == lob.KINK_AT_END:
+        m[lob.KINK] = lob.KINK_AT_START
+        m[lob.POLYNOMIAL_STEP] = 0.0
+        work[at.NEXT_STEP] = m[lob.AFTER_KINK]
+
+
+@lane_function
+def try_step(effects, work, stages, par, m, torque_table, load_table, settings, n):
+    """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
+    strictness = par[at.STRICTNESS]
+    choose_step(work, par, effects.torque, 1)
+    begin_contacts(work, m)
+    if work[at.FRESH] == 1.0:
+        evaluate_start(effects, work, stages, m, torque_table, load_table, n)
+    weigh(work, stages, m, settings, strictness, n)
+    lob.guess(m, n, work[at.STEP])
+    work[at.ATTEMPTS] += 1.0
+    if sweep(effects, work, m, torque_table, load_table, n):
+        lob.keep_polynomial(m, n, work[at.STEP])
+        error = error_of(
+            effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
+        )
+        work[at.ERROR] = error
+        propose(work, m, error)
+    else:
+        work[at.ACCEPT] = 0.0
+        factor = math.sqrt(BEST_CONTRACTION / m[lob.CONTRACTION])
+        work[at.NEXT_STEP] = work[at.STEP] * min(max(factor, LARGEST_SHRINK), FAILED_SHRINK)
+
+
+@lane_function
+def judge_end(effects, work, stages, m, settings, n):
+    """What an accepted step shows of contacts, turns and integrals; it may yet be cut. Returns OK or why the lane ends."""
+    status = OK
+    if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
+        status = failure(0, 1, n, work, stages, settings)
+    if status == OK and work[at.ACCEPT] == 1.0:
+        end_of_step(effects, work, m, n)
+        stop_at_contacts(effects, work, m, settings)
+        if work[at.ACCEPT] == 1.0:
+            status = free_crank_turn(effects.torque, 0, 1, work, settings, n - 1)
+        if work[at.ACCEPT] == 1.0:
+            integrate_gap(0, 1, work, at.GAP_12)
+            integrate_gap(0, 1, work, at.GAP_23)
+            peaks_inside(effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12)
+            peaks_inside(effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23)
+    return status
+
+
+@cache
+def make_collocation_stepper(n: int) -> Callable[..., Any]:
+    """Return the compiled stepper of one response with n coordinates.
+
+    Its arguments are those of `stepper.make_stepper`, so that either serves `lanes.Lanes`; the tableau is not read, and
+    `memory` is what `lobatto.new_memory` makes.
+    """
+
+    @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
+    def stepper(
+        effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
+        queue_par, queue_state, out, finished, counters, record, m, budget,
+    ):  # fmt: skip
+        if work[at.RUNNING] == 0.0:
+            load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
+            replicate(work, par, m)
+        full = False
+        while budget > 0 and work[at.RUNNING] > 0.0 and not full:
+            budget -= 1
+            try_step(effects, work, stages, par, m, torque_table, load_table, settings, n)
+            status = judge_end(effects, work, stages, m, settings, n)
+            goes_on = status == OK
+            if goes_on and work[at.ACCEPT] == 1.0:
+                record_nodes(record, counters, work, m, book, n)
+                ended = commit(
+                    effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
+                    effects.responses, work, stages, n, 1,
+                )  # fmt: skip
+                record_step(record, counters, work, stages, book, n, 1)
+                full = no_room(record, counters)
+                after_step(work, m)
+                if ended > 0.0:
+                    wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
+                    status = end_revolution(0, 1, work, book, settings)
+                    goes_on = status == UNFINISHED
+            if not goes_on:
+                finish(0, 1, n, status, work, book, out, finished, counters)
+                load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
+                replicate(work, par, m)
+        return work[at.RUNNING] > 0.0
+
+    return stepper
+
+
+__all__ = ["make_collocation_stepper"]

@@ -1,0 +1,1 @@
+"""The block stepper: Runge-Kutta pairs over lanes in lockstep."""

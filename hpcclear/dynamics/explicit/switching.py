@@ -1,0 +1,80 @@
+"""Which lanes take implicit steps: scores of stiffness on the explicit lanes, and when a stiff lane comes back.
+
+All that a scene which may be stiff has to pay for lanes that are not.
+"""
+
+from hpcclear.base.jit import lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.explicit.combine import group_of
+from hpcclear.dynamics.stepping.control import count_up
+from hpcclear.dynamics.stepping.lifecycle import IMPLICIT
+
+CALM_STEPS = 6.0  # so many in a row send a lane back
+EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffness
+CHATTER = 4.0  # or that times the change over the step between its last two stages: as good a sign
+EDGE_LIMIT = 40.0  # such a score sends a lane to the implicit method
+REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
+REJECTION_MEMORY = 0.9
+
+
+@lane_function
+def settle_methods(memory, settings, work, W):
+    """Decide, between steps, which lanes go on with which method. Returns how many take implicit steps."""
+    count = 0.0
+    if memory is not None:
+        always = 1.0 if settings[IMPLICIT] == 2.0 else 0.0
+        for i in range(W):
+            stiff = work[at.STIFF * W + i]
+            go = 1.0 if work[at.EDGE_SCORE * W + i] >= EDGE_LIMIT else 0.0
+            go = max(go, 1.0 if work[at.REJECTION_SCORE * W + i] >= REJECTION_LIMIT else 0.0)
+            stay = 1.0 if work[at.CALM * W + i] < CALM_STEPS else 0.0
+            new = max(stay if stiff == 1.0 else go, always)
+            same = 1.0 if new == stiff else 0.0
+            work[at.STIFF * W + i] = new
+            for row in (at.EDGE_SCORE, at.REJECTION_SCORE, at.CALM, at.STIFF_STEPS_HERE):
+                score = work[row * W + i]
+                work[row * W + i] = score if same == 1.0 else 0.0
+            count = count_up(count, new * work[at.RUNNING * W + i])
+    return count
+
+
+@lane_function
+def edge_excess(work, stages, weights, last, atol, n, k, terms, i, W):
+    """Square of the change of acceleration between the last two stages of the pair less that of the velocity times EDGE / h.
+
+    Both stages stand at the end of the step: summed over the coordinates it is positive where h lambda, estimated as
+    h |a7 - a6| / |v7 - v6|, is above `EDGE` (Hairer and Wanner, Solving ODEs II, IV.2). Friction that saturates within
+    the step hides its slope from this estimate; but then the acceleration changes far more between these two stages
+    than over the whole step, which on a smooth path it never does.
+    """
+    new = work[(at.ACC + k) * W + i]
+    change = new - stages[((terms - 1) * n + k) * W + i]
+    dv = 0.0  # without a factor h
+    for j in range(terms):
+        dv += weights[last + j] * stages[(j * n + k) * W + i]
+    scale = 1.0 / atol[at.MAX_COORDINATES + k]
+    over_step = CHATTER * (abs(new - stages[k * W + i]) + 1e-8 * abs(new))
+    least = min(EDGE * abs(dv), over_step) * scale
+    change *= scale
+    return change * change - least * least
+
+
+@lane_function
+def sense_stiffness(memory, work, stages, weights, last, atol, n, terms, W):
+    """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
+    decaying count of rejections."""
+    if memory is not None:
+        count = group_of(n)
+        for first in range(0, n, count):
+            for i in range(W):
+                excess = -1e-300 if first == 0 else work[at.EDGE_EXCESS * W + i]
+                for k in range(first, first + count):
+                    excess += edge_excess(work, stages, weights, last, atol, n, k, terms, i, W)
+                work[at.EDGE_EXCESS * W + i] = excess
+        for i in range(W):
+            at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
+            score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5
+            work[at.EDGE_SCORE * W + i] = max(score, 0.0)
+            rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
+            score = REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
+            work[at.REJECTION_SCORE * W + i] = score

@@ -1,0 +1,1 @@
+"""Radau IIA steps of lanes that are stiff."""

@@ -1,0 +1,167 @@
+"""Kinks of the forces: where sliding leaves or enters the friction ramp, and where damping stops a contact's force.
+
+Across a kink the solution is hardly more than once differentiable and Newton's iteration with one Jacobian for all
+stages does not converge, so an implicit step is cut to end just beyond the first kink its first guess shows, or its
+solution. Each kink is the zero of a smooth function: damping factor, sliding speed at one side of the ramp, at the other, gap.
+"""
+
+from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.memory import END, LANES
+from hpcclear.dynamics.implicit.radau import BASIS, NODES
+
+BEYOND = 1e-4
+"""How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
+
+GUESSED_BEYOND = 0.03
+"""A guess shows a kink where a stage is so far beyond it; whether a nearer one is real the solution tells."""
+
+NEAR = 5e-4
+"""A kink this near the start of a step, in these units, is stepped over."""
+
+GAP_UNIT = 0.1
+"""Of the clearance: the unit in which the gap, whose sign is a kink too, is of order 1."""
+
+LEAST_CUT = 0.02
+"""A step is cut to this fraction at least: a kink that is nearer is stepped over."""
+
+_BOTH = 2 * mem.KINKS_A_JOINT
+
+
+@lane_function
+def damping_part(fixed, latched, m, joint, rate, inverse, i):
+    """Damping factor of the normal force; 1 without damping or contact."""
+    damping = m[(mem.PAR + joint + at.DAMPING) * LANES + i]
+    if latched is not None:
+        return 1.0 + damping * rate * m[inverse * LANES + i]
+    elif fixed is not None:
+        return 1.0 + damping * rate
+    else:
+        return 1.0
+
+
+@lane_function
+def in_contact(latched, m, gap, active, i):
+    """Whether the joint transmits a force but for its damping."""
+    if latched is not None:
+        return gap > 0.0 and m[active * LANES + i] == 1.0
+    else:
+        return gap > 0.0
+
+
+@lane_function
+def impact_ahead(latched, m, active, i):
+    """Whether a change of the gap's sign is the stepper's to find: an impact to be located."""
+    if latched is not None:
+        return m[active * LANES + i] == 0.0
+    else:
+        return False
+
+
+@lane_function
+def ramp_sides(coulomb, ambrosio, m, joint, sliding, i):
+    """Functions that vanish where friction's ramp begins and ends."""
+    inverse_ramp = m[(mem.PAR + joint + at.INVERSE_RAMP) * LANES + i]
+    if coulomb is not None:
+        return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
+    elif ambrosio is not None:
+        ramp = (abs(sliding) - m[(mem.PAR + joint + at.DEAD_SPEED) * LANES + i]) * inverse_ramp
+        return ramp, ramp - 1.0
+    else:
+        return 0.0, 0.0
+
+
+@lane_function
+def kinks_of_joint(flag, effects, latched, m, k, i):
+    """The four functions of joint k (0 or 1) at the state in lane i; 0 where no kink can be felt."""
+    if flag is not None:
+        joint = at.JOINT_12 if k == 0 else at.JOINT_23
+        gap = m[(at.RATE_NOW + at.GAP_12 + 3 * k) * LANES + i]
+        rate = m[(at.RATE_NOW + at.RATE_12 + 3 * k) * LANES + i]
+        sliding = m[(at.RATE_NOW + at.SLIDING_12 + k) * LANES + i]
+        factor = damping_part(
+            effects.fixed, latched, m, joint, rate, at.INVERSE_IMPACT_12 + k, i
+        )  # fmt: skip
+        touches = in_contact(latched, m, gap, at.ACTIVE_12 + k, i)
+        pushes = touches and factor > 0.0
+        low, high = ramp_sides(effects.coulomb, effects.ambrosio, m, joint, sliding, i)
+        free = impact_ahead(latched, m, at.ACTIVE_12 + k, i)
+        unit = GAP_UNIT * m[(mem.PAR + joint + at.CLEARANCE) * LANES + i]
+        row = mem.KINKS + k * mem.KINKS_A_JOINT
+        m[row * LANES + i] = factor if touches else 0.0
+        m[(row + 1) * LANES + i] = low if pushes else 0.0
+        m[(row + 2) * LANES + i] = high if pushes else 0.0
+        m[(row + 3) * LANES + i] = 0.0 if free else gap / unit
+
+
+@scalar_function
+def kink_functions(effects, m):
+    """Kink functions of both joints at the states of the first bank, as evaluated."""
+    for i in range(LANES):
+        kinks_of_joint(effects.crank_rod, effects, effects.latched, m, 0, i)
+        kinks_of_joint(effects.rod_slider, effects, effects.latched, m, 1, i)
+
+
+@scalar_function
+def kinks_of_start(effects, m):
+    """Keep the functions at the last state evaluated, where a step begins; True where one has changed its sign, or come or
+    gone, since the start kept before."""
+    kink_functions(effects, m)
+    changed = False
+    for f in range(_BOTH):
+        before = m[mem.START_KINKS + f]
+        now = m[(mem.KINKS + f) * LANES + END]
+        m[mem.START_KINKS + f] = now
+        same = before * now > 0.0 or (before == 0.0 and now == 0.0)
+        changed = changed or not same
+    return changed
+
+
+@scalar_function
+def kink_fraction(effects, m, beyond):
+    """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none.
+
+    `beyond`: how far, in units of the kink's function, a stage must be for it to count.
+    """
+    kink_functions(effects, m)
+    first = 2.0
+    for f in range(_BOTH):
+        start = m[mem.START_KINKS + f]
+        row = (mem.KINKS + f) * LANES
+        if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
+            first = min(first, crossing(m, start, row, beyond))
+    return first
+
+
+@scalar_function
+def crossing(m, start, row, beyond):
+    """Where one function gets `BEYOND` its zero; 2 if it does not. `row`: where its values at the stages are."""
+    sign = 1.0 if start > 0.0 else -1.0
+    if m[row + END] == 0.0 or abs(start) < NEAR:
+        return 2.0
+    low = 0.0
+    for s in range(3):
+        value = m[row + s]
+        if value == 0.0:
+            return 2.0
+        if value * sign < -beyond:
+            return bisect(m, start, row, low, NODES[s], sign)
+        low = NODES[s]
+    return 2.0
+
+
+@scalar_function
+def bisect(m, start, row, low, high, sign):
+    """Upper end of a small bracket of the crossing between `low` and `high`."""
+    for _ in range(30):
+        x = 0.5 * (low + high)
+        value = start
+        for j in range(3):
+            weight = x * (BASIS[j, 0] + x * (BASIS[j, 1] + x * BASIS[j, 2]))
+            value += weight * (m[row + j] - start)
+        if value * sign < -0.5 * BEYOND:
+            high = x
+        else:
+            low = x
+    return high

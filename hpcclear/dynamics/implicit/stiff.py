@@ -1,0 +1,392 @@
+"""Implicit steps for lanes whose motion is stiff (which those are: `switching`).
+
+A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
+revolutions, books, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
+step would.
+"""
+
+import math
+
+from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank, fill
+from hpcclear.dynamics.implicit.kinks import (
+    BEYOND,
+    GUESSED_BEYOND,
+    LEAST_CUT,
+    kink_fraction,
+    kinks_of_start,
+)
+from hpcclear.dynamics.implicit.memory import END, LANES
+from hpcclear.dynamics.implicit.radau import (
+    copy_polynomial,
+    evaluate_stages,
+    factorise_both,
+    filtered_error,
+    gap_of_step,
+    guess_from_start,
+    guess_stages,
+    newton,
+    next_step,
+    rates_of_step,
+    refilter_error,
+    start_of_step,
+)
+from hpcclear.dynamics.stepping.lifecycle import ATOL, RTOL
+
+CHEAP_CONTRACTION = 0.002
+"""While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
+
+KEPT_TO = 1.2
+"""A step that would grow by less keeps its size, and the factors."""
+
+BEST_RATE = 0.3
+"""Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
+
+SLOPE_MEMORY = 0.5
+"""How much of that rate is still believed after a step that one iteration solved."""
+
+FAILED_SHRINK = 0.1
+"""At most, after the iteration failed."""
+
+CEILING, CEILING_GROWTH = 0.6, 1.05
+"""Of the failed step, for those after it; and how that is forgotten, step by step."""
+
+CALM_STIFFNESS = 2.0
+"""h |J| below which the explicit method would do."""
+
+STEEP = 100.0
+"""s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are."""
+
+ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
+"""Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
+
+KINK_REACH, MOST_CUTS = 0.005, 12.0
+"""A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
+
+
+@scalar_function
+def loosened(rtol, strictness, steep):
+    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
+
+    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
+    the result is no better than the estimate, most of all where a steep friction ramp sticks and tears loose. There the
+    energy balance closes as well as elsewhere only with an exponent of 1, which costs next to nothing: kinks hold the
+    steps down anyway.
+    `strictness`: square of how many times tighter this sample's tolerances are.
+    """
+    asked = rtol / math.sqrt(strictness)
+    return 0.05 * asked if steep else 0.1 * asked**0.9
+
+
+@scalar_function
+def fit_to_ramp(m, settings):
+    """Relative tolerance of implicit steps and reach of the Jacobian's differences: both keep well within friction's ramp.
+
+    Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
+    and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
+    ramp's end would hide its slope.
+    """
+    first = m[(mem.PAR + at.JOINT_12 + at.INVERSE_RAMP) * LANES]
+    second = m[(mem.PAR + at.JOINT_23 + at.INVERSE_RAMP) * LANES]
+    slope = max(
+        m[(mem.PAR + at.JOINT_12 + at.FRICTION) * LANES] * first,
+        m[(mem.PAR + at.JOINT_23 + at.FRICTION) * LANES] * second,
+    )
+    ramp = 1.0 / max(first, second, 1e-300)
+    speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
+    within = ERROR_IN_RAMP * ramp / (1.0 + speed)
+    strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
+    m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
+    m[mem.REACH] = DIFFERENCE_IN_RAMP * ramp
+
+
+@scalar_function
+def take_over(size, lane, W, work, par, m, settings):
+    """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
+    n = len(size)
+    for k in range(at.PARAMETERS):
+        fill(m, mem.PAR + k, par[k * W + lane])
+        fill(m, mem.SECOND + mem.PAR + k, par[k * W + lane])
+    for k in range(n):
+        m[mem.LEAST + k] = settings[ATOL + k] / settings[RTOL]
+        m[mem.LEAST + n + k] = settings[ATOL + at.MAX_COORDINATES + k] / settings[RTOL]
+    m[mem.POLYNOMIAL_STEP] = 0.0
+    m[mem.KEPT_STEP] = 0.0
+    m[mem.CONTINUES] = 1.0
+    m[mem.ACCEPTED_STEP] = 0.0
+    m[mem.CONTRACTION] = 1.0
+    m[mem.RATE] = 1.0
+    m[mem.RATE_SLOPE] = 0.0
+    m[mem.CEILING] = math.inf
+    m[mem.FACTORED_STEP] = 0.0
+    m[mem.NEW_JACOBIAN] = 0.0
+    m[mem.TRIED_ERROR] = 0.0
+    m[mem.KINK_CUTS] = 0.0
+    fit_to_ramp(m, settings)
+
+
+@scalar_function
+def fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows):
+    """Bring the start of the step into the lane's memory; `follows`: it is where the lane's last implicit step ended."""
+    n = len(size)
+    m[mem.TIME] = work[at.TIME * W + lane]
+    m[mem.STEP] = work[at.STEP * W + lane]
+    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+        fill(m, row, work[row * W + lane])
+        fill(m, mem.SECOND + row, work[row * W + lane])
+    for k in range(n):
+        m[mem.Q + k] = work[(at.Q + k) * W + lane]
+        m[mem.V + k] = work[(at.V + k) * W + lane]
+    fresh = work[at.FRESH * W + lane] == 1.0
+    unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
+    if unknown:
+        start_of_step(n, m)
+        evaluate_bank(effects, m, torque_table, load_table)
+        work[at.EVALUATIONS * W + lane] += 1.0
+    if fresh:
+        m[mem.NEW_JACOBIAN] = 0.0
+        for k in range(n):
+            stages[k * W + lane] = m[(at.ACC + k) * LANES + END]
+        for r in range(at.RATES):
+            work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
+        work[at.FRESH * W + lane] = 0.0
+    if (unknown or follows) and kinks_of_start(effects, m):
+        m[mem.RATE] = 1.0
+        m[mem.RATE_SLOPE] = 0.0
+        m[mem.CEILING] = math.inf
+        m[mem.KEPT_STEP] = 0.0
+    rtol = m[mem.TOLERANCE]
+    for k in range(n):
+        m[mem.START + k] = stages[k * W + lane]
+        m[mem.SCALE + k] = rtol * (m[mem.LEAST + k] + abs(m[mem.Q + k]))
+        m[mem.SCALE + n + k] = rtol * (m[mem.LEAST + n + k] + abs(m[mem.V + k]))
+
+
+@scalar_function
+def norm_of_jacobian(size, m):
+    """Estimate of the largest eigenvalue in 1/s from row sums, in units that make angles and lengths comparable."""
+    n = len(size)
+    by_q = 0.0
+    by_v = 0.0
+    for r in range(n):
+        row_q = 0.0
+        row_v = 0.0
+        for k in range(n):
+            unit = m[mem.LEAST + n + k] / m[mem.LEAST + n + r]
+            row_q += abs(m[mem.JACOBIAN + r * mem.COLUMNS + k]) * unit
+            row_v += abs(m[mem.JACOBIAN + r * mem.COLUMNS + n + k]) * unit
+        by_q = max(by_q, row_q)
+        by_v = max(by_v, row_v)
+    return by_v + math.sqrt(by_q)
+
+
+@scalar_function
+def cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table):
+    """Evaluate the guessed stages, and cut the step if they show a kink."""
+    h = m[mem.STEP]
+    evaluate_stages(effects, size, m, torque_table, load_table, h)
+    work[at.EVALUATIONS * W + lane] += 3.0
+    fraction = kink_fraction(effects, m, GUESSED_BEYOND)
+    if fraction < 1.0:
+        m[mem.POLYNOMIAL_STEP] = h
+        h *= max(fraction, LEAST_CUT)
+        m[mem.STEP] = h
+        work[at.STEP * W + lane] = h
+        work[at.ENDING * W + lane] = 0.0
+        m[mem.CONTINUES] = 0.0
+        guess_stages(size, m, h)
+        evaluate_stages(effects, size, m, torque_table, load_table, h)
+        work[at.EVALUATIONS * W + lane] += 3.0
+
+
+@scalar_function
+def new_jacobian(effects, size, m, torque_table, load_table, guessed):
+    """Jacobian at the second guessed stage, or at the start where there is no guess."""
+    n = len(size)
+    if not guessed:
+        start_of_step(n, m)
+    for k in range(n):
+        m[mem.BASE + k] = m[(at.ACC + k) * LANES + mem.MIDDLE] if guessed else m[mem.START + k]
+    difference_jacobian(effects, size, m, torque_table, load_table)
+    m[mem.NORM] = norm_of_jacobian(size, m)
+    m[mem.NEW_JACOBIAN] = 1.0
+    m[mem.FACTORED_STEP] = 0.0
+
+
+@scalar_function
+def begin_step(effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings):
+    """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
+    follows = work[at.ACCEPT * W + lane] == 1.0
+    first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
+    if first:
+        take_over(size, lane, W, work, par, m, settings)
+    elif follows:
+        m[mem.ACCEPTED_STEP] = m[mem.STEP]
+        m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
+        m[mem.NEW_JACOBIAN] = 0.0
+        copy_polynomial(size, m, mem.Z, mem.KEPT)
+        m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
+        m[mem.CONTINUES] = 1.0
+    fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows)
+    work[at.STIFF_STEPS_HERE * W + lane] += 1.0
+    work[at.STIFF_STEPS * W + lane] += 1.0
+    if first:
+        guess_from_start(size, m, m[mem.STEP])
+    else:
+        guess_stages(size, m, m[mem.STEP])
+    return m[mem.POLYNOMIAL_STEP] > 0.0
+
+
+@scalar_function
+def solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed):
+    """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
+    if guessed:
+        cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table)
+    h = m[mem.STEP]
+    stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
+    if stale and m[mem.NEW_JACOBIAN] == 0.0:
+        new_jacobian(effects, size, m, torque_table, load_table, guessed)
+        work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
+    if m[mem.FACTORED_STEP] != h and not factorise_both(size, m, h):
+        return -1
+    iterations = newton(effects, size, m, torque_table, load_table, h, guessed)
+    evaluated = abs(iterations) - 1 if guessed else abs(iterations)
+    work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
+    return iterations
+
+
+@scalar_function
+def give_up(size, lane, W, work, m):
+    """The iteration failed: a shorter step by the polynomial of the step before, with a Jacobian that is nearer."""
+    h = m[mem.STEP]
+    copy_polynomial(size, m, mem.KEPT, mem.Z)
+    m[mem.POLYNOMIAL_STEP] = m[mem.KEPT_STEP]
+    m[mem.CONTINUES] = 1.0
+    m[mem.NEW_JACOBIAN] = 0.0
+    shrink = BEST_RATE / m[mem.RATE] if m[mem.RATE] > 0.0 else 0.0
+    m[mem.RATE] = 1.0
+    m[mem.CONTRACTION] = 1.0
+    m[mem.CEILING] = CEILING * h
+    work[at.ERROR * W + lane] = 1e6
+    work[at.NEXT_STEP * W + lane] = min(max(shrink, FAILED_SHRINK), 0.5) * h
+
+
+@scalar_function
+def implicit_step(
+    effects, size, lane, W, work, stages, par, torque_table, load_table, memory, settings
+):
+    """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
+    m = memory[lane]
+    guessed = begin_step(
+        effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings
+    )
+    iterations = solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed)
+    if iterations < 0:
+        give_up(size, lane, W, work, m)
+        return
+    h = m[mem.STEP]
+    m[mem.POLYNOMIAL_STEP] = h
+    m[mem.CONTINUES] = 0.0
+    fraction = kink_fraction(effects, m, BEYOND)
+    if fraction < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS:
+        # the guess did not show it; the solution is a good guess for the part before it
+        m[mem.KINK_CUTS] += 1.0
+        m[mem.RATE] = 1.0
+        work[at.ERROR * W + lane] = 2.0
+        work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
+    else:
+        m[mem.KINK_CUTS] = 0.0
+        judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
+
+
+@scalar_function
+def judge(effects, size, lane, W, work, m, torque_table, load_table, iterations):
+    """Error of a converged step, its integrals, its end and the step to try next."""
+    n = len(size)
+    h = m[mem.STEP]
+    rtol = m[mem.TOLERANCE]
+    for k in range(n):
+        m[mem.SHIFTED + k] = m[mem.START + k]
+        m[mem.SHIFTED + n + k] = 0.0
+    total = filtered_error(size, m, h)
+    uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
+    if total > 2.0 * n and uneasy:
+        total = refilter_error(effects, size, m, torque_table, load_table, h)
+        work[at.EVALUATIONS * W + lane] += 1.0
+    # as the last correction left them: integrals fit the end of the step
+    evaluate_stages(effects, size, m, torque_table, load_table, h)
+    work[at.EVALUATIONS * W + lane] += 1.0
+    gaps = gap_of_step(
+        effects.crank_rod, m, work, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, lane, W
+    )
+    gaps += gap_of_step(
+        effects.rod_slider, m, work, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, lane, W
+    )
+    rates_of_step(effects.ledger, effects.responses, m, work, lane, W)
+    leave(size, lane, W, work, m)
+    mean = (total + gaps) * (0.5 / n)
+    m[mem.TRIED_ERROR] = math.sqrt(mean)
+    work[at.ERROR * W + lane] = mean
+    propose(lane, W, work, m, iterations)
+
+
+@scalar_function
+def propose(lane, W, work, m, iterations):
+    """The step to try next, and whether the explicit method could have taken this one."""
+    h = m[mem.STEP]
+    proposal = next_step(m, h, m[mem.TRIED_ERROR], iterations)
+    if iterations == 1:
+        m[mem.RATE_SLOPE] *= SLOPE_MEMORY
+    elif m[mem.NEW_JACOBIAN] == 1.0:
+        m[mem.RATE_SLOPE] = m[mem.RATE] / h
+    if m[mem.RATE_SLOPE] > 0.0:
+        proposal = min(proposal, BEST_RATE / m[mem.RATE_SLOPE])
+    proposal = min(proposal, m[mem.CEILING])
+    m[mem.CEILING] *= CEILING_GROWTH
+    if m[mem.TRIED_ERROR] <= 1.0:
+        if work[at.REJECTED * W + lane] == 1.0:
+            proposal = min(proposal, h)
+        if work[at.ENDING * W + lane] == 1.0:
+            proposal = max(proposal, work[at.NEXT_STEP * W + lane])
+        if m[mem.RATE] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
+            proposal = h
+        calm = h * m[mem.NORM] < CALM_STIFFNESS and proposal < 2.0 * h
+        work[at.CALM * W + lane] = work[at.CALM * W + lane] + 1.0 if calm else 0.0
+    work[at.NEXT_STEP * W + lane] = proposal
+
+
+@scalar_function
+def leave(size, lane, W, work, m):
+    """Put the end of the step where an explicit step would leave it."""
+    n = len(size)
+    for k in range(n):
+        work[(at.QS + k) * W + lane] = m[(at.QS + k) * LANES + END]
+        work[(at.VS + k) * W + lane] = m[(at.VS + k) * LANES + END]
+        work[(at.ACC + k) * W + lane] = m[(at.ACC + k) * LANES + END]
+    for r in range(at.RATES):
+        work[(at.RATE_NOW + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
+
+
+@lane_function
+def take_implicit_steps(
+    effects, size, work, stages, par, torque_table, load_table, memory, settings, W
+):
+    """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
+    if memory is not None:
+        for i in range(W):
+            if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
+                implicit_step(
+                    effects,
+                    size,
+                    i,
+                    W,
+                    work,
+                    stages,
+                    par,
+                    torque_table,
+                    load_table,
+                    memory,
+                    settings,
+                )

@@ -1,0 +1,1 @@
+"""What moves: accelerations, gaps and powers of a mechanism at a state."""

@@ -1,0 +1,93 @@
+"""From the coordinates of a topology to the positions and velocities of all bodies, and the energies of these."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.dynamics import layout as at
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions and velocities of all bodies at each instant, shape (t,), SI; eccentricities (t, 2 joints)."""
+
+    crank_angle: Array
+    crank_speed: Array
+    rod_x: Array
+    rod_y: Array
+    rod_angle: Array
+    rod_vx: Array
+    rod_vy: Array
+    rod_spin: Array
+    slider: Array
+    slider_speed: Array
+    eccentricity_x: Array
+    eccentricity_y: Array
+
+
+def motion(
+    open_joints: tuple[bool, bool], par: Array, phi: Array, omega: Array, q: Array, v: Array
+) -> Motion:
+    """All bodies from minimal coordinates.
+
+    Parameters
+    ----------
+    open_joints : pair of bool
+        Whether O12 and O23 are open.
+    par : ndarray, shape (PARAMETERS,)
+    phi, omega : ndarray, shape (t,)
+        Crank angle in this revolution (rad) and speed (rad/s).
+    q, v : ndarray, shape (n, t)
+        Coordinates and velocities, the crank's left out.
+    """
+    crank, length, near = par[at.CRANK_LENGTH], par[at.ROD_LENGTH], par[at.ROD_NEAR]
+    pin = np.array([crank * np.cos(phi), crank * np.sin(phi)])
+    pin_v = omega * np.array([-pin[1], pin[0]])
+    first, second = open_joints
+    if first and second:
+        theta, spin, slider, slider_v = q[2], v[2], q[3], v[3]
+    elif first or second:
+        theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
+    else:
+        theta = np.arcsin(-pin[1] / length)
+        spin = -pin_v[1] / (length * np.cos(theta))
+    along = np.array([np.cos(theta), np.sin(theta)])
+    across = spin * np.array([-along[1], along[0]])
+    if first and second:
+        centre, centre_v = q[:2], v[:2]
+    elif first:
+        back = length - near
+        centre = np.array([slider, np.zeros_like(slider)]) - back * along
+        centre_v = np.array([slider_v, np.zeros_like(slider)]) - back * across
+    else:
+        centre, centre_v = pin + near * along, pin_v + near * across
+    if not (first or second):
+        slider = (pin + length * along)[0]
+        slider_v = (pin_v + length * across)[0]
+    near_end, far_end = centre - near * along, centre + (length - near) * along
+    gap_1 = pin - near_end if first else np.zeros_like(pin)
+    gap_2 = np.array([slider, np.zeros_like(slider)]) - far_end if second else np.zeros_like(pin)
+    return Motion(
+        phi, omega, centre[0], centre[1], theta, centre_v[0], centre_v[1], spin, slider, slider_v,
+        np.array([gap_1[0], gap_2[0]]).T, np.array([gap_1[1], gap_2[1]]).T,
+    )  # fmt: skip
+
+
+def kinetic_energy(m: Motion, par: Array) -> Array:
+    """Kinetic energy in J of crank (flywheel included), rod and slider, shape (t,)."""
+    rod = par[at.ROD_MASS] * (m.rod_vx**2 + m.rod_vy**2) + par[at.ROD_INERTIA] * m.rod_spin**2
+    crank = par[at.CRANK_INERTIA] * m.crank_speed**2
+    return 0.5 * (rod + crank + par[at.SLIDER_MASS] * m.slider_speed**2)
+
+
+def potential_energy(m: Motion, par: Array, gravity: float) -> Array:
+    """Potential energy in J against y = 0, shape (t,)."""
+    return gravity * (par[at.CRANK_MOMENT] * np.sin(m.crank_angle) + par[at.ROD_MASS] * m.rod_y)
+
+
+def elastic_energy(gaps: Array, active: Array, stiffness: Array) -> Array:
+    """Energy in J stored in the contacts, 0.4 K d^2.5 each, shape (t,); arguments (t, 2), (t, 2), (2,)."""
+    return (0.4 * stiffness * active * np.maximum(gaps, 0.0) ** 2.5).sum(axis=1)

@@ -1,0 +1,597 @@
+"""Equations of motion in minimal coordinates, one lane at a time.
+
+Each topology reads the stage's coordinates and velocities of lane ``i``, adds up the forces that are on, and
+writes accelerations and gaps, forces and powers to their rows of `work`.
+
+Conventions: crank pin and slider pin are the journals, the rod carries both bearings; e = journal centre -
+bearing centre; the contact point lies half-way through the overlap, so the pair of contact forces exerts no
+net couple; angles counter-clockwise; gravity towards -y.
+
+Coordinates (free crank angle last, only with a torque drive):
+
+- both joints open: rod x, rod y, rod angle, slider x;
+- one joint open: rod angle, slider x (the ideal joint removes two);
+- both ideal: none (with a torque drive: the crank angle).
+"""
+
+import math
+
+from hpcclear.base.jit import lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.physics.angles import sincos
+from hpcclear.dynamics.physics.contact import elastic_force, normal_force
+from hpcclear.dynamics.physics.friction import friction_ratio, saturated
+
+_TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
+
+
+@lane_function
+def table_value(table, angle):
+    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell."""
+    cells = table.size // 4
+    turns = angle * (0.5 / math.pi)
+    x = (turns - math.floor(turns)) * cells
+    cell = min(int(x), cells - 1)
+    s = x - cell
+    k = 4 * cell
+    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+
+
+@lane_function
+def product(flag, a, b):
+    """a b, or 0 with the effect off: a product with 0 is not dropped by the compiler, since b may be infinite."""
+    if flag is not None:
+        return a * b
+    else:
+        return 0.0
+
+
+@lane_function
+def either_product(flag, other, a, b):
+    """`product` for an effect with two forms: friction laws, constant and tabulated loads."""
+    if flag is not None:
+        return a * b
+    else:
+        return product(other, a, b)
+
+
+@lane_function
+def gravity_of(gravity, par, i, W):
+    """Gravity, m/s^2 against y."""
+    if gravity is not None:
+        return par[at.GRAVITY * W + i]
+    else:
+        return 0.0
+
+
+@lane_function
+def load_of(load, load_table, par, looked_up, i, W):
+    """Force on the slider along +x in N; `looked_up`: what its table says, where it has one."""
+    if load is not None:
+        return par[at.LOAD * W + i]
+    elif load_table is not None:
+        return par[at.LOAD * W + i] * looked_up
+    else:
+        return 0.0
+
+
+@lane_function
+def torque_of(torque_table, work, par, i, W):
+    """Drive torque on the crank in N m."""
+    if torque_table is not None:
+        return par[at.TORQUE * W + i] * work[at.TORQUE_VALUE * W + i]
+    else:
+        return par[at.TORQUE * W + i]
+
+
+@lane_function
+def guide_ratio(guide, par, speed, i, W):
+    """Guide friction over guide reaction, signed like the slider's speed."""
+    if guide is not None:
+        ramp = saturated(speed * par[at.GUIDE_INVERSE_RAMP * W + i])
+        return par[at.GUIDE_COEFFICIENT * W + i] * ramp
+    else:
+        return 0.0
+
+
+@lane_function
+def guide_friction(guide, par, speed, reaction, i, W):
+    """Friction of the guide on the slider, against +x, in N, for a reaction that does not depend on it."""
+    if guide is not None:
+        return guide_ratio(guide, par, speed, i, W) * abs(reaction)
+    else:
+        return 0.0
+
+
+@lane_function
+def joint_force(
+    effects,
+    work,
+    par,
+    joint,
+    row,
+    active,
+    inverse_impact,
+    ex,
+    ey,
+    vx,
+    vy,
+    spin_journal,
+    spin_bearing,
+    i,
+    W,
+):
+    """Contact and friction in one open joint.
+
+    Parameters are the journal's position and velocity relative to the bearing's centre and both bodies'
+    angular velocities. Gap |e| - c, normal force and gap rate go to three rate rows from `row` on.
+    Returns the force on the bearing (the journal gets the opposite), the moments of the friction force on
+    bearing and journal about their own centres, and the dissipated power.
+    """
+    square = ex * ex + ey * ey + _TINY
+    inverse = 1.0 / math.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    gap = square * inverse - par[(joint + at.CLEARANCE) * W + i]
+    rate = vx * nx + vy * ny
+    depth = 0.5 * (gap + abs(gap))
+    stiffness = par[(joint + at.CONTACT_STIFFNESS) * W + i]
+    normal = normal_force(
+        effects.fixed,
+        effects.latched,
+        stiffness,
+        par[(joint + at.DAMPING) * W + i],
+        depth,
+        rate,
+        inverse_impact,
+    )
+    normal = switched(effects.latched, normal, active)
+    arm_bearing = par[(joint + at.BEARING_RADIUS) * W + i] + 0.5 * depth
+    arm_journal = par[(joint + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
+    sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
+    coulomb, ambrosio = effects.coulomb, effects.ambrosio
+    ratio = friction_ratio(
+        coulomb,
+        ambrosio,
+        par[(joint + at.FRICTION) * W + i],
+        par[(joint + at.DEAD_SPEED) * W + i],
+        par[(joint + at.INVERSE_RAMP) * W + i],
+        sliding,
+    )
+    tangential = either_product(coulomb, ambrosio, normal, ratio)
+    fx = normal * nx - either_product(coulomb, ambrosio, tangential, ny)
+    fy = normal * ny + either_product(coulomb, ambrosio, tangential, nx)
+    moment_bearing = either_product(coulomb, ambrosio, tangential, arm_bearing)
+    moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
+    elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
+    loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
+    work[(at.RATE_NOW + row) * W + i] = gap
+    work[(at.RATE_NOW + row + 1) * W + i] = normal
+    work[(at.RATE_NOW + row + 2) * W + i] = rate
+    store_rate(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
+    store_rate(effects.sliding, work, at.SLIDING_12 + row // 3, sliding, i, W)
+    return fx, fy, moment_bearing, -moment_journal, loss
+
+
+@lane_function
+def store_rate(flag, work, row, value, i, W):
+    """Write down a rate that an effect asks for."""
+    if flag is not None:
+        work[(at.RATE_NOW + row) * W + i] = value
+
+
+@lane_function
+def switched(latched, force, active):
+    """A latched contact is on or off for a whole step, so that a step ends exactly at an impact."""
+    if latched is not None:
+        return force * active
+    else:
+        return force
+
+
+@lane_function
+def store_power(
+    ledger, series, responses, work, drive_moment, speed, loss, load_power, acceleration, i, W
+):
+    """What the drive, the contacts and the load do, and the slider's acceleration."""
+    if responses is not None:
+        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
+        work[(at.RATE_NOW + at.SLIDER_ACCELERATION) * W + i] = acceleration
+        work[(at.RATE_NOW + at.SLIDER_SQUARE) * W + i] = acceleration * acceleration
+    if series is not None:
+        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
+    if ledger is not None:
+        power = drive_moment * speed
+        work[(at.RATE_NOW + at.DRIVE_POWER) * W + i] = power
+        work[(at.RATE_NOW + at.ABS_DRIVE_POWER) * W + i] = abs(power)
+        work[(at.RATE_NOW + at.DISSIPATION) * W + i] = loss
+        work[(at.RATE_NOW + at.LOAD_POWER) * W + i] = load_power
+
+
+@lane_function
+def store_crank(torque, work, last, acceleration, i, W):
+    """Write down the crank's angular acceleration where it is a coordinate."""
+    if torque is not None:
+        work[(at.ACC + last) * W + i] = acceleration
+
+
+@lane_function
+def drive_moment_of(torque, given, reaction):
+    """Moment of the drive: given with a torque drive, the reaction at prescribed speed."""
+    if torque is not None:
+        return given
+    else:
+        return reaction
+
+
+@lane_function
+def two_open(effects, work, par, phi, omega, i, W):
+    """Both joints open: every body moves under forces alone."""
+    cphi_s = sincos(phi)
+    sphi, cphi = cphi_s[0], cphi_s[1]
+    theta = work[(at.QS + 2) * W + i]
+    st_ct = sincos(theta)
+    st, ct = st_ct[0], st_ct[1]
+    vx2 = work[(at.VS + 0) * W + i]
+    vy2 = work[(at.VS + 1) * W + i]
+    spin = work[(at.VS + 2) * W + i]
+    v3 = work[(at.VS + 3) * W + i]
+    near = par[at.ROD_NEAR * W + i]
+    far = par[at.ROD_FAR * W + i]
+    crank = par[at.CRANK_LENGTH * W + i]
+    x2 = work[(at.QS + 0) * W + i]
+    y2 = work[(at.QS + 1) * W + i]
+    fx1, fy1, mb1, mj1, loss1 = joint_force(
+        effects,
+        work,
+        par,
+        at.JOINT_12,
+        at.GAP_12,
+        work[at.ACTIVE_12 * W + i],
+        work[at.INVERSE_IMPACT_12 * W + i],
+        crank * cphi - (x2 - near * ct),
+        crank * sphi - (y2 - near * st),
+        -crank * omega * sphi - (vx2 + near * spin * st),
+        crank * omega * cphi - (vy2 - near * spin * ct),
+        omega,
+        spin,
+        i,
+        W,
+    )
+    fx2, fy2, mb2, _, loss2 = joint_force(
+        effects,
+        work,
+        par,
+        at.JOINT_23,
+        at.GAP_23,
+        work[at.ACTIVE_23 * W + i],
+        work[at.INVERSE_IMPACT_23 * W + i],
+        work[(at.QS + 3) * W + i] - (x2 + far * ct),
+        -(y2 + far * st),
+        v3 - (vx2 - far * spin * st),
+        -(vy2 + far * spin * ct),
+        0.0,
+        spin,
+        i,
+        W,
+    )
+    g = gravity_of(effects.gravity, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
+    crank_load = (
+        crank * (sphi * fx1 - cphi * fy1)
+        + mj1
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
+    )
+    inverse_mass = par[at.INV_ROD_MASS * W + i]
+    moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2) + mb1 + mb2
+    work[at.ACC * W + i] = (fx1 + fx2) * inverse_mass
+    work[(at.ACC + 1) * W + i] = (fy1 + fy2) * inverse_mass - g
+    work[(at.ACC + 2) * W + i] = moment * par[at.INV_ROD_INERTIA * W + i]
+    work[(at.ACC + 3) * W + i] = (load - fx2 - guide) * par[at.INV_SLIDER_MASS * W + i]
+    store_crank(
+        effects.torque, work, 4, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
+    )
+    store_power(
+        effects.ledger,
+        effects.series,
+        effects.responses,
+        work,
+        drive_moment_of(effects.torque, torque, -crank_load),
+        omega,
+        loss1 + loss2 + guide * v3,
+        load * v3,
+        work[(at.ACC + 3) * W + i],
+        i,
+        W,
+    )
+
+
+@lane_function
+def crank_rod_open(effects, work, par, phi, omega, i, W):
+    """O12 open, O23 ideal: coordinates rod angle and slider x, coupled by the rod's mass."""
+    s_c = sincos(phi)
+    sphi, cphi = s_c[0], s_c[1]
+    s_c = sincos(work[(at.QS + 0) * W + i])
+    st, ct = s_c[0], s_c[1]
+    x3 = work[(at.QS + 1) * W + i]
+    spin = work[(at.VS + 0) * W + i]
+    v3 = work[(at.VS + 1) * W + i]
+    length = par[at.ROD_LENGTH * W + i]
+    far = par[at.ROD_FAR * W + i]
+    crank = par[at.CRANK_LENGTH * W + i]
+    fx, fy, mb, mj, loss = joint_force(
+        effects,
+        work,
+        par,
+        at.JOINT_12,
+        at.GAP_12,
+        work[at.ACTIVE_12 * W + i],
+        work[at.INVERSE_IMPACT_12 * W + i],
+        crank * cphi - (x3 - length * ct),
+        crank * sphi + length * st,
+        -crank * omega * sphi - (v3 + length * spin * st),
+        crank * omega * cphi + length * spin * ct,
+        omega,
+        spin,
+        i,
+        W,
+    )
+    g = gravity_of(effects.gravity, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
+    m2 = par[at.ROD_MASS * W + i]
+    m3 = par[at.SLIDER_MASS * W + i]
+    a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
+    a12 = m2 * far * st
+    a22 = m2 + m3
+    b1 = length * (st * fx - ct * fy) + mb + product(effects.gravity, m2 * far * ct, g)
+    b2 = fx + load - m2 * far * ct * spin * spin
+    alpha, a3, friction = sliding_pair(
+        effects.guide,
+        par,
+        a11,
+        a12,
+        a22,
+        b1,
+        b2,
+        m2 * far,
+        st,
+        ct,
+        spin,
+        v3,
+        (m2 + m3) * g - fy,
+        i,
+        W,
+    )
+    work[at.ACC * W + i] = alpha
+    work[(at.ACC + 1) * W + i] = a3
+    crank_load = (
+        crank * (sphi * fx - cphi * fy)
+        + mj
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
+    )
+    store_crank(
+        effects.torque, work, 2, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
+    )
+    store_power(
+        effects.ledger,
+        effects.series,
+        effects.responses,
+        work,
+        drive_moment_of(effects.torque, torque, -crank_load),
+        omega,
+        loss + friction * v3,
+        load * v3,
+        a3,
+        i,
+        W,
+    )
+
+
+@lane_function
+def sliding_pair(guide, par, a11, a12, a22, b1, b2, moment, st, ct, spin, v3, weight, i, W):
+    """Solve for rod angle and slider x with guide friction on an ideal slider pin.
+
+    The guide's reaction N = weight + m2 y2'' depends on the acceleration, and friction opposes the sliding
+    whatever the sign of N: solve for N > 0, and for N < 0 where that sign does not hold.
+    Returns angular acceleration, slider acceleration, friction force against +x.
+    """
+    if guide is not None:
+        ratio = guide_ratio(guide, par, v3, i, W)
+        y2_rest = moment * st * spin * spin  # the part of m2 y2'' without the angular acceleration
+        rest = weight + y2_rest
+        # N = rest - moment ct alpha; x row: a12 alpha + a22 a3 = b2 - ratio |N|
+        c21 = a12 - ratio * moment * ct
+        determinant = a11 * a22 - a12 * c21
+        alpha = (b1 * a22 - a12 * (b2 - ratio * rest)) / determinant
+        flip = 1.0 if rest - moment * ct * alpha >= 0.0 else -1.0
+        ratio = ratio * flip
+        c21 = a12 - ratio * moment * ct
+        determinant = a11 * a22 - a12 * c21
+        alpha = (b1 * a22 - a12 * (b2 - ratio * rest)) / determinant
+        a3 = (a11 * (b2 - ratio * rest) - c21 * b1) / determinant
+        return alpha, a3, ratio * (rest - moment * ct * alpha)
+    else:
+        inverse = 1.0 / (a11 * a22 - a12 * a12)
+        return (b1 * a22 - a12 * b2) * inverse, (a11 * b2 - a12 * b1) * inverse, 0.0
+
+
+@lane_function
+def rod_slider_open(effects, work, par, phi, omega, i, W):
+    """O12 ideal, O23 open: coordinates rod angle, slider x (and the crank angle, coupled by the rod's mass)."""
+    s_c = sincos(phi)
+    sphi, cphi = s_c[0], s_c[1]
+    s_c = sincos(work[(at.QS + 0) * W + i])
+    st, ct = s_c[0], s_c[1]
+    x3 = work[(at.QS + 1) * W + i]
+    spin = work[(at.VS + 0) * W + i]
+    v3 = work[(at.VS + 1) * W + i]
+    length = par[at.ROD_LENGTH * W + i]
+    near = par[at.ROD_NEAR * W + i]
+    crank = par[at.CRANK_LENGTH * W + i]
+    fx, fy, mb, _, loss = joint_force(
+        effects,
+        work,
+        par,
+        at.JOINT_23,
+        at.GAP_23,
+        work[at.ACTIVE_23 * W + i],
+        work[at.INVERSE_IMPACT_23 * W + i],
+        x3 - (crank * cphi + length * ct),
+        -(crank * sphi + length * st),
+        v3 + crank * omega * sphi + length * spin * st,
+        -(crank * omega * cphi + length * spin * ct),
+        0.0,
+        spin,
+        i,
+        W,
+    )
+    g = gravity_of(effects.gravity, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
+    guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
+    m2 = par[at.ROD_MASS * W + i]
+    a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near
+    coupling = m2 * near * crank
+    cos_d = cphi * ct + sphi * st
+    sin_d = sphi * ct - cphi * st  # sin(phi - theta)
+    b1 = (
+        length * (ct * fy - st * fx)
+        + mb
+        - product(effects.gravity, m2 * near * ct, g)
+        + coupling * omega * omega * sin_d
+    )
+    # moment about the crank's bearing from everything but the drive and the angular accelerations
+    b3 = (
+        crank * (cphi * fy - sphi * fx)
+        - product(effects.gravity, (par[at.CRANK_MOMENT * W + i] + m2 * crank) * cphi, g)
+        - coupling * spin * spin * sin_d
+    )
+    alpha, crank_alpha = crank_pair(
+        effects.torque,
+        a11,
+        coupling * cos_d,
+        par[at.CRANK_INERTIA * W + i] + m2 * crank * crank,
+        b1,
+        b3 + torque,
+    )
+    work[at.ACC * W + i] = alpha
+    work[(at.ACC + 1) * W + i] = (load - fx - guide) * par[at.INV_SLIDER_MASS * W + i]
+    store_crank(effects.torque, work, 2, crank_alpha, i, W)
+    store_power(
+        effects.ledger,
+        effects.series,
+        effects.responses,
+        work,
+        drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3),
+        omega,
+        loss + guide * v3,
+        load * v3,
+        work[(at.ACC + 1) * W + i],
+        i,
+        W,
+    )
+
+
+@lane_function
+def crank_pair(torque, a11, a13, a33, b1, b3):
+    """Angular accelerations of rod and crank (the latter 0 at prescribed speed)."""
+    if torque is not None:
+        inverse = 1.0 / (a11 * a33 - a13 * a13)
+        return (b1 * a33 - a13 * b3) * inverse, (a11 * b3 - a13 * b1) * inverse
+    else:
+        return b1 / a11, 0.0
+
+
+@lane_function
+def both_ideal(effects, work, par, phi, omega, i, W):
+    """Both joints ideal under a torque: one coordinate, the crank angle."""
+    s_c = sincos(phi)
+    sphi, cphi = s_c[0], s_c[1]
+    crank = par[at.CRANK_LENGTH * W + i]
+    length = par[at.ROD_LENGTH * W + i]
+    far = par[at.ROD_FAR * W + i]
+    m2 = par[at.ROD_MASS * W + i]
+    m3 = par[at.SLIDER_MASS * W + i]
+    st = -crank * sphi / length
+    ct = math.sqrt(1.0 - st * st)
+    # kinematic coefficients: first and second derivatives with respect to the crank angle
+    k = -crank * cphi / (length * ct)
+    dk = (crank * sphi + length * st * k * k) / (length * ct)
+    x3 = -crank * sphi - length * st * k
+    dx3 = -crank * cphi - length * (ct * k * k + st * dk)
+    x2 = x3 + far * st * k
+    dx2 = dx3 + far * (ct * k * k + st * dk)
+    y2 = -far * ct * k
+    dy2 = far * (st * k * k - ct * dk)
+    g = gravity_of(effects.gravity, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    torque = torque_of(effects.torque_table, work, par, i, W)
+    v3 = x3 * omega
+    inertia = (
+        par[at.CRANK_INERTIA * W + i]
+        + m2 * (x2 * x2 + y2 * y2)
+        + par[at.ROD_INERTIA * W + i] * k * k
+        + m3 * x3 * x3
+    )
+    change = m2 * (x2 * dx2 + y2 * dy2) + par[at.ROD_INERTIA * W + i] * k * dk + m3 * x3 * dx3
+    force = (
+        torque
+        + either_product(effects.load, effects.load_table, load, x3)
+        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi + m2 * y2, g)
+        - change * omega * omega
+    )
+    w2 = omega * omega
+    slope = st / ct
+    # guide reaction n0 + n1 alpha - slope f
+    n1 = reaction_slope(par, st, ct, k, x2, y2, x3, i, W)
+    n0 = reaction_slope(par, st, ct, dk * w2, dx2 * w2, dy2 * w2 + g, dx3 * w2, i, W)
+    n0 = n0 + load * slope + m3 * g
+    alpha, friction = guided_crank(effects.guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
+    work[at.ACC * W + i] = alpha
+    store_power(
+        effects.ledger,
+        effects.series,
+        effects.responses,
+        work,
+        torque,
+        omega,
+        friction * v3,
+        load * v3,
+        x3 * alpha + dx3 * w2,
+        i,
+        W,
+    )
+
+
+@lane_function
+def reaction_slope(par, st, ct, alpha2, ax2, ay2, ax3, i, W):
+    """Force Ry that a rod between ideal pins takes from the slider for given accelerations, without load and friction.
+
+    Moments about the rod's first pin: I2 alpha2 + m2 near (ct ay2 - st ax2) = length (ct Ry - st Rx), and the
+    slider's balance Rx = load - f - m3 ax3. Gravity counts as part of ay2.
+    """
+    length = par[at.ROD_LENGTH * W + i]
+    m2_near = par[at.ROD_MASS * W + i] * par[at.ROD_NEAR * W + i]
+    moment = par[at.ROD_INERTIA * W + i] * alpha2 + m2_near * (ct * ay2 - st * ax2)
+    return (moment - length * st * par[at.SLIDER_MASS * W + i] * ax3) / (length * ct)
+
+
+@lane_function
+def guided_crank(guide, par, inertia, force, x3, n0, n1, slope, v3, i, W):
+    """Crank acceleration with guide friction f = ratio |N|, whose reaction N = n0 + n1 alpha - slope f depends on it.
+
+    Solve for N > 0, and for N < 0 where that sign does not hold. Returns acceleration and f.
+    """
+    if guide is not None:
+        ratio = guide_ratio(guide, par, v3, i, W)
+        scaled = ratio / (1.0 + slope * ratio)  # f = scaled (n0 + n1 alpha)
+        alpha = (force - scaled * n0 * x3) / (inertia + scaled * n1 * x3)
+        ratio = ratio if n0 + n1 * alpha >= 0.0 else -ratio
+        scaled = ratio / (1.0 + slope * ratio)
+        alpha = (force - scaled * n0 * x3) / (inertia + scaled * n1 * x3)
+        return alpha, scaled * (n0 + n1 * alpha)
+    else:
+        return force / inertia, 0.0

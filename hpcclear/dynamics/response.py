@@ -1,0 +1,285 @@
+"""One response, whole: the motion step by step, and from it forces, energies and time series."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.evaluator import outcome_records
+from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
+from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.lowering import (
+    coordinate_count,
+    integrator_of,
+    parameters,
+    problem_of,
+    start_states,
+    topology,
+)
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+
+Array = NDArray[np.float64]
+
+_CHUNK = 8192  # accepted steps kept before they are handed over
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Every accepted step of one response, the start included; arrays over steps (s,)."""
+
+    time: Array
+    turn_time: Array  # since the start of the revolution
+    revolution: Array
+    contacts: Array  # (s, 4): active flags and 1/d'_0, valid until the next step
+    works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
+    q: Array  # (s, n)
+    v: Array
+    a: Array
+
+
+def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
+    """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
+    problem = problem_of(scene, ledger=True, series=True, single=True)
+    par = parameters(scene)
+    state = start_states(scene, par)
+    n = problem.coordinates
+    buffer = np.zeros((_CHUNK, rec.columns(n)))
+    lanes = Lanes(problem, 1, buffer)
+    lanes.queue(par, state, np.zeros(1, np.int64))
+    chunks = [_first_row(problem, par, state[0], n)]
+    while lanes.pending:
+        lanes.advance(0.2)
+        chunks.append(lanes.take_record())
+    rows = np.concatenate(chunks)
+    labels, out, finished = lanes.collect()
+    s = rec.STATE
+    contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
+    steps = Steps(
+        rows[:, rec.TIME],
+        rows[:, rec.TURN_TIME],
+        rows[:, rec.REVOLUTION],
+        rows[:, contacts],
+        rows[:, rec.DRIVE_WORK : rec.STATE],
+        rows[:, s : s + n],
+        rows[:, s + n : s + 2 * n],
+        rows[:, s + 2 * n :],
+    )
+    return steps, outcome_records(labels, out, finished), par[0]
+
+
+def _first_row(problem: Problem, par: Array, state: Array, n: int) -> Array:
+    """The start as a row of the record."""
+    row = np.zeros((1, rec.columns(n)))
+    velocities = state[at.MAX_COORDINATES : at.MAX_COORDINATES + n]
+    row[0, rec.STATE : rec.STATE + 2 * n] = np.concatenate([state[:n], velocities])
+    contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
+    row[0, contacts] = state[2 * at.MAX_COORDINATES :]
+    states = row[:, rec.STATE : rec.STATE + 2 * n]
+    row[0, rec.STATE + 2 * n :] = _observed(problem, par[0], states, row[:, contacts], np.zeros(1))[
+        0, :n
+    ]
+    return row
+
+
+def _observed(problem: Problem, par: Array, states: Array, contacts: Array, times: Array) -> Array:
+    """Accelerations (n) and rates (RATES) at each instant."""
+    n = problem.coordinates
+    out = np.zeros((len(times), n + at.RATES))
+    none = np.zeros(4)
+    tables = [none if t is None else t for t in (problem.torque_table, problem.load_table)]
+    arrays = [np.ascontiguousarray(x) for x in (states, contacts, times)]
+    observe(problem.effects, n, par, *tables, *arrays, out)
+    return out
+
+
+def _between(
+    steps: Steps, times: Array, free: bool
+) -> tuple[Array, Array, Array, NDArray[np.intp], Array]:
+    """States, contacts, step index and time within the step at given times.
+
+    Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
+    accurate as the integrator; a free crank's angle restarts every turn and is unwrapped first.
+    """
+    q = steps.q.copy()
+    if free:
+        q[:, -1] += at.TURN * steps.revolution
+    k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
+    h = (steps.time[k + 1] - steps.time[k])[:, None]
+    s = (times - steps.time[k])[:, None] / h
+    d = q[k + 1] - q[k]
+    v0, v1 = h * steps.v[k], h * steps.v[k + 1]
+    a0, a1 = h * h * steps.a[k], h * h * steps.a[k + 1]
+    c3 = 10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+    c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
+    position = q[k] + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    return position, velocity, steps.contacts[k], k, s[:, 0]
+
+
+def _works_between(steps: Steps, powers: Array, k: NDArray[np.intp], s: Array) -> Array:
+    """Works (t, 4) by the cubic through works and powers at both ends of the step."""
+    h = (steps.time[k + 1] - steps.time[k])[:, None]
+    s = s[:, None]
+    w0, w1 = steps.works[k], steps.works[k + 1]
+    p0, p1 = h * powers[k], h * powers[k + 1]
+    d = w1 - w0
+    return w0 + s * (p0 + s * (3 * d - 2 * p0 - p1 + s * (p0 + p1 - 2 * d)))
+
+
+def instants(scene: Scene, steps: Steps) -> Array:
+    """Times of the output, s, shape (times,): evenly spaced over each revolution, or every accepted step."""
+    count = scene.output.instants_per_revolution
+    if count == 0:
+        return steps.time
+    ends = np.flatnonzero(np.diff(steps.revolution) > 0)  # the rows that close a revolution
+    borders = np.concatenate([[0.0], steps.time[ends]])
+    if steps.time[-1] > borders[-1]:
+        borders = np.append(borders, steps.time[-1])
+    parts = [np.linspace(a, b, count, endpoint=False) for a, b in itertools.pairwise(borders)]
+    return np.append(np.concatenate(parts), borders[-1])
+
+
+def simulate(scene: Scene) -> xr.Dataset:
+    """Simulate one scene; time series of the motion, forces and energies.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind ``response``: dimensions time and joint, SI units as attributes. Every step before a failure is kept;
+        `status` says how the simulation ended.
+
+    Raises
+    ------
+    InputError
+        If the scene asks for what the kernel cannot do.
+    """
+    named = scene
+    scene, reason = resolve(scene)
+    simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
+    times, data, record = simulated(scene)
+    names = (
+        "objective",
+        "objective_spread",
+        "objective_uncertainty",
+        "mean_gap",
+        "peak_contact_force",
+    )
+    outcome = {
+        name: record[name][0] for name in (*names, "latched", "rhs_evaluations", "status", "flags")
+    }
+    return dataset.response_dataset(
+        times,
+        {**data, **outcome},
+        dataset.provenance(named.text or named.to_toml(), named.hash)
+        | recorded(reason)
+        | {"integrator": integrator_of(scene, single=True)},
+    )
+
+
+def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+    """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
+    lanes = ClosedForm(problem_of(scene))
+    par = parameters(scene)
+    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
+    return *ideal_series(scene), outcome_records(*lanes.collect())
+
+
+def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+    """Instants, time series and outcome record (1,) of a scene that is integrated."""
+    first, second, free = topology(scene)
+    nine = scene.numerics.formulation == "baumgarte"
+    turning = free or nine  # the crank angle is the last coordinate
+    steps, record, par = integrate(scene)
+    times = instants(scene, steps)
+    q, v, contacts, k, s = _between(steps, times, turning)
+    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
+    problem = problem_of(scene, ledger=True, series=True)
+    states = np.hstack([_in_turn(q, steps.revolution[k], turning), v])
+    seen = _observed(problem, par, states, contacts, turn_time)
+    ends = np.hstack([steps.q, steps.v])
+    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)
+    n = problem.coordinates
+    works = _works_between(steps, at_steps[:, n + at.DRIVE_POWER + np.arange(4)], k, s)
+    phi, omega = at.TURN * times / par[at.PERIOD], np.full_like(times, par[at.SPEED])
+    data = {}
+    if nine:
+        data["constraint_violation"] = baumgarte.constraint_violation(first, second, par, q.T)
+    rows = baumgarte.minimal_rows(first, second) if nine else list(range(n - free))
+    if turning:
+        phi, omega = q[:, -1], v[:, -1]
+    if first or second:
+        slider = seen[:, rows[-1]]
+    else:
+        rigid = ideal.ideal_response(
+            problem.effects, par, problem.load_table, phi, omega, seen[:, n - 1]
+        )
+        slider = rigid[ideal.SLIDER_A]
+    m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
+    data |= _series(scene, m, par, seen, n, contacts, works)
+    return times, data | {"crank_angle": phi, "slider_acceleration": slider}, record
+
+
+def _in_turn(q: Array, revolution: Array, turning: bool) -> Array:
+    """Coordinates with the crank angle, if it is one, counted from the start of its revolution, as the kernel does."""
+    if turning:
+        q = q.copy()
+        q[:, -1] -= at.TURN * revolution
+    return q
+
+
+def _turn_starts(steps: Steps) -> tuple[Array, Array]:
+    """Index and value of the time at which the revolution of each step interval began, for `numpy.interp`."""
+    index = np.arange(len(steps.time), dtype=float)
+    return index, steps.time - steps.turn_time
+
+
+def _series(
+    scene: Scene, m: geometry.Motion, par: Array, seen: Array, n: int, contacts: Array, works: Array
+) -> dict[str, Array]:
+    """Every time series of the response."""
+    rates = seen[:, n:]
+    open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
+    gaps = np.where(open_, rates[:, [at.GAP_12, at.GAP_23]], 0.0)
+    stiffness = np.where(
+        open_, par[[at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS]], 0.0
+    )
+    latched = scene.effects.contact is not None and scene.effects.contact.latched
+    active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
+    elastic = geometry.elastic_energy(gaps, active, stiffness)
+    kinetic = geometry.kinetic_energy(m, par)
+    potential = geometry.potential_energy(m, par, scene.effects.gravity)
+    driving, _, dissipated, load = works.T
+    total = kinetic + elastic + potential
+    return {
+        "slider_position": m.slider,
+        "slider_velocity": m.slider_speed,
+        "rod_x": m.rod_x,
+        "rod_y": m.rod_y,
+        "rod_angle": m.rod_angle,
+        "eccentricity_x": m.eccentricity_x,
+        "eccentricity_y": m.eccentricity_y,
+        "penetration": np.maximum(gaps, 0.0) * active,
+        "contact_force": rates[:, [at.FORCE_12, at.FORCE_23]],
+        "friction_force": rates[:, [at.FRICTION_12, at.FRICTION_23]],
+        "crank_moment": rates[:, at.DRIVE_MOMENT],
+        "kinetic_energy": kinetic,
+        "elastic_energy": elastic,
+        "potential_energy": potential,
+        "driving_work": driving,
+        "load_work": load,
+        "dissipated_energy": dissipated,
+        "energy_residual": total - total[0] - driving - load + dissipated,
+    }

@@ -1,0 +1,228 @@
+"""Step-size control, acceptance and commit of a step over all lanes, without branches in the lane loop.
+
+Proportional-integral control after Gustafsson 1991 (doi:10.1145/210232.210242) with the exponents of Hairer, Norsett
+and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair at hand.
+"""
+
+from numba import njit
+
+from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.dynamics import layout as at
+
+_LOG_SAFETY = -0.152003  # log2(0.9)
+_LOG_SHRINK = -2.321928  # a step shrinks to a fifth at most
+_LOG_GROW = 3.321928  # and grows tenfold
+
+
+@njit(forceinline=True, error_model="numpy", fastmath=FASTMATH | {"reassoc"})
+def count_up(count, flag):
+    """count + flag, a sum of zeros and ones: exact in any order, so the compiler may reorder it."""
+    return count + flag
+
+
+@lane_function
+def choose_step(work, par, torque, W):
+    """Take the step asked for, or what is left of the revolution (prescribed speed)."""
+    for i in range(W):
+        h = work[at.NEXT_STEP * W + i]
+        if torque is None:
+            left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
+            # Stretched by round-off at most: a step cut to end at an impact must stay cut, or is tried for ever.
+            ending = 1.0 if h * (1.0 + 1e-8) >= left else 0.0
+            h = left if h * (1.0 + 1e-8) >= left else h
+            work[at.ENDING * W + i] = ending
+        work[at.STEP * W + i] = h
+
+
+@lane_function
+def judge_step(work, expo, beta, max_steps, smallest, W):
+    """Accept or reject by the error, propose the next step; lanes that cannot go on become special."""
+    special = 0.0
+    for i in range(W):
+        error = work[at.ERROR * W + i]
+        # not a number has a sign too, and a negative one would pass for a tiny error below
+        error = error if error <= 1e300 else 1e300
+        running = work[at.RUNNING * W + i]
+        h = work[at.STEP * W + i]
+        log = 0.5 * rough_log2(error)
+        accept = 1.0 if error <= 1.0 else 0.0
+        gain = _LOG_SAFETY - (expo - 0.75 * beta) * log + beta * work[at.LOG_ERROR * W + i]
+        loss = _LOG_SAFETY - expo * log
+        log_factor = gain if accept == 1.0 else loss
+        top = 0.0 if (work[at.REJECTED * W + i] == 1.0) | (accept == 0.0) else _LOG_GROW
+        log_factor = min(max(log_factor, _LOG_SHRINK), top)
+        proposal = h * rough_exp2(log_factor)
+        # a step cut short by the end of the revolution says little about the next one
+        asked = work[at.NEXT_STEP * W + i]
+        cut = accept * work[at.ENDING * W + i]
+        proposal = max(proposal, asked) if cut == 1.0 else proposal
+        # the implicit method has its own control
+        proposal = asked if work[at.STIFF * W + i] == 1.0 else proposal
+        attempts = work[at.ATTEMPTS * W + i] + running
+        work[at.ATTEMPTS * W + i] = attempts
+        work[at.ACCEPT * W + i] = accept
+        work[at.NEXT_STEP * W + i] = proposal
+        stuck = 1.0 if (accept == 0.0) & (h <= smallest * (h + work[at.TIME * W + i])) else 0.0
+        over = 1.0 if attempts >= max_steps else 0.0
+        flag = running * max(stuck, over)
+        work[at.SPECIAL * W + i] = flag
+        special = count_up(special, flag)
+    return special
+
+
+@lane_function
+def gap_flag(latched, work, active, gap, i, W, tolerance):
+    """1 where the joint's gap needs the scalar code: an impact inside the step, or a change of sign."""
+    d0 = work[(at.RATE_OLD + gap) * W + i]
+    d1 = work[(at.RATE_NOW + gap) * W + i]
+    flag = 1.0 if d0 * d1 < 0.0 else 0.0
+    if latched is not None:
+        h = work[at.STEP * W + i]
+        m0 = h * work[(at.RATE_OLD + gap + 2) * W + i]
+        m1 = h * work[(at.RATE_NOW + gap + 2) * W + i]
+        flight = 1.0 - work[active * W + i]
+        hit = 1.0 if d1 > -tolerance else 0.0
+        bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
+        flag = max(flag, flight * max(hit, bump))
+    return flag
+
+
+@lane_function
+def flag_gaps(crank_rod, rod_slider, torque, latched, work, last, tolerance, W):
+    """Mark accepted lanes that need the scalar code before the step is committed."""
+    special = 0.0
+    for i in range(W):
+        flag = 0.0
+        if crank_rod is not None:
+            flag = max(flag, gap_flag(latched, work, at.ACTIVE_12, at.GAP_12, i, W, tolerance))
+        if rod_slider is not None:
+            flag = max(flag, gap_flag(latched, work, at.ACTIVE_23, at.GAP_23, i, W, tolerance))
+        if torque is not None:
+            turned = 1.0 if work[(at.QS + last) * W + i] > at.TURN - 1e-6 else 0.0
+            stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
+            flag = max(flag, max(turned, stalled))
+        flag = flag * work[at.ACCEPT * W + i] * work[at.RUNNING * W + i]
+        work[at.SPECIAL * W + i] = max(work[at.SPECIAL * W + i], flag)
+        special = count_up(special, flag)
+    return special
+
+
+@lane_function
+def keep(work, row, new, yes, i, W):
+    """Store a new value where the step was accepted.
+
+    Both are read before one is chosen: else the compiler chooses between two addresses, and vectorises no loop with that.
+    """
+    old = work[row * W + i]
+    work[row * W + i] = new if yes else old
+
+
+@lane_function
+def add_integral(work, rate, mean, yes, i, W):
+    """Add the mean of a rate over the step, times the step, where it was accepted.
+
+    The sum is chosen, not the product: else the compiler fuses the two in a single response and not in lanes.
+    """
+    added = work[(at.INTEGRAL + rate) * W + i] + work[at.STEP * W + i] * mean
+    keep(work, at.INTEGRAL + rate, added, yes, i, W)
+
+
+@lane_function
+def commit_joint(flag, latched, work, gap, active, peak, deepest, ended, i, W):
+    """Contact state, integral and extremes of one joint after a step."""
+    if flag is not None:
+        accept = work[at.ACCEPT * W + i]
+        yes = accept == 1.0
+        counts = accept * work[at.AVERAGING * W + i] == 1.0
+        d = work[(at.RATE_NOW + gap) * W + i]
+        force = work[(at.RATE_NOW + gap + 1) * W + i]
+        work[peak * W + i] = max(work[peak * W + i], force if counts else 0.0)
+        work[deepest * W + i] = max(work[deepest * W + i], d if counts else 0.0)
+        add_integral(work, gap, abs(work[(at.RATE_SUM + gap) * W + i]), yes, i, W)
+        keep(work, at.RATE_OLD + gap, d, yes, i, W)
+        keep(work, at.RATE_OLD + gap + 2, work[(at.RATE_NOW + gap + 2) * W + i], yes, i, W)
+        if latched is not None:
+            on = work[active * W + i]
+            off = 1.0 if (accept * on == 1.0) & (d < 0.0) else 0.0
+            work[active * W + i] = on - off
+            work[ended * W + i] += off
+
+
+@lane_function
+def commit_ledger(ledger, work, i, W):
+    """Powers and works after a step."""
+    if ledger is not None:
+        yes = work[at.ACCEPT * W + i] == 1.0
+        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
+            add_integral(work, r, work[(at.RATE_SUM + r) * W + i], yes, i, W)
+            keep(work, at.RATE_OLD + r, work[(at.RATE_NOW + r) * W + i], yes, i, W)
+
+
+@lane_function
+def commit_response(work, rate, yes, i, W):
+    """Integral of a rate after a step."""
+    add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
+    keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+
+
+@lane_function
+def commit_responses(responses, work, i, W):
+    """Integrals of forces and slider acceleration, and the peak of the crank moment, after a step."""
+    if responses is not None:
+        yes = work[at.ACCEPT * W + i] == 1.0
+        counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
+        commit_response(work, at.FORCE_12, yes, i, W)
+        commit_response(work, at.FORCE_23, yes, i, W)
+        commit_response(work, at.SLIDER_ACCELERATION, yes, i, W)
+        commit_response(work, at.SLIDER_SQUARE, yes, i, W)
+        moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
+        peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
+        work[at.PEAK_MOMENT * W + i] = peak
+
+
+@lane_function
+def commit(crank_rod, rod_slider, latched, ledger, responses, work, stages, n, W):
+    """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
+    ended = 0.0
+    for i in range(W):
+        commit_joint(
+            crank_rod,
+            latched,
+            work,
+            at.GAP_12,
+            at.ACTIVE_12,
+            at.PEAK_12,
+            at.DEEPEST_12,
+            at.ENDED_12,
+            i,
+            W,
+        )
+        commit_joint(
+            rod_slider,
+            latched,
+            work,
+            at.GAP_23,
+            at.ACTIVE_23,
+            at.PEAK_23,
+            at.DEEPEST_23,
+            at.ENDED_23,
+            i,
+            W,
+        )
+        commit_ledger(ledger, work, i, W)
+        commit_responses(responses, work, i, W)
+        accept = work[at.ACCEPT * W + i]
+        yes = accept == 1.0
+        for k in range(n):
+            keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
+            keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
+            new = work[(at.ACC + k) * W + i]
+            old = stages[k * W + i]
+            stages[k * W + i] = new if yes else old
+        work[at.TIME * W + i] += accept * work[at.STEP * W + i]
+        keep(work, at.LOG_ERROR, 0.5 * rough_log2(max(work[at.ERROR * W + i], 1e-8)), yes, i, W)
+        rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
+        work[at.REJECTED * W + i] = rejected * (1.0 - accept)
+        ended = count_up(ended, accept * work[at.ENDING * W + i] * work[at.RUNNING * W + i])
+    return ended

@@ -1,0 +1,77 @@
+"""Keeping every accepted step of a single response: the raw material of time series. Off in ensembles."""
+
+from hpcclear.base.jit import lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation.lobatto import MATRIX, STAGES, row_of, weighted
+from hpcclear.dynamics.stepping.lifecycle import RECORDED
+
+# one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
+(TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
+(DRIVE_WORK, ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, STATE) = range(7, 12)
+
+
+def columns(n: int) -> int:
+    """Length of a row for n coordinates."""
+    return STATE + 3 * n
+
+
+@lane_function
+def record_step(record, counters, work, stages, book, n, W):
+    """Append the new state of lane 0 to `record`; True when it is full and the stepper must return."""
+    if record is not None:
+        if work[at.ACCEPT * W] * work[at.RUNNING * W] == 1.0:
+            row = counters[RECORDED]
+            record[row, TIME] = book[at.ELAPSED * W] + work[at.TIME * W]
+            record[row, TURN_TIME] = work[at.TIME * W]
+            record[row, REVOLUTION] = book[at.REVOLUTION * W]
+            record[row, ACTIVE_12] = work[at.ACTIVE_12 * W]
+            record[row, ACTIVE_23] = work[at.ACTIVE_23 * W]
+            record[row, INVERSE_12] = work[at.INVERSE_IMPACT_12 * W]
+            record[row, INVERSE_23] = work[at.INVERSE_IMPACT_23 * W]
+            for r in range(4):
+                done = book[(at.DRIVE_WORK + r) * W]
+                record[row, DRIVE_WORK + r] = done + work[(at.INTEGRAL + at.DRIVE_POWER + r) * W]
+            for k in range(n):
+                record[row, STATE + k] = work[(at.Q + k) * W]
+                record[row, STATE + n + k] = work[(at.V + k) * W]
+                record[row, STATE + 2 * n + k] = stages[k * W]
+            counters[RECORDED] = row + 1
+        return counters[RECORDED] >= record.shape[0]
+    else:
+        return False
+
+
+@lane_function
+def record_nodes(record, counters, work, m, book, n):
+    """Append the inner nodes of a step of collocation, which stand in the lanes of `m`, before it is committed."""
+    if record is not None:
+        for i in range(STAGES - 1):
+            row = counters[RECORDED]
+            turn_time = m[at.STAGE_TIME * STAGES + i]
+            record[row, TIME] = book[at.ELAPSED] + turn_time
+            record[row, TURN_TIME] = turn_time
+            record[row, REVOLUTION] = book[at.REVOLUTION]
+            record[row, ACTIVE_12] = m[at.ACTIVE_12 * STAGES]
+            record[row, ACTIVE_23] = m[at.ACTIVE_23 * STAGES]
+            record[row, INVERSE_12] = m[at.INVERSE_IMPACT_12 * STAGES]
+            record[row, INVERSE_23] = m[at.INVERSE_IMPACT_23 * STAGES]
+            for r in range(4):
+                power = at.DRIVE_POWER + r
+                rates = row_of(m, at.RATE_NOW + power)
+                since = weighted(m, MATRIX, work[at.RATE_OLD + power], rates, i)
+                done = book[at.DRIVE_WORK + r] + work[at.INTEGRAL + power]
+                record[row, DRIVE_WORK + r] = done + work[at.STEP] * since
+            for k in range(n):
+                record[row, STATE + k] = m[(at.QS + k) * STAGES + i]
+                record[row, STATE + n + k] = m[(at.VS + k) * STAGES + i]
+                record[row, STATE + 2 * n + k] = m[(at.ACC + k) * STAGES + i]
+            counters[RECORDED] = row + 1
+
+
+@lane_function
+def no_room(record, counters):
+    """Whether another step of collocation might not fit into `record`."""
+    if record is not None:
+        return counters[RECORDED] + STAGES > record.shape[0]
+    else:
+        return False

@@ -1,0 +1,1 @@
+"""A design through the dynamics, on all ranks: samples and statistics."""

@@ -1,0 +1,83 @@
+"""What a script or notebook calls beside `load_scene` and `simulate`: many designs at once, in this process."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.variables import PAPER_PATHS
+
+
+def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
+    """Designs from a mapping of name or scene path to values, shape (n,) or a scalar, SI.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a design makes no mechanism.
+    """
+    if isinstance(points, Points):
+        return points
+    if not points:
+        raise InputError(
+            "points", {}, "there is nothing to vary", "Give at least one name and its values"
+        )
+    columns = {
+        str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
+    }
+    values = np.column_stack(np.broadcast_arrays(*columns.values()))
+    paths = tuple(_paths(scene, name) for name in columns)
+    made = Points(tuple(columns), values, paths)
+    check_points(scene, made)
+    return made
+
+
+def _paths(scene: Scene, name: str) -> tuple[str, ...]:
+    """Scene entries that a name drives: the study's, the paper's, or a path itself."""
+    if scene.study is not None and name in scene.study.names:
+        return scene.study.variable(name).paths
+    if name in PAPER_PATHS:
+        known = set(scene.numeric_paths())
+        return tuple(path for path in PAPER_PATHS[name] if path in known)
+    scene.number(name)  # refuses what is no number of this scene
+    return (name,)
+
+
+def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Dataset:
+    """Simulate many designs of a scene in this process.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : Points or mapping of str to array
+        Designs: names as in the paper (``m2``, ``C``), of the study, or dotted scene paths; values in SI, shape (n,)
+        or scalars.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind ``samples``: objective, its spread, forces, status of each design. Failed numbers are NaN.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a design makes no mechanism, or the scene asks for what the kernel cannot do.
+    """
+    designs = as_points(scene, points)
+    chosen, reason = resolve(scene, designs)
+    records = evaluate_records(chosen, designs)
+    return dataset.samples_dataset(
+        designs.names,
+        designs.values,
+        dict(zip(designs.names, designs.units, strict=True)),
+        records,
+        dataset.provenance(scene.text or scene.to_toml(), scene.hash) | recorded(reason),
+    )

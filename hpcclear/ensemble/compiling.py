@@ -1,0 +1,116 @@
+"""Everything a study compiles, shared out over the ranks at its start.
+
+Compilation takes longer than many a study's simulations. What one rank has compiled the others on
+its node load from disk.
+"""
+
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.dynamics.evaluator import Evaluator
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.simulate import COMPILE, payload_of
+from hpcclear.ranks.progress import Progress, Style
+from hpcclear.ranks.team import Ranks
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points
+from hpcclear.statistics.random.distributions import Uniform
+from hpcclear.statistics.random.inputs import RandomInput
+from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.search.mopso import minimise
+from hpcclear.statistics.surrogate.kriging import fit_kriging
+
+
+def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
+    """Compile this rank's share of the parts; root and the others are at it together.
+
+    Parameters
+    ----------
+    payload : mapping
+        Of `hpcclear.ensemble.simulate.payload_of`.
+    ranks : Ranks
+    """
+    mine: tuple[Callable[[Mapping[str, Any]], None], ...] = (_ensemble, _response, _statistics)
+    if ranks.size > 1 and ranks.is_root:
+        mine = mine[:1]  # takes as long as the others together
+    elif ranks.size > 1:
+        mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
+    for part in mine:
+        part(payload)
+    return Compiled()
+
+
+class Compiled:
+    """A worker that has done its work when it is made."""
+
+    lanes = 1
+
+    def __init__(self) -> None:
+        self._waiting: list[int] = []
+
+    @property
+    def pending(self) -> int:
+        """Samples not returned yet."""
+        return len(self._waiting)
+
+    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
+        """Queue samples: indices of shape (n,), points of shape (n, d)."""
+        self._waiting += index.tolist()
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Return the records of all samples."""
+        records = np.zeros(self.pending, OUTCOME)
+        records["sample"] = self._waiting
+        self._waiting.clear()
+        return records
+
+
+def _ensemble(payload: Mapping[str, Any]) -> None:
+    """The kernel for many samples."""
+    columns = Points(payload["names"], np.empty((0, len(payload["names"]))), payload["paths"])
+    Evaluator(load_scene(payload["scene"]), columns, payload["lanes"]).advance(0.0)
+
+
+def _response(payload: Mapping[str, Any]) -> None:
+    """The kernel for one response."""
+    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
+    simulate(load_scene(payload["scene"]).with_(short))
+
+
+def _statistics(payload: Mapping[str, Any]) -> None:
+    """Surrogate, its moments, and the swarm."""
+    rng = np.random.default_rng(0)
+    points = rng.random((12, 2))
+    bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
+    model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
+    model.predict(points)
+    objective = RobustObjective(model, ("x",), [RandomInput("y", Uniform(0.0, 1.0))])
+    minimise(objective, bounds[:1], iterations=4, rng=rng, size=2)
+
+
+def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> None:
+    """Compile what a study of this scene needs, each part on a rank of its own if there are three.
+
+    Parameters
+    ----------
+    scene : Scene
+    ranks : Ranks
+    points : Points
+        Perhaps none; their columns are what counts.
+    style : str
+        How progress is shown.
+    """
+    # One sample that takes as long as the compilers do: its rate would say nothing.
+    progress = Progress("compiling", style="quiet")
+    if style != "quiet":
+        print(
+            "compiling what this study needs: up to a minute the first time",
+            file=sys.stderr,
+            flush=True,
+        )
+    nothing = np.zeros((1, 1))  # a stage needs a sample
+    ranks.run_points(COMPILE, payload_of(scene, points), nothing, progress=progress)

@@ -1,0 +1,200 @@
+"""Statistics summed up where the samples are made: ranks get parts of blocks and send back one summary for each.
+
+A part is a run of sample numbers that is a node of its block's tree (`statistics.summarise`), so that it does not matter
+to a single bit how long parts are, who sums them up and in which order they come in.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.ranks.progress import Progress, Style
+from hpcclear.statistics.streams.accumulator import Accumulator
+from hpcclear.statistics.streams.summary import BINS, LEAF, ROWS, Summary, summarise
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.schedule import Points, Worker
+    from hpcclear.ranks.team import Ranks
+
+PARTS_A_RANK = 32
+"""A rank gets at least so many parts while they can be short enough, so that none is busy long after the others."""
+
+_ROWS = len(ROWS)
+
+PARTIAL = np.dtype(
+    [
+        ("sample", np.int64),  # which part
+        ("first", np.int64),  # its first sample
+        ("length", np.int64),  # of the node of the tree; the last part of a design may hold less
+        ("samples", np.int64),
+        ("count", np.int64, (_ROWS,)),
+        ("mean", float, (_ROWS,)),
+        ("squares", float, (_ROWS,)),
+        ("minimum", float, (_ROWS,)),
+        ("maximum", float, (_ROWS,)),
+        ("histogram", np.uint16, (_ROWS, BINS + 2)),
+        ("status", np.int64, (len(Status),)),
+        ("flags", np.int64, (len(Flag),)),
+    ]
+)
+"""One part's summary as a record, for the way from rank to root."""
+
+
+LONGEST = 2.0
+"""Seconds of work that a part holds at most, if samples allow: what a rank that is killed has not reported."""
+
+LONGEST_UNKNOWN = 256
+"""Samples of a part at most while nobody knows what they cost."""
+
+
+def part_length(samples: int, ranks: int, block: int, seconds: float = 0.0) -> int:
+    """Samples a part: a leaf times a power of two, a block at most; `seconds`: of one sample, 0 if not known."""
+    most = min(block, LONGEST / seconds if seconds > 0.0 else LONGEST_UNKNOWN)
+    length = LEAF
+    while 2 * length <= min(most, samples // (PARTS_A_RANK * ranks)):
+        length *= 2
+    return length
+
+
+def packed(part: int, first: int, length: int, samples: int, summary: Summary) -> np.ndarray:
+    """One summary as a record of `PARTIAL`, shape (1,)."""
+    record = np.zeros(1, PARTIAL)
+    record["sample"], record["first"], record["length"], record["samples"] = (
+        part, first, length, samples,
+    )  # fmt: skip
+    for field in fields(Summary):
+        record[field.name] = getattr(summary, field.name)
+    return record
+
+
+def unpacked(record: np.void) -> Summary:
+    """The summary in one record of `PARTIAL`."""
+    row = {field.name: record[field.name] for field in fields(Summary)}
+    row["histogram"] = row["histogram"].astype(np.int64)
+    return Summary(**row)
+
+
+class Parts:
+    """What is left of a design, as parts: rows of first sample and length, made when they are asked for.
+
+    Parameters
+    ----------
+    sums : Accumulator
+        Knows what was taken already.
+    length : int
+        Samples a part, as `part_length`.
+    """
+
+    def __init__(self, sums: Accumulator, length: int) -> None:
+        self._rows = sums.parts_left(length)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        return self._rows[np.asarray(index, np.int64)].astype(float)
+
+
+class Summariser:
+    """A rank's worker that simulates parts and sums them up; see `schedule.Worker`.
+
+    Parameters
+    ----------
+    worker : Worker
+        Simulates samples.
+    points : Points
+        Makes the design's points by sample number.
+    edges : ndarray, shape (rows, bins + 1)
+        Of the histograms.
+    """
+
+    lanes = 1  # parts at once: one is worked on while the next fills lanes that it leaves
+
+    def __init__(self, worker: "Worker", points: "Points", edges: NDArray[np.float64]) -> None:
+        self._worker, self._points, self._edges = worker, points, edges
+        self._open: dict[int, np.ndarray] = {}  # records by part; sample -1: not here yet
+        self._places: dict[int, tuple[int, int]] = {}  # first sample and length of each part
+        self._missing: dict[int, int] = {}
+
+    @property
+    def pending(self) -> int:
+        """Parts not finished."""
+        return len(self._open)
+
+    @property
+    def samples_in_hand(self) -> list[int]:
+        """Samples of open parts that have not finished, ascending."""
+        return sorted(
+            self._places[part][0] + k
+            for part, records in self._open.items()
+            for k in np.flatnonzero(records["sample"] < 0).tolist()
+        )
+
+    def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
+        """Queue parts: numbers (m,), rows of first sample and length (m, 2)."""
+        for part, (first, length) in zip(
+            index.tolist(), points.astype(np.int64).tolist(), strict=True
+        ):
+            samples = np.arange(first, min(first + length, len(self._points)))
+            records = np.zeros(samples.size, OUTCOME)
+            records["sample"] = -1
+            self._open[part], self._places[part] = records, (first, length)
+            self._missing[part] = samples.size
+            self._worker.submit(samples, self._points[samples])
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Work for about `seconds`; summaries (`PARTIAL`) of the parts finished meanwhile."""
+        records = self._worker.advance(seconds)
+        done = []
+        if records.size:
+            for part in list(self._open):
+                first, length = self._places[part]
+                slots = records["sample"] - first
+                mine = (slots >= 0) & (slots < length)
+                self._open[part][slots[mine]] = records[mine]
+                self._missing[part] -= int(np.count_nonzero(mine))
+                if self._missing[part] == 0:
+                    done.append(self._finish(part))
+        return np.concatenate(done) if done else np.zeros(0, PARTIAL)
+
+    def _finish(self, part: int) -> np.ndarray:
+        records = self._open.pop(part)
+        first, length = self._places.pop(part)
+        del self._missing[part]
+        return packed(part, first, length, records.size, summarise(records, self._edges, length))
+
+
+def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
+    """A rank's worker: the simulations of `payload["samples"]`, summed up where they are made."""
+    from hpcclear.ensemble.simulate import KIND
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.sampling import MonteCarloPoints
+
+    worker = ranks.make(KIND, payload["samples"])
+    points = MonteCarloPoints(load_scene(payload["design"]), payload["total"])
+    return Summariser(worker, points, payload["edges"])
+
+
+class PartsProgress(Progress):
+    """Progress of a stage of parts, told in samples."""
+
+    def __init__(self, label: str, style: Style, samples: int, done: int) -> None:
+        super().__init__(label, style)
+        self._samples, self._before = samples, done
+
+    def start(self, total: int, completed: np.ndarray) -> None:
+        """Begin with records `completed` (m,) there already; the number of parts says nothing to a reader."""
+        super().start(self._samples, completed)
+        self._done = self._before
+        self._origin = (self._began, self._done)
+        self._history.clear()
+        self._history.append(self._origin)
+
+    def add(self, records: np.ndarray) -> None:
+        """Count the samples of finished parts, records of `PARTIAL` (m,)."""
+        self._done += int(records["samples"].sum())
+        self._failed += int(records["status"][:, 1:].sum())

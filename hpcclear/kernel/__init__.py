@@ -1,1 +1,0 @@
-"""How time advances: tableaus, step control, impact instants and the block stepper."""

@@ -1,0 +1,1 @@
+"""Samples handed out over MPI ranks; only `boundary` imports mpi4py."""

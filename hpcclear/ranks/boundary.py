@@ -1,0 +1,211 @@
+"""Into MPI and out of it: the one module that knows mpi4py, and the boundary that no error crosses.
+
+Root runs the program, the other ranks work for it (`hpcclear.ranks.team`). However the program ends -
+done, bad input, stopped early, an error on any rank - it is said once and every rank leaves with
+the same exit code, within seconds. Without a launcher there is one process and no MPI library.
+"""
+
+import contextlib
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from hpcclear.base.errors import InputError, StorageError
+from hpcclear.ranks import launcher
+from hpcclear.ranks.mailbox import Mail, Nap, Tag
+from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
+from hpcclear.ranks.team import Leave, Maker, RankFailed, Ranks
+
+
+def run_on_ranks(
+    program: Callable[[Ranks], int | None],
+    makers: Mapping[str, Maker],
+    stop: StopSwitch | None = None,
+) -> int:
+    """Run `program` on root while the other ranks work for it: the boundary no error crosses.
+
+    Parameters
+    ----------
+    program : callable
+        Gets the `Ranks`; its return value is the exit code (None is 0).
+    makers : mapping of str to callable
+        For each kind of stage, what makes a rank's worker.
+    stop : StopSwitch, optional
+        Entered already, to hear signals from early on; by default one without a time limit.
+
+    Returns
+    -------
+    int
+        Exit code for `sys.exit`, the same on every rank: 0, or the program's own; 1 after a program
+        error, a refused write or want of memory, reported once; 2 after an `InputError`; 3 after `Stopped`.
+    """
+    launcher.pin_threads()
+    with contextlib.ExitStack() as stack:
+        stop = stack.enter_context(StopSwitch()) if stop is None else stop
+        try:
+            mail = _open_mail()
+        except InputError as error:
+            if launcher.launched_rank() in (0, None):  # every copy finds the same
+                _say(f"Error: {error}")
+            return Exit.BAD_INPUT
+        stop.last_resort = mail.abort
+        ranks = Ranks(mail, makers, stop)
+        code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
+        mail.finalize()
+        return code
+
+
+def alone(makers: Mapping[str, Maker]) -> Ranks:
+    """One process without signals, exits or MPI, for notebooks: errors are plain exceptions."""
+    return Ranks(Mail(), makers, StopSwitch())
+
+
+def describe_mpi() -> str:
+    """Name and version of the MPI library that would be used; does not start it.
+
+    Raises
+    ------
+    InputError
+        If none can be loaded.
+    """
+    lines = _load_mpi().Get_library_version().strip("\0\n ").splitlines()
+    return " ".join(lines[0].replace("Version:", "").split())
+
+
+def _load_mpi() -> Any:
+    try:
+        import mpi4py
+
+        if "mpi4py.MPI" not in sys.modules:
+            mpi4py.rc.initialize = mpi4py.rc.finalize = False  # begun and ended here, on purpose
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise InputError(
+            "MPI library",
+            "none",
+            f"mpi4py cannot load one ({' '.join(str(error).split())})",
+            "Load the site's MPI module, set MPI4PY_LIBMPI to its libmpi, or install one with "
+            "pip install 'hpcclear[mpich]'",
+        ) from error
+    return MPI
+
+
+def _open_mail() -> Mail:
+    if not launcher.is_launched() and "mpi4py.MPI" not in sys.modules:
+        return Mail()
+    mpi = _load_mpi()
+    begins = not mpi.Is_initialized()
+    if begins:
+        with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
+            warnings.filterwarnings("ignore", "suspicious MPI execution environment")
+            mpi.Init_thread()
+    variable, copies = launcher.launched_size()
+    if copies > 1 and mpi.COMM_WORLD.size == 1:
+        raise InputError(
+            variable,
+            copies,
+            f"the launcher started {copies} processes, but each of them sees only itself: it does "
+            f"not belong to the MPI library in use ({describe_mpi()})",
+            "Start with the mpiexec of that library, or set MPI4PY_LIBMPI to the launcher's; with "
+            "srun, choose the right --mpi",
+        )
+    return Mail(mpi, finalizes=begins)
+
+
+def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
+    """Run the program, say how it ended, and send the others home with the same exit code."""
+    text = ""
+    try:
+        code = program(ranks) or Exit.DONE
+    except Stopped as error:
+        code, text = Exit.STOPPED, f"Stopped early: {error}. The same command goes on from here."
+    except InputError as error:
+        code, text = Exit.BAD_INPUT, f"Error: {error}"
+    except StorageError as error:
+        code, text = Exit.FAILED, f"Error: {error}"
+    except RankFailed as error:
+        code, text = Exit.FAILED, str(error)
+    except SystemExit as error:
+        code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
+    except BaseException as error:  # noqa: BLE001 - the rank boundary
+        code, text = Exit.FAILED, _report(ranks, error)
+    if text:
+        _say(text)
+    return _dismiss(ranks, int(code))
+
+
+def _dismiss(ranks: Ranks, code: int) -> int:
+    """Tell the others to leave; after a failure those who do not listen are ended."""
+    if code != Exit.DONE:
+        ranks.stop_switch.leave_within(GRACE, code)
+    ranks.mail.tell_others(Tag.LEAVE, code)
+    waited_for, nap = set(range(1, ranks.size)), Nap()
+    patience = time.monotonic() + 1.5
+    while waited_for:
+        message = ranks.mail.poll()
+        if message is None:
+            if code != Exit.DONE and time.monotonic() > patience:
+                ranks.mail.abort(code)
+            nap.take()
+        elif message.tag == Tag.LEFT:
+            waited_for.discard(message.source)
+        elif message.tag == Tag.ERROR and code == Exit.DONE:
+            _say_and_abort(ranks, str(message.body[0]), Exit.FAILED)
+    return code
+
+
+def _as_worker(ranks: Ranks) -> int:
+    """Work for root; an error goes to root, which reports it and ends the job."""
+    try:
+        ranks.serve()
+    except Leave as leave:
+        code = leave.code
+    except BaseException as error:  # noqa: BLE001 - the rank boundary
+        code = _tell_root(ranks, error)
+    if code != Exit.DONE:
+        ranks.stop_switch.leave_within(GRACE, code)
+    ranks.mail.send(0, Tag.LEFT)
+    return code
+
+
+def _tell_root(ranks: Ranks, error: BaseException) -> int:
+    """Send a report and finished records to root; if root is deaf, report and end the job here."""
+    known = isinstance(error, InputError)
+    report = error if known else _report(ranks, error)
+    ranks.mail.send(0, Tag.ERROR, (report, ranks.outbox()))
+    patience, nap = time.monotonic() + 2.0, Nap()
+    while time.monotonic() < patience:
+        message = ranks.mail.poll()
+        if message is not None and message.tag == Tag.LEAVE:
+            return int(message.body)
+        nap.take()
+    text = f"Error: {error}" if known else str(report)
+    _say_and_abort(ranks, text, Exit.BAD_INPUT if known else Exit.FAILED)
+    return Exit.FAILED
+
+
+def _report(ranks: Ranks, error: BaseException) -> str:
+    """Where a program error happened, and its traceback; for want of memory, what to do about it."""
+    if isinstance(error, MemoryError):
+        why = f" ({error})" if str(error) else ""
+        return (
+            f"Error: out of memory on {ranks.where}{why}. Give the job more memory, or fewer ranks a "
+            "node, and run the same command again; what was finished is saved"
+        )
+    trace = "".join(traceback.format_exception(error)).rstrip()
+    return f"hpcclear failed on {ranks.where}\n{trace}"
+
+
+def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
+    """Report, and end every rank."""
+    _say(text)
+    time.sleep(0.3)  # an abort may overtake what the launcher has not passed on to the user yet
+    ranks.mail.abort(code)
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()

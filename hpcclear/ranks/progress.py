@@ -1,0 +1,187 @@
+"""How far a stage is: a bar on a terminal, a line now and then in a log, or nothing."""
+
+import os
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TextIO
+
+import numpy as np
+
+from hpcclear.ranks.launcher import is_launched
+
+Style = Literal["auto", "bar", "log", "quiet"]
+
+_LAUNCHERS = ("mpiexec", "mpirun", "prterun", "orterun")
+_BAR_INTERVAL = 0.2  # s
+_WINDOW = 30.0  # s, over which the rate is taken: costs change over a design
+
+
+class Progress:
+    """Counts finished and failed samples, and shows them on standard error.
+
+    Parameters
+    ----------
+    label : str
+        What is going on.
+    style : {"auto", "bar", "log", "quiet"}
+        ``auto`` is a bar on a terminal, also through a local mpiexec, else a log.
+    interval : float, optional
+        Seconds between two lines of a log; 5 by default, 30 in a Slurm job.
+    stream : file, optional
+        Where to write.
+    clock : callable, optional
+        Seconds; replaced by tests.
+    """
+
+    def __init__(
+        self,
+        label: str,
+        style: Style = "auto",
+        interval: float | None = None,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._label = label
+        self._style = style
+        self._interval = log_interval() if interval is None else interval
+        self._stream = stream
+        self._clock = clock
+        self._bar: Any = None
+
+    def start(self, total: int, completed: np.ndarray) -> None:
+        """Begin with `total` samples, of which the records `completed` are there already."""
+        self._total, self._done, self._failed = total, completed.size, _failures(completed)
+        self._began = self._shown = self._clock()
+        self._origin = (self._began, self._done)
+        self._history = deque([self._origin])
+        if self._style == "auto":
+            terminal = None if self._stream else launching_terminal()
+            self._stream = terminal or self._stream or sys.stderr
+            self._style = "bar" if self._stream.isatty() else "log"
+        self._stream = self._stream or sys.stderr
+        if self._style == "bar":
+            self._bar = _make_bar(self._label, total, self._stream)
+            self._bar.start()
+
+    def add(self, records: np.ndarray) -> None:
+        """Count finished records; a field ``status`` other than 0 is a failure."""
+        self._done += records.size
+        self._failed += _failures(records)
+
+    def refresh(self) -> None:
+        """Show the state, if it is time to."""
+        now = self._clock()
+        if self._style == "quiet" or now - self._shown < (
+            self._interval if self._bar is None else _BAR_INTERVAL
+        ):
+            return
+        self._shown = now
+        self._history.append((now, self._done))
+        while len(self._history) > 2 and now - self._history[1][0] >= _WINDOW:
+            self._history.popleft()
+        if self._bar is None:
+            self._write(f"{self.text()}, {self._eta()}")
+        else:
+            self._draw()
+
+    def close(self) -> None:
+        """Show the final state, with the rate over all."""
+        self._history = deque([self._origin])
+        if self._bar is not None:
+            self._draw()
+            self._bar.stop()
+            self._bar = None
+        if self._style != "quiet":
+            self._write(f"{self.text()} in {duration(self._clock() - self._began)}")
+
+    def text(self) -> str:
+        """Done, total, percentage, failures and rate."""
+        share = 100.0 * self._done / self._total if self._total else 100.0
+        failed = f", {self._failed} failed" if self._failed else ""
+        return f"{self._done}/{self._total} ({share:.0f} %){failed}, {self._rate():.3g} samples/s"
+
+    def _rate(self) -> float:
+        """Samples a second over the last `_WINDOW` seconds."""
+        (since, before), now = self._history[0], self._clock()
+        return (self._done - before) / (now - since) if now > since else 0.0
+
+    def _eta(self) -> str:
+        rate = self._rate()
+        return f"{duration((self._total - self._done) / rate)} left" if rate > 0.0 else "? left"
+
+    def _write(self, text: str) -> None:
+        assert self._stream is not None
+        self._stream.write(f"{self._label}: {text}\n" if self._label else f"{text}\n")
+        self._stream.flush()
+
+    def _draw(self) -> None:
+        self._bar.update(0, completed=self._done, state=f"{self.text()}, {self._eta()}")
+        self._bar.refresh()
+
+
+def log_interval(environment: Mapping[str, str] = os.environ) -> float:
+    """Seconds between two lines of a log: batch logs are read later and should stay short."""
+    return 30.0 if "SLURM_JOB_ID" in environment else 5.0
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people read them: ``42 s``, ``3:05 min``, ``1:02:03 h``."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours}:{minutes:02d}:{rest:02d} h"
+    return f"{minutes}:{rest:02d} min" if minutes else f"{rest} s"
+
+
+def launching_terminal() -> TextIO | None:
+    """The terminal on which a local mpiexec shows what its ranks write; None if there is none.
+
+    Ranks write to a pipe even when a person watches, so ask what mpiexec's standard error is
+    (Linux only).
+    """
+    if sys.platform != "linux" or not is_launched():
+        return None
+    pid = os.getppid()
+    try:
+        for _ in range(3):  # proxy, mpiexec
+            with open(f"/proc/{pid}/stat", encoding="utf-8") as status:
+                name, _, rest = status.read().partition("(")[2].rpartition(")")
+            if name.startswith(_LAUNCHERS):
+                return _open_terminal(os.readlink(f"/proc/{pid}/fd/2"))
+            pid = int(rest.split()[1])
+    except OSError:  # another user's process, or another namespace
+        return None
+    return None
+
+
+def _open_terminal(path: str) -> TextIO | None:
+    if not path.startswith("/dev/"):
+        return None
+    descriptor = os.open(path, os.O_WRONLY | os.O_NOCTTY)
+    if os.isatty(descriptor):
+        return os.fdopen(descriptor, "w")
+    os.close(descriptor)
+    return None
+
+
+def _failures(records: np.ndarray) -> int:
+    names = records.dtype.names or ()
+    return int(np.count_nonzero(records["status"])) if "status" in names else 0
+
+
+def _make_bar(label: str, total: int, stream: TextIO) -> Any:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[state]}"),
+        console=Console(file=stream),
+        auto_refresh=False,  # no thread: drawn between two quanta of work
+        transient=True,  # the last line is written as text
+    )
+    bar.add_task(label, total=total, state="")
+    return bar

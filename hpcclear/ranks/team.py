@@ -1,0 +1,387 @@
+"""The processes of a job at work: root hands out samples and collects records, stage after stage.
+
+The other ranks wait for root's stages and work on what it hands out. Root works too, and looks into
+its mailbox between short quanta of its own work. No rank ever blocks inside MPI: every wait is a
+poll with short sleeps, so that waiting costs nothing and errors and stops are heard everywhere.
+"""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NoReturn
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
+from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.schedule import Desk, HandOut, Points, Worker
+from hpcclear.ranks.stopping import Stopped, StopSwitch
+
+FLUSH_INTERVAL = 1.0
+"""Seconds that a finished record waits on a rank at most."""
+
+COLUMNS = ("busy", "idle", "compile", "write")
+"""What a rank's seconds are spent on: samples or serial code, waiting, set-up, output."""
+
+Maker = Callable[[Any, "Ranks"], Worker]
+"""Makes a rank's worker from the payload of a stage; called on every rank."""
+
+
+class RankFailed(Exception):
+    """Another rank met a program error; the text is its report."""
+
+
+class Leave(BaseException):
+    """Root said to leave with an exit code: unwinds a rank to its boundary."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
+
+
+class Ranks:
+    """The processes of one job. Made by `run_on_ranks`, or by `alone` for one process.
+
+    Attributes
+    ----------
+    rank, size : int
+        This process, and how many there are.
+    is_root : bool
+        Whether this process runs the program.
+    oversubscribed : bool
+        Whether this node has more ranks than cores for them.
+    stage_seconds : dict of str to ndarray
+        On root: seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`;
+        every row of a stage adds up to its wall time.
+    """
+
+    def __init__(self, mail: Mail, makers: Mapping[str, Maker], stop: StopSwitch) -> None:
+        self.mail = mail
+        self._makers = makers
+        self.stop_switch = stop
+        self._stage = "start"
+        self._desk: Desk | None = None
+        self._unsent: list[np.ndarray] = []
+        self._write = 0.0  # seconds of output not booked yet
+        self._booked = 0.0  # wall seconds booked in `stage_seconds`
+        self._passed_on = False
+        self.rank = mail.rank
+        self.size = mail.size
+        self.is_root = mail.rank == 0
+        self.oversubscribed = mail.node_size > mail.node_cores
+        self.stage_seconds: dict[str, np.ndarray] = {}
+
+    def first_on_node(self, action: Callable[[], object]) -> None:
+        """Let one rank of each node do `action` before the others: it compiles, they load.
+
+        For makers; every rank of the node must call it.
+        """
+        if self.mail.node_rank == 0:
+            action()
+        self.mail.meet_on_node()
+        if self.mail.node_rank != 0:
+            action()
+
+    @property
+    def where(self) -> str:
+        """Rank, stage and, after an error of the worker, its samples: for reports."""
+        samples = [] if self._desk is None else self._desk.suspects
+        shown = ", ".join(map(str, samples[:8])) + (", ..." if len(samples) > 8 else "")
+        place = f"rank {self.rank} of {self.size} in stage '{self._stage}'"
+        if len(samples) > 1:
+            return f"{place}, one of {len(samples)} samples in hand: {shown}"
+        return f"{place}, sample {shown}" if samples else place
+
+    def stop_requested(self) -> bool:
+        """Whether a signal on any rank or the time limit asks to end early; for root.
+
+        Raises
+        ------
+        RankFailed, InputError
+            If another rank has failed.
+        """
+        while (message := self.mail.poll()) is not None:
+            self._heed(message)
+        return self.stop_switch.is_set()
+
+    def raise_if_stopped(self) -> None:
+        """Raise `Stopped` if asked to end early; for loops of serial code on root."""
+        if self.stop_requested():
+            raise Stopped(self.stop_switch.reason)
+
+    @contextlib.contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Name what root does inside, for error reports and `stage_seconds`."""
+        with self._timed(name, serial=True):
+            yield
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Count root's time inside as output of the stage under way."""
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._write += time.perf_counter() - started
+
+    def run_points(
+        self,
+        kind: str,
+        payload: object,
+        points: Points,
+        *,
+        stage: str | None = None,
+        completed: np.ndarray | None = None,
+        on_records: Callable[[np.ndarray], object] | None = None,
+        save: Callable[[], object] | None = None,
+        progress: Progress | None = None,
+        dtype: np.dtype = OUTCOME,
+        keep: bool = True,
+    ) -> np.ndarray:
+        """Simulate a design on all ranks; call it on root, as often as needed.
+
+        Parameters
+        ----------
+        kind : str
+            Which of the makers makes the workers.
+        payload : object
+            What the maker needs, such as the scene's text; it travels to every rank.
+        points : ndarray, shape (n, d), or Points
+            The design, or an object that makes the rows asked for.
+        stage : str, optional
+            Name for reports and timing; `kind` by default.
+        completed : structured ndarray, optional
+            Records of samples finished before; they are not simulated again.
+        on_records : callable, optional
+            Gets every batch of newly finished records, on root, as they arrive.
+        save : callable, optional
+            Called after each batch, to write what has gathered; not again once anything has failed,
+            while `on_records` still gets what the ranks had finished by then.
+        progress : Progress, optional
+            Shown meanwhile.
+        dtype : dtype, optional
+            Type of the records; has a field ``sample``.
+        keep : bool, optional
+            Return the records; without, memory does not grow with them.
+
+        Returns
+        -------
+        structured ndarray
+            One record a sample in ascending order, whoever made it; empty unless `keep`.
+
+        Raises
+        ------
+        Stopped
+            If asked to end early; `on_records` got everything that was finished, `save` may be due.
+        RankFailed, InputError
+            If another rank failed; likewise.
+        """
+        earlier = np.empty(0, dtype) if completed is None else completed.astype(dtype)
+        progress = Progress("", style="quiet") if progress is None else progress
+        name = kind if stage is None else stage
+        run = _Run(self, HandOut(len(points), earlier["sample"], self.size), points, progress)
+        run.on_records, run.save, run.kept = on_records, save, [earlier] if keep else None
+        progress.start(len(points), earlier)
+        with contextlib.closing(progress), self._timed(name) as spent:
+            if not run.book.done:
+                run.work(name, kind, payload, spent)
+        records = np.concatenate(run.kept or [earlier[:0]])
+        return records[np.argsort(records["sample"])]
+
+    @contextlib.contextmanager
+    def _timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
+        """Book the wall time inside, less what is booked inside; yields the table to fill."""
+        spent = np.zeros((self.size, len(COLUMNS)))
+        (outer, self._stage), (write, self._write) = (self._stage, name), (self._write, 0.0)
+        started, booked = time.perf_counter(), self._booked
+        try:
+            yield spent
+            self._stage = outer  # not after an error: its report names the stage
+        finally:
+            wall = time.perf_counter() - started - (self._booked - booked)
+            spent[0, COLUMNS.index("write")] = self._write
+            if serial:
+                spent[0, COLUMNS.index("busy")] = wall - self._write
+            spent[:, COLUMNS.index("idle")] = np.maximum(wall - spent.sum(axis=1), 0.0)
+            self.stage_seconds[name] = self.stage_seconds.get(name, 0.0) + spent
+            self._booked += wall
+            self._write = write
+
+    def _heed(self, message: Message) -> None:
+        """Act on what a rank may say at any time."""
+        if message.tag == Tag.STOP:
+            self.stop_switch.request(message.body)
+        elif message.tag == Tag.ERROR:
+            report, _ = message.body
+            raise report if isinstance(report, InputError) else RankFailed(report)
+
+    def make(self, kind: str, payload: object) -> Worker:
+        """A worker of one of the kinds, for a maker that builds on another."""
+        return self._makers[kind](payload, self)
+
+    def _make_desk(self, kind: str, payload: object) -> tuple[Desk, float]:
+        """This rank's worker, and the seconds it took to make it."""
+        started = time.perf_counter()
+        self._desk = Desk(self.make(kind, payload))
+        return self._desk, time.perf_counter() - started
+
+    def serve(self) -> NoReturn:
+        """Work for root, stage after stage, until it says to leave."""
+        nap = Nap(0.02)
+        while True:
+            message = self.mail.poll()
+            self._pass_on_stop()
+            if message is None:
+                nap.take()
+            elif message.tag == Tag.LEAVE:
+                raise Leave(message.body)
+            elif message.tag == Tag.STAGE:
+                self._stage, kind, payload = message.body
+                self._serve_stage(kind, payload)
+                nap.reset()
+
+    def _serve_stage(self, kind: str, payload: object) -> None:
+        """Ask for samples before the last ones are done, send records along, until root ends it."""
+        desk, setup = self._make_desk(kind, payload)
+        asked, sent_at, nap = False, time.monotonic(), Nap()
+        while (message := self.mail.poll()) is None or message.tag != Tag.END:
+            self._pass_on_stop()
+            if message is not None:
+                if message.tag == Tag.LEAVE:
+                    raise Leave(message.body)
+                desk.take(*message.body)
+                asked = False
+                nap.reset()
+            overdue = desk.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
+            if desk.hungry and not asked:
+                self.mail.send(0, Tag.ASK, (self.outbox(), desk.need))
+                asked, sent_at = True, time.monotonic()
+            elif self._unsent and overdue:
+                self.mail.send(0, Tag.RECORDS, self.outbox())
+                sent_at = time.monotonic()
+            if desk.idle:
+                nap.take()
+            else:
+                self._unsent.append(desk.work())
+        self.mail.send(0, Tag.DONE, (self.outbox(), desk.busy, setup))
+        self._desk = None
+
+    def outbox(self) -> np.ndarray | None:
+        """Finished records that root has not got yet; empties the box."""
+        records = np.concatenate(self._unsent) if self._unsent else None
+        self._unsent.clear()
+        return records
+
+    def _pass_on_stop(self) -> None:
+        """Tell root of a signal that only this rank may have got."""
+        if self.stop_switch.is_set() and not self._passed_on:
+            self.mail.send(0, Tag.STOP, f"{self.stop_switch.reason} on rank {self.rank}")
+            self._passed_on = True
+
+
+class _Run:
+    """One design on its way through the ranks, seen from root."""
+
+    def __init__(self, ranks: Ranks, book: HandOut, points: Points, progress: Progress) -> None:
+        self._ranks = ranks
+        self._mail = ranks.mail
+        self._points = points
+        self._progress = progress
+        self._present = set(range(1, ranks.size))  # ranks that will still say DONE
+        self._closing = False
+        self._failed = False
+        self.book = book
+        self.on_records: Callable[[np.ndarray], object] | None = None
+        self.save: Callable[[], object] | None = None
+        self.kept: list[np.ndarray] | None = None
+
+    def work(self, name: str, kind: str, payload: object, spent: np.ndarray) -> None:
+        """Run the stage; whatever ends it, everything finished is collected and delivered."""
+        self._spent = spent
+        self._ranks.raise_if_stopped()
+        self._mail.tell_others(Tag.STAGE, (name, kind, payload))
+        try:
+            self._hand_out(kind, payload)
+        except BaseException as error:
+            self._failed = not isinstance(error, Stopped)
+            self._gather(until=time.monotonic() + 1.2)
+            raise
+        self._gather(until=None)
+        self._ranks._desk = None
+
+    def _hand_out(self, kind: str, payload: object) -> None:
+        """Answer the others and work along until every sample is finished."""
+        desk, self._spent[0, COLUMNS.index("compile")] = self._ranks._make_desk(kind, payload)
+        nap = Nap()
+        while not self.book.done:
+            while (message := self._mail.poll()) is not None:
+                self._answer(message)
+                nap.reset()
+            if self._ranks.stop_switch.is_set():
+                raise Stopped(self._ranks.stop_switch.reason)
+            if desk.hungry:
+                index, ask_below = self.book.grant(desk.need)
+                desk.take(index, self._points[index], ask_below)
+            if desk.idle:
+                nap.take()
+            else:
+                self._accept(desk.work())
+                self._spent[0, COLUMNS.index("busy")] = desk.busy
+            self._progress.refresh()
+
+    def _gather(self, until: float | None) -> None:
+        """End the stage on every rank; after an error or a stop, do not wait for ever."""
+        self._closing = True
+        self._mail.tell_others(Tag.END)
+        nap = Nap()
+        while self._present and (until is None or time.monotonic() < until):
+            message = self._mail.poll()
+            if message is None:
+                nap.take()
+            elif until is None:
+                self._answer(message)
+            else:  # one failure is on its way up already: the records count, not another report
+                with contextlib.suppress(RankFailed, InputError):
+                    self._answer(message)
+
+    def _answer(self, message: Message) -> None:
+        """Book what a rank sends, and give it what it asks for."""
+        source, tag, body = message
+        if tag == Tag.ASK:
+            records, need = body
+            self._accept(records)
+            if not self._closing:
+                index, ask_below = self.book.grant(need)
+                self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
+        elif tag == Tag.RECORDS:
+            self._accept(body)
+        elif tag == Tag.DONE:
+            records, busy, setup = body
+            self._present.discard(source)
+            self._spent[source, [COLUMNS.index("busy"), COLUMNS.index("compile")]] = busy, setup
+            self._accept(records)
+        elif tag == Tag.ERROR:
+            self._present.discard(source)
+            self._accept(body[1])
+            self._ranks._heed(message)
+        else:
+            self._ranks._heed(message)
+
+    def _accept(self, records: np.ndarray | None) -> None:
+        """Book finished records and hand them on; after a failure, do no more than keep them."""
+        if records is None or records.size == 0:
+            return
+        self.book.accept(records)
+        if self.kept is not None:
+            self.kept.append(records)
+        with self._ranks.writing():
+            if self.on_records is not None:
+                callback, self.on_records = self.on_records, None  # one that fails gets no more
+                callback(records)
+                self.on_records = callback
+            if self.save is not None and not self._failed:
+                self.save()
+        if not self._failed:
+            self._progress.add(records)

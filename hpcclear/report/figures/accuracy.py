@@ -1,0 +1,256 @@
+"""Figures of what accuracy costs (kind ``accuracy``): one for each approximation of a study."""
+
+import textwrap
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import labels, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARGIN = 100.0
+"""Errors count as resolved from this many times the reference's own error on."""
+
+_WORDS = {
+    "slider_position": "slider position",
+    "slider_velocity": "slider velocity",
+    "peak_contact_force": "contact-force peak",
+    "objective": "objective $f$",
+}
+
+
+def _foot(figure: "Figure", found: xr.Dataset, *sentences: str) -> None:
+    """Where the numbers come from, below a figure."""
+    versions = str(found.attrs.get("versions", ""))
+    lines = [*sentences, str(found.attrs.get("processor", "")), versions]
+    text = "\n".join(textwrap.fill(line, 58) for line in lines)
+    figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL)
+
+
+def _decades(axis: Any) -> None:
+    """Few decade ticks, so that labels do not meet in half a column."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(numticks=5))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _plain(axis: Any) -> None:
+    """A logarithmic time axis above a panel, with plain numbers at its ticks."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.tick_params(labelsize=style.SMALL, length=2.0, pad=1.0)
+
+
+def _small(axes: Any) -> None:
+    """Minor labels of short logarithmic axes of the same size as the others."""
+    for panel in np.ravel(axes):
+        panel.tick_params(axis="both", which="minor", labelsize=style.SMALL)
+
+
+@style.drawn
+def integration_figure(found: xr.Dataset) -> "Figure":
+    """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
+    quantities = [str(q) for q in found["quantity"].to_numpy()]
+    figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
+    for row, quantity in enumerate(quantities):
+        here = found.sel(quantity=quantity)
+        for column, work in enumerate(("seconds", "evaluations")):
+            _ladder(axes[row, column], here, work)
+        axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)}\nrelative error (–)")
+    axes[-1, 0].set_xlabel("wall time (ms)")
+    axes[-1, 1].set_xlabel("force evaluations (–)")
+    style.settle(axes)
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=2)
+    _foot(
+        figure,
+        found,
+        "Errors of the grey region, with hollow marks, are below 100 times the reference's own error.",
+        f"{found.attrs.get('designs', '')}; {found.attrs.get('repeats', '')}.",
+    )
+    return figure
+
+
+def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
+    """One line a method; what the reference cannot resolve is hollow."""
+    factor = 1e3 if work == "seconds" else 1.0
+    floor = MARGIN * float(here["reference_error"])
+    for k, method in enumerate(here["integrator"].to_numpy()):
+        x, y = here[work].to_numpy()[k] * factor, here["error"].to_numpy()[k]
+        look = k % len(style.CYCLE)
+        colour, dashes = style.CYCLE[look], style.DASHES[(look + k // len(style.CYCLE)) % 7]
+        label = labels.literal(str(method))
+        axes.loglog(x, y, ls=dashes, color=colour, lw=0.8)
+        for hollow in (False, True):
+            chosen = (y < floor) == hollow
+            axes.plot(
+                x[chosen], y[chosen], ls="none", marker=style.MARKERS[look], ms=2.8, color=colour,
+                mfc="white" if hollow else colour, mew=0.6,
+            )  # fmt: skip
+        axes.plot([], [], ls=dashes, marker=style.MARKERS[look], ms=2.8, color=colour, label=label)
+    if np.isfinite(floor):
+        axes.axhspan(axes.get_ylim()[0], floor, color="#eeeeee", zorder=0)
+    for axis in (axes.xaxis, axes.yaxis):
+        _decades(axis)
+
+
+@style.drawn
+def averaging_figure(found: xr.Dataset) -> "Figure":
+    """Error of the objective against revolutions averaged, for several transients, and the floor that is left."""
+    figure, axes = style.grid(1, 1, 100.0)
+    panel, error = axes[0, 0], found["averaging_error"]
+    for k, transient in enumerate(found["transient"].to_numpy()):
+        y = error.sel(transient=transient).to_numpy()
+        again, look = divmod(k, len(style.CYCLE))  # the second round has hollow marks
+        panel.loglog(
+            found["averaged"], y, color=style.CYCLE[look], ls=style.DASHES[look],
+            marker=style.MARKERS[look], label=str(transient),
+            **({"mfc": "white"} if again else {}),
+        )  # fmt: skip
+    floor = float(found["averaging_floor"])
+    if floor > 0.0:
+        panel.axhline(floor, color="black", lw=0.6, ls=(0, (6, 2)))
+        panel.annotate(
+            f"floor {floor:.0e}: copies disagree", (0.99, floor), xycoords=("axes fraction", "data"),
+            ha="right", va="bottom", fontsize=style.SMALL,
+        )  # fmt: skip
+    handles, names = panel.get_legend_handles_labels()
+    figure.legend(
+        handles, names, title="transient revolutions", loc="outside upper center", ncols=5
+    )
+    panel.set_xlabel("averaged revolutions (–)")
+    panel.set_ylabel("relative error of $f$ (–)")
+    turn = 1e3 * float(found["turn_seconds"])
+    above = panel.secondary_xaxis("top", functions=(lambda x: x * turn, lambda t: t / turn))
+    above.set_xlabel("core time of the averaged revolutions (ms)")
+    style.settle([panel])
+    _plain(above)
+    _foot(
+        figure,
+        found,
+        f"{found.attrs.get('copies', '')}, kicked by 1e-10, half of them ten times stricter.",
+    )
+    return figure
+
+
+@style.drawn
+def surrogate_figure(found: xr.Dataset) -> "Figure":
+    """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
+    figure, axes = style.grid(3, 1, 145.0, sharex=True)
+    size, each = found["training"].to_numpy(), float(found["sample_seconds"])
+    rows = (
+        ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"]),
+        ("RMAE (–)", found["rmae"]),
+        ("leave-one-out error\nover deviation (–)", found["leave_one_out"]),
+    )
+    for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
+        for k, surrogate in enumerate(found["surrogate"].to_numpy()):
+            y = values.sel(surrogate=surrogate).to_numpy()
+            panel.loglog(
+                size,
+                y,
+                color=style.CYCLE[k],
+                ls=style.DASHES[k],
+                marker=style.MARKERS[k],
+                label=surrogate,
+            )
+        panel.set_ylabel(words)
+    axes[0, 0].legend()
+    axes[-1, 0].set_xlabel("training samples (–)")
+    axes[-1, 0].set_xticks(size, [str(n) for n in size])
+    axes[-1, 0].minorticks_off()
+    above = axes[0, 0].secondary_xaxis("top", functions=(lambda x: x * each, lambda t: t / each))
+    above.set_xlabel("simulation time (core-seconds)")
+    style.settle(axes)
+    _small(axes)
+    _plain(above)
+    _foot(figure, found, f"{found.attrs.get('study', '')}; fresh test points.")
+    return figure
+
+
+@style.drawn
+def random_inputs_figure(found: xr.Dataset) -> "Figure":
+    """Error of mean and deviation against Monte Carlo size and time, with 95 % limits; the surrogate's bias."""
+    figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
+    for row, moment in enumerate(found["moment"].to_numpy()):
+        here = found.sel(moment=moment)
+        for k, estimate in enumerate(found["estimate"].to_numpy()):
+            one = here.sel(estimate=estimate)
+            y = one["moment_error"].to_numpy()
+            limits = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
+            for column, x in enumerate((found["draws"], one["moment_seconds"])):
+                axes[row, column].errorbar(
+                    x.to_numpy(), y, limits, color=style.CYCLE[k], ls=style.DASHES[k],
+                    marker=style.MARKERS[k], elinewidth=0.6, label=str(estimate),
+                )  # fmt: skip
+        for column in (0, 1):
+            panel = axes[row, column]
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+            panel.axhline(
+                abs(float(here["moment_bias"])), color="black", lw=0.6, ls=(0, (6, 2)),
+                label="surrogate's bias",
+            )  # fmt: skip
+        axes[row, 1].axvline(
+            float(found["quadrature_seconds"]), color=style.PALETTE["green"], lw=0.8, ls=":",
+            label="quadrature",
+        )  # fmt: skip
+        axes[row, 0].set_ylabel(f"relative error of the {moment} (–)")
+    axes[-1, 0].set_xlabel("Monte Carlo size (–)")
+    axes[-1, 1].set_xlabel("core time (s)")
+    for panel in axes.flat:
+        _decades(panel.xaxis)
+    style.settle(axes)
+    _small(axes)
+    handles, names = axes[0, 1].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=2)
+    _foot(
+        figure,
+        found,
+        "Bars: 95 % confidence; the bias is the surrogate's, by quadrature, against all simulations.",
+        f"{found.attrs.get('study', '')}.",
+    )
+    return figure
+
+
+@style.drawn
+def parallel_figure(found: xr.Dataset) -> "Figure":
+    """Speed-up and efficiency on the ranks at hand, and the core-seconds lost."""
+    figure, axes = style.grid(1, 2, 80.0)
+    number = found["ranks"].to_numpy()
+    strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
+    left, right = axes[0]
+    left.plot(number, strong[0] / strong, "o-", color=style.CYCLE[0], label="same batch")
+    left.plot(number, number * weak[0] / weak, "s--", color=style.CYCLE[1], label="batch a rank")
+    left.plot(number, number, color=style.PALETTE["grey"], lw=0.6, label="ideal")
+    left.set_xticks(number, [str(n) for n in number])
+    left.set_xlabel("ranks (–)")
+    left.set_ylabel("speed-up (–)")
+    left.legend()
+    lost = found["lost_seconds"].to_numpy()
+    right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.PALETTE["sky"])
+    right.set_yticks(np.arange(len(lost)), [str(x) for x in found["loss"].to_numpy()])
+    right.set_xlabel("lost (core-seconds)")
+    right.set_ylabel("time lost to (what)")
+    style.settle(axes)
+    _foot(figure, found, f"{found.attrs.get('batch', '')}.")
+    return figure
+
+
+FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
+    "integration": integration_figure,
+    "averaging": averaging_figure,
+    "surrogate": surrogate_figure,
+    "random_inputs": random_inputs_figure,
+    "parallel": parallel_figure,
+}
+"""The figures of a dataset, by the name of their file."""

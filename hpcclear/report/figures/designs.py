@@ -1,0 +1,216 @@
+"""Figures of the optimised designs: fronts, and responses side by side."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, motion, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_QUANTITIES = (
+    ("contact_force", "crank_rod", "contact force 1\n(O12)"),
+    ("contact_force", "rod_slider", "contact force 2\n(O23)"),
+    ("crank_moment", "", "crank moment\n"),
+    ("slider_acceleration", "", "slider acceleration\n"),
+)
+
+_MARKS = (
+    ("paper", "the paper's, directly", "D"),
+    ("original", "the original, directly", "s"),
+    ("", "ours, directly simulated", "o"),
+)
+"""Words in a design's name, what such a design is called, and its mark."""
+
+
+@style.drawn
+def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
+    """Pareto fronts of all cases, and the designs that were simulated directly (the paper's Fig. 9).
+
+    Left the fronts alone, right with the original and the paper's designs, which lie far off.
+
+    Parameters
+    ----------
+    front : xarray.Dataset
+        Kind ``front``.
+    verification : xarray.Dataset, optional
+        Kind ``verification``: its designs are drawn with confidence limits, joined to what the surrogate said.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    cases = [str(case) for case in front["case"].to_numpy()]
+    columns = 1 if verification is None else 2
+    figure, axes = style.grid(len(cases), columns, 24.0 + 54.0 * len(cases), sharex="col")
+    x, y = labels.of(front["mean"]), labels.of(front["deviation"])
+    for line, case in zip(axes, cases, strict=True):
+        for column, panel in enumerate(line):
+            _runs(panel, front.sel(case=case), x, y)
+            if verification is not None:
+                _verified(panel, verification, case, x, y, all_designs=column == 1)
+        line[0].set_title(f"case: {labels.literal(case)}")
+        line[0].set_ylabel(y.label(r"deviation $\sigma_f$"))
+        line[-1].set_ylabel(y.label(r"deviation $\sigma_f$"))
+    for panel in axes[-1]:
+        panel.set_xlabel(x.label(r"mean $\mu_f$"))
+    handles, words = axes[0, -1].get_legend_handles_labels()
+    once = dict(zip(words, handles, strict=True))
+    figure.legend(list(once.values()), list(once), loc="outside lower center", ncols=2)
+    style.settle(axes, 5 if columns == 1 else 3)
+    return figure
+
+
+def _runs(panel: Any, one: xr.Dataset, x: labels.Scale, y: labels.Scale) -> None:
+    """The solutions of every run of a case."""
+    for k, run in enumerate(one["run"].to_numpy()):
+        row = one.sel(run=run)
+        points = (row["mean"].to_numpy() * x.factor, row["deviation"].to_numpy() * y.factor)
+        options: dict[str, Any] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
+        panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
+
+
+def _verified(
+    panel: Any,
+    verification: xr.Dataset,
+    case: str,
+    x: labels.Scale,
+    y: labels.Scale,
+    *,
+    all_designs: bool,
+) -> None:
+    """True mean and deviation of the designs of a case, ours or all, each joined to the surrogate's."""
+    names = [str(name) for name in verification["design"].to_numpy()]
+    cases = (
+        [str(c) for c in verification["case"].to_numpy()]
+        if "case" in verification
+        else [case] * len(names)
+    )
+    for k, name in enumerate(names):
+        if cases[k] != case:
+            continue
+        one = verification.isel(design=k)
+        label, marker = next(row[1:] for row in _MARKS if row[0] in name)
+        if marker != "o" and not all_designs:
+            continue
+        at = float(one["mean_true"]) * x.factor, float(one["deviation_true"]) * y.factor
+        options: dict[str, Any] = {
+            "fmt": marker,
+            "ms": 3.4,
+            "mfc": "white",
+            "mew": 0.7,
+            "zorder": 4,
+        }
+        bars = _limits(one, "mean", x), _limits(one, "deviation", y)
+        panel.errorbar(
+            *at,
+            xerr=bars[0],
+            yerr=bars[1],
+            color="black",
+            ecolor=style.PALETTE["grey"],
+            elinewidth=0.5,
+            label=label,
+            **options,
+        )
+        if "mean_surrogate" in one and "deviation_surrogate" in one:
+            guess = (
+                float(one["mean_surrogate"]) * x.factor,
+                float(one["deviation_surrogate"]) * y.factor,
+            )
+            panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
+        greek = {f"{case} alpha": "α", f"{case} beta": "β"}.get(name)
+        if greek is not None and not all_designs:
+            options = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": style.SMALL}
+            panel.annotate(greek, at, **options)
+
+
+def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
+    """Distances to the confidence limits as `errorbar` wants them, (2, 1); None if there are none."""
+    if f"{name}_lower" not in one or f"{name}_upper" not in one:
+        return None
+    sides = [float(one[f"{name}_{side}"]) for side in ("lower", "upper")]
+    return np.abs(np.array(sides)[:, None] - float(one[f"{name}_true"])) * unit.factor
+
+
+@style.drawn
+def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2) -> "Figure":
+    """Responses of optimised designs beside the original's, α left and β right (the paper's Fig. 10).
+
+    Parameters
+    ----------
+    responses : mapping of str to xarray.Dataset
+        Kind ``response``, by the name of the design: names with ``alpha`` go left, with ``beta`` right, others are
+        drawn in both as what to compare with.
+    revolutions : int
+        The last ones are drawn.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    InputError
+        No response at all, or one with fewer revolutions.
+    """
+    if not responses:
+        raise InputError(
+            "responses", {}, "there is nothing to draw", "Give the response of each design"
+        )
+    columns = _columns(list(responses))
+    height = 24.0 + 33.0 * len(_QUANTITIES)
+    figure, axes = style.grid(len(_QUANTITIES), len(columns), height, sharex=True, sharey="row")
+    shown = {name: motion.latest(response, revolutions) for name, response in responses.items()}
+    order = sorted(responses, key=lambda name: ("alpha" in name or "beta" in name, name))
+    kinds = list(dict.fromkeys(_kind(name) for name in order))
+    for line, (name, joint, words) in zip(axes, _QUANTITIES, strict=True):
+        series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
+        unit = labels.scale(
+            str(next(iter(series.values())).attrs["units"]),
+            [float(abs(s).max()) for s in series.values()],
+        )
+        for panel, members in zip(line, columns.values(), strict=True):
+            for design in (d for d in order if d in members):
+                k = kinds.index(_kind(design))
+                turn = motion.turns(shown[design])
+                options: dict[str, Any] = {
+                    "color": style.CYCLE[(k - 1) % 7],
+                    "lw": 0.7,
+                    "label": _kind(design),
+                }
+                panel.plot(turn - turn[0], series[design].to_numpy() * unit.factor, **options)
+        line[0].set_ylabel(unit.label(words))
+    for panel, title in zip(axes[0], columns, strict=True):
+        panel.set_title(title)
+    for panel in axes[-1]:
+        panel.set_xlabel("crank angle (rev.)")
+    entries: dict[str, Any] = {}
+    for panel in axes[0]:
+        entries |= {w: h for h, w in zip(*panel.get_legend_handles_labels(), strict=True)}
+    texts = [labels.literal(text) for text in entries]
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "columnspacing": 1.0}
+    figure.legend(list(entries.values()), texts, **where)
+    style.settle(axes, 4)
+    figure.align_ylabels(axes[:, 0])
+    return figure
+
+
+def _columns(names: Sequence[str]) -> dict[str, list[str]]:
+    """Which designs each column of the comparison shows, by its title."""
+    base = [name for name in names if "alpha" not in name and "beta" not in name]
+    found = {}
+    for word, title in (("alpha", "solution α"), ("beta", "solution β")):
+        members = [name for name in names if word in name]
+        if members:
+            found[title] = base + members
+    return found or {"": base}
+
+
+def _kind(name: str) -> str:
+    """A design's name without α or β: what has the same colour in both columns."""
+    bare = name.replace("alpha", "").replace("beta", "").strip(" _-.,")
+    return bare or name

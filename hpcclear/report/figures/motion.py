@@ -1,0 +1,134 @@
+"""What the figures of a response need beyond its variables: turns, steady part, clearances, f of each turn."""
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hpcclear.base.errors import InputError
+
+Array = NDArray[np.float64]
+
+TURN = 2.0 * np.pi
+
+
+def turns(response: xr.Dataset) -> Array:
+    """Crank angle in revolutions, shape (time,)."""
+    return response["crank_angle"].to_numpy() / TURN
+
+
+def whole_turns(response: xr.Dataset) -> int:
+    """How many whole revolutions, from one passage of crank angle 0 to the last, a response holds."""
+    first, last = _passages(response)
+    return last - first
+
+
+def _passages(response: xr.Dataset) -> tuple[int, int]:
+    """Number of the first and of the last revolution's border; an instant that is missing there is forgiven."""
+    angle = turns(response)
+    slack = min(1.5 * float(np.max(np.diff(angle[:2]), initial=1e-6)), 0.02)
+    return int(np.ceil(angle[0] - slack)), int(np.floor(angle[-1] + slack))
+
+
+def latest(response: xr.Dataset, revolutions: int) -> xr.Dataset:
+    """The last whole revolutions; all there is of a response that ended in the first."""
+    whole = whole_turns(response)
+    return steady(response, min(revolutions, whole)) if whole > 0 else response
+
+
+def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
+    """The last whole revolutions of a response.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+    revolutions : int, optional
+        How many; half of the whole revolutions by default, what stands before counts as the transient.
+
+    Returns
+    -------
+    xarray.Dataset
+        Both ends included.
+
+    Raises
+    ------
+    InputError
+        The response holds fewer revolutions.
+    """
+    angle = turns(response)
+    last = _passages(response)[1]
+    whole = whole_turns(response)
+    count = max(1, (whole + 1) // 2) if revolutions is None else revolutions
+    if count < 1 or count > whole:
+        reason = f"the response has {whole} whole revolutions"
+        raise InputError("revolutions", count, reason, "Simulate more revolutions, or draw fewer")
+    inside = (angle >= last - count - 1e-6) & (angle <= last + 1e-6)
+    return response.isel(time=np.flatnonzero(inside))
+
+
+def clearances(response: xr.Dataset) -> Array:
+    """Radial clearance of each joint, m, shape (2,); NaN where there is none, or where it was never reached.
+
+    Penetration is |e| - c, so contact tells the clearance.
+    """
+    reach = eccentricity(response)
+    depth = response["penetration"].to_numpy()
+    found = np.full(depth.shape[1], np.nan)
+    for joint in range(depth.shape[1]):
+        contact = depth[:, joint] > 0.0
+        if contact.any():
+            found[joint] = np.median(reach[contact, joint] - depth[contact, joint])
+    return found
+
+
+def eccentricity(response: xr.Dataset) -> Array:
+    """Distance of journal centre and bearing centre, m, shape (time, 2)."""
+    return np.hypot(response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy())
+
+
+def objective_by_turn(response: xr.Dataset) -> Array:
+    """Objective f of every whole revolution, m, shape (revolutions,): time means over the instants of the file."""
+    time, angle = response["time"].to_numpy(), turns(response)
+    first, last = _passages(response)
+    borders = np.arange(first, last + 1)
+    gap = np.abs(eccentricity(response) - clearances(response))
+    squares = np.zeros(max(len(borders) - 1, 0))
+    at = np.interp(borders, angle, time)
+    for joint in range(gap.shape[1]):
+        if np.isnan(gap[:, joint]).any():
+            continue  # no clearance in this joint
+        steps = np.diff(time) * 0.5 * (gap[1:, joint] + gap[:-1, joint])
+        total = np.interp(at, time, np.concatenate([[0.0], np.cumsum(steps)]))
+        squares += (np.diff(total) / np.diff(at)) ** 2
+    return np.sqrt(squares)
+
+
+def section(response: xr.Dataset, name: str, phase: float = 0.0) -> Array:
+    """A variable once a revolution, at the crank angle `phase` (rad): shape (revolutions,) or (revolutions, 2)."""
+    angle = response["crank_angle"].to_numpy()
+    first = np.ceil((angle[0] - phase) / TURN - 1e-6)
+    last = np.floor((angle[-1] - phase) / TURN + 1e-6)
+    at = phase + TURN * np.arange(first, last + 1)
+    values = response[name].to_numpy()
+    columns = values.reshape(len(angle), -1).T
+    return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
+        len(at), *values.shape[1:]
+    )
+
+
+def spectrum(response: xr.Dataset, values: Array) -> tuple[Array, Array]:
+    """Amplitudes over the crank order (multiples of the crank's mean frequency), Hann window.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Whole revolutions.
+    values : array, shape (time,)
+        In any unit; the amplitudes have the same.
+    """
+    time, angle = response["time"].to_numpy(), turns(response)
+    even = np.linspace(time[0], time[-1], len(time))[:-1]
+    signal = np.interp(even, time, values)
+    window = np.hanning(len(even) + 1)[:-1]
+    amplitude = 2.0 * np.abs(np.fft.rfft((signal - signal.mean()) * window)) / window.sum()
+    return np.arange(len(amplitude)) / (angle[-1] - angle[0]), amplitude

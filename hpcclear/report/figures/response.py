@@ -1,0 +1,235 @@
+"""Figures of responses (kind ``response``) over the crank angle, frequency and clearance, and of their energies."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, motion, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_JOINT_STYLES = (("crank_rod", "#0072b2", "-"), ("rod_slider", "#d55e00", "-"))
+
+
+def _joints(axes: "Axes", response: xr.Dataset, name: str, unit: labels.Scale) -> None:
+    """One curve for each joint against the revolution of the crank."""
+    for row, (joint, colour, dashes) in enumerate(_JOINT_STYLES):
+        values = response[name].sel(joint=joint).to_numpy() * unit.factor
+        label = style.JOINT_NAMES[joint]
+        axes.plot(
+            motion.turns(response), values, dashes, color=colour, lw=0.8 - 0.2 * row, label=label
+        )
+
+
+@style.drawn
+def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+    """Slider motion, contact forces and crank moment over the last revolutions.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+    revolutions : int
+        How many; fewer if the response has fewer.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    shown = motion.latest(response, revolutions)
+    names = (
+        "slider_position",
+        "slider_velocity",
+        "slider_acceleration",
+        "contact_force",
+        "crank_moment",
+    )
+    words = (
+        "slider\nposition",
+        "slider\nvelocity",
+        "slider\nacceleration",
+        "contact\nforce",
+        "crank\nmoment",
+    )
+    figure, axes = style.grid(len(names), 1, 140.0, sharex=True)
+    for panel, name, word in zip(axes[:, 0], names, words, strict=True):
+        unit = labels.of(shown[name])
+        if "joint" in shown[name].dims:
+            _joints(panel, shown, name, unit)
+            panel.set_ylim(top=1.35 * panel.get_ylim()[1])
+            panel.legend(loc="upper right", ncols=2, borderaxespad=0.1)
+        else:
+            panel.plot(
+                motion.turns(shown),
+                shown[name].to_numpy() * unit.factor,
+                color=style.PALETTE["blue"],
+            )
+        panel.set_ylabel(unit.label(word))
+    axes[-1, 0].set_xlabel("crank angle (revolutions)")
+    style.settle(axes, 4)
+    figure.align_ylabels()
+    return figure
+
+
+@style.drawn
+def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+    """Penetration of both joints over the last revolutions; parameters as for `response_figure`."""
+    shown = motion.latest(response, revolutions)
+    figure, axes = style.grid(2, 1, 80.0, sharex=True, sharey=True)
+    unit = labels.of(shown["penetration"])
+    for panel, (joint, colour, _) in zip(axes[:, 0], _JOINT_STYLES, strict=True):
+        depth = shown["penetration"].sel(joint=joint).to_numpy() * unit.factor
+        panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
+        panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
+        share = float((depth > 0.0).mean())
+        panel.set_title(f"{style.JOINT_NAMES[joint]}: in contact {share:.0%} of the time")
+        panel.set_ylabel(unit.label("penetration"))
+        panel.set_ylim(bottom=0.0)
+    axes[-1, 0].set_xlabel("crank angle (revolutions)")
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def spectrum_figure(
+    response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
+) -> "Figure":
+    """Amplitude spectra of slider acceleration and contact forces over the order of the crank frequency.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+    revolutions : int, optional
+        The last ones are used; half of all by default.
+    orders : float
+        Right end of the axis, multiples of the crank frequency.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    shown = motion.steady(response, revolutions)
+    figure, axes = style.grid(2, 1, 90.0, sharex=True)
+    unit = labels.of(shown["slider_acceleration"])
+    acceleration = shown["slider_acceleration"].to_numpy() * unit.factor
+    order, amplitude = motion.spectrum(shown, acceleration)
+    inside = (order > 0.0) & (order <= orders)
+    axes[0, 0].semilogy(order[inside], amplitude[inside], color=style.PALETTE["blue"], lw=0.7)
+    axes[0, 0].set_ylabel(unit.label("slider acceleration"))
+    unit = labels.of(shown["contact_force"])
+    for row, (joint, colour, _) in enumerate(_JOINT_STYLES):
+        force = shown["contact_force"].sel(joint=joint).to_numpy() * unit.factor
+        _, amplitude = motion.spectrum(shown, force)
+        label = style.JOINT_NAMES[joint]
+        axes[1, 0].semilogy(
+            order[inside], amplitude[inside], color=colour, lw=0.8 - 0.2 * row, label=label
+        )
+    axes[1, 0].legend(loc="upper right", ncols=2)
+    axes[1, 0].set_ylabel(unit.label("contact force"))
+    axes[1, 0].set_xlabel("order (multiples of the crank frequency)")
+    axes[0, 0].set_title("amplitudes")
+    for panel in axes[:, 0]:
+        highest = max(float(np.max(line.get_ydata())) for line in panel.lines)
+        panel.set_ylim(1e-6 * highest, 3.0 * highest)  # what is below is the window's own
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def energy_figure(response: xr.Dataset) -> "Figure":
+    """Energy ledger: what the drive puts in, what is stored, what is lost, and what is left unexplained.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    figure, axes = style.grid(3, 1, 120.0, sharex=True, height_ratios=[1.2, 1.2, 0.8])
+    turn = motion.turns(response)
+    ledgers = (
+        ("driving_work", "load_work", "dissipated_energy"),
+        ("kinetic_energy", "elastic_energy", "potential_energy"),
+    )
+    titles = ("since the start", "stored")
+    for panel, names, title in zip(axes[:2, 0], ledgers, titles, strict=True):
+        present = [n for n in names if n in response and bool((response[n] != 0.0).any())]
+        unit = labels.scale("J", [float(abs(response[n]).max()) for n in present])
+        for row, name in enumerate(present):
+            values = response[name].to_numpy() * unit.factor
+            label = name.replace("_", " ").removesuffix(" energy")
+            panel.plot(turn, values, style.DASHES[row], color=style.CYCLE[row], lw=0.8, label=label)
+        panel.set_ylabel(unit.label("energy"))
+        panel.set_title(title)
+        panel.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(present), borderaxespad=0.0
+        )
+    residual = abs(response["energy_residual"].to_numpy())
+    unit = labels.scale("J", residual)
+    axes[2, 0].plot(turn, residual * unit.factor, color=style.PALETTE["black"], lw=0.7)
+    if (residual > 0.0).any():
+        axes[2, 0].set_yscale("log")
+        axes[2, 0].set_ylim(bottom=1e-5 * unit.factor * residual.max())
+    axes[2, 0].set_ylabel(unit.label("|residual|"))
+    axes[2, 0].set_xlabel("crank angle (revolutions)")
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None = None) -> "Figure":
+    """Objective of every revolution, and slider velocity once a revolution, against clearance.
+
+    A motion that repeats every revolution is one dot over its clearance, one that repeats every n is n dots.
+
+    Parameters
+    ----------
+    responses : sequence of xarray.Dataset
+        Kind ``response``, each of another clearance and with many revolutions.
+    revolutions : int, optional
+        The last ones of each are drawn; half of all by default.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    InputError
+        No response at all, or one with fewer revolutions.
+    """
+    if not responses:
+        raise InputError(
+            "responses", [], "there is nothing to draw", "Give one response for each clearance"
+        )
+    figure, axes = style.grid(2, 1, 110.0, sharex=True)
+    steady = [motion.steady(response, revolutions) for response in responses]
+    clearances = np.array([np.nanmax(motion.clearances(response)) for response in steady])
+    rows = (
+        ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
+        (
+            "slider velocity at crank angle 0",
+            "m/s",
+            [motion.section(r, "slider_velocity") for r in steady],
+        ),
+    )
+    across = labels.scale("m", clearances)
+    for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
+        unit = labels.scale(units, np.concatenate(values))
+        x = np.repeat(clearances, [len(v) for v in values]) * across.factor
+        size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
+        y = np.concatenate(values) * unit.factor
+        panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"])
+        panel.set_ylabel(unit.label(words))
+    axes[1, 0].set_xlabel(across.label("clearance $C$"))
+    style.settle(axes)
+    return figure

@@ -1,0 +1,183 @@
+"""Figures of a design that went through the dynamics (kind ``samples``)."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_MEANINGS = {
+    "m1": "crank mass $m_1$",
+    "u1": "crank centre $u_1$",
+    "I1": "crank inertia $I_1$",
+    "m2": "rod mass $m_2$",
+    "u2": "rod centre $u_2$",
+    "I2": "rod inertia $I_2$",
+    "m3": "slider mass $m_3$",
+    "C": "clearance $C$",
+}
+
+
+@style.drawn
+def samples_figure(samples: xr.Dataset) -> "Figure":
+    """Objective against every design variable, coloured by clearance; its spread, histogram and failures.
+
+    Parameters
+    ----------
+    samples : xarray.Dataset
+        Kind ``samples``.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    InputError
+        There is no design variable to draw against.
+    """
+    variables = labels.design_variables(samples)
+    if not variables:
+        reason = "there is no design variable to draw the objective against"
+        raise InputError(
+            "samples",
+            list(map(str, samples.data_vars)),
+            reason,
+            "Vary at least one entry of the scene",
+        )
+    main = labels.clearance(samples)
+    main = variables[0] if main is None else main
+    others = [v for v in variables if v.name != main.name]
+    rows = (len(others) + 1) // 2
+    figure = style.page(70.0 + (34.0 * rows + 12.0 if others else 0.0))
+    figure.suptitle(_title(samples), x=0.02, ha="left")
+    cells = figure.add_gridspec(
+        1 + rows + bool(others), 1, height_ratios=[2.2] + [1.0] * rows + [0.07] * bool(others)
+    )
+    unit = labels.of(samples["objective"])
+    first = _first_rows(
+        figure, cells[0].subgridspec(2, 2, width_ratios=[3, 1], height_ratios=[2, 1]), samples, main
+    )
+    for i, variable in enumerate(others):
+        if i % 2 == 0:
+            row = cells[1 + i // 2].subgridspec(1, 2)
+        panel = figure.add_subplot(row[i % 2], sharey=first)
+        drawn = _cloud(panel, variable, samples["objective"], _values(main))
+        panel.tick_params(labelleft=i % 2 == 0)
+        panel.set_xlabel(labels.of(variable).label(symbol(variable)))
+        panel.set_ylabel(unit.label("$f$") if i % 2 == 0 else "")
+        style.settle([panel])
+    if others:
+        bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
+        bar.set_label("colour of the points: " + labels.of(main).label(symbol(main)))
+        style.settle([bar.ax])
+    return figure
+
+
+def symbol(variable: xr.DataArray) -> str:
+    """What a design variable is called on an axis, short enough for half a column."""
+    name = str(variable.attrs["scene_path"])
+    short = name if len(name) < 24 else "…" + name[-23:]
+    return _MEANINGS.get(name, labels.literal(short))
+
+
+def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.DataArray) -> "Axes":
+    """Objective against clearance and its histogram, the spread below, and what the marks mean; the first axes."""
+    first = figure.add_subplot(cells[0, 0])
+    _cloud(first, main, samples["objective"], _values(main))
+    first.set_ylabel(labels.of(samples["objective"]).label("objective $f$"))
+    first.tick_params(labelbottom=False)
+    side = figure.add_subplot(cells[0, 1], sharey=first)
+    f = _values(samples["objective"])
+    side.hist(
+        f[np.isfinite(f)],
+        bins=24,
+        orientation="horizontal",
+        color=style.PALETTE["blue"],
+        alpha=0.75,
+    )
+    side.set_xlabel("samples (–)")
+    side.tick_params(labelleft=False)
+    below = figure.add_subplot(cells[1, 0], sharex=first)
+    _cloud(below, main, samples["objective_spread"], _values(main))
+    below.set_xlabel(labels.of(main).label(symbol(main)))
+    below.set_ylabel(labels.of(samples["objective_spread"]).label("spread of $f$"))
+    spread = samples["objective_spread"].where(samples["objective_spread"] > 0)
+    if float(spread.max()) > 30.0 * float(spread.min()):
+        below.set_yscale("log")
+    style.settle([first, below])
+    style.settle([side], 3)
+    corner = figure.add_subplot(cells[1, 1])
+    corner.set_axis_off()
+    corner.legend(handles=_marks(samples), loc="lower center", handletextpad=0.4, borderpad=0.0)
+    return first
+
+
+def _values(variable: xr.DataArray) -> Array:
+    return variable.to_numpy() * labels.of(variable).factor
+
+
+def _cloud(axes: "Axes", variable: xr.DataArray, result: xr.DataArray, colour: Array) -> Any:
+    """Points, their median in bins, and crosses at the foot where the simulation failed."""
+    x, y = _values(variable), _values(result)
+    good = np.isfinite(y)
+    size = float(np.clip(2000.0 / max(len(x), 1), 0.5, 6.0))
+    options: dict[str, Any] = {
+        "s": size,
+        "cmap": style.COLOURS,
+        "linewidths": 0,
+        "zorder": 2,
+        "rasterized": len(x) > 2000,
+    }
+    drawn = axes.scatter(x[good], y[good], c=colour[good], **options)
+    if np.isfinite(colour).any():
+        drawn.set_clim(np.nanmin(colour), np.nanmax(colour))
+    centre, middle = binned(x[good], y[good])
+    axes.plot(centre, middle, color="white", lw=2.4, zorder=3)
+    axes.plot(centre, middle, color=style.PALETTE["vermilion"], lw=1.2, zorder=4)
+    foot = np.full(int((~good).sum()), 0.04)
+    axes.plot(x[~good], foot, "kx", ms=4, transform=axes.get_xaxis_transform(), zorder=5)
+    return drawn
+
+
+def binned(x: Array, y: Array, bins: int = 12) -> tuple[Array, Array]:
+    """Middles of bins of equal width and the median of y in them, from x and y of shape (n,).
+
+    Bins of fewer than five points are left out.
+    """
+    if len(x) < 10 or not np.ptp(x) > 0.0:
+        return np.zeros(0), np.zeros(0)
+    edges = np.linspace(x.min(), x.max(), min(bins, len(x) // 5) + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
+    full = [k for k in range(len(edges) - 1) if (place == k).sum() >= 5]
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return middle[full], np.array([np.median(y[place == k]) for k in full])
+
+
+def _title(samples: xr.Dataset) -> str:
+    count = samples.sizes["sample"]
+    failed = int((samples["status"] != 0).sum())
+    latched = int((samples["latched"] != 0).any("joint").sum()) if "latched" in samples else 0
+    return f"{count} simulations: {failed} failed, {latched} with a joint latched"
+
+
+def _marks(samples: xr.Dataset) -> list[Any]:
+    """Legend entries of what `_cloud` draws."""
+    from matplotlib.lines import Line2D
+
+    marks = [
+        Line2D([], [], color=style.PALETTE["green"], marker="o", ms=2.5, ls="none", label="sample"),
+        Line2D([], [], color=style.PALETTE["vermilion"], lw=1.2, label="median"),
+    ]
+    if bool((samples["status"] != 0).any()):
+        marks.append(Line2D([], [], color="black", marker="x", ms=4, ls="none", label="failed"))
+    return marks

@@ -1,0 +1,183 @@
+"""The look of every figure: one column of a journal wide, colours that survive colour blindness and grey print.
+
+Matplotlib is an extra and is imported when a figure is drawn, never with the package; figures are made without
+pyplot, so nothing is registered globally and nothing needs closing.
+"""
+
+import functools
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.results import files as storage
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 85.0
+"""Width of a figure, mm: one column, so that 7 pt in the file are 7 pt on the page."""
+
+SMALL, NORMAL = 7.0, 7.5  # pt; ticks and legends, axis labels and titles
+
+PALETTE = {
+    "blue": "#0072b2",
+    "vermilion": "#d55e00",
+    "green": "#009e73",
+    "purple": "#cc79a7",
+    "sky": "#56b4e9",
+    "orange": "#e69f00",
+    "black": "#000000",
+    "grey": "#767676",
+}
+"""Okabe and Ito's colours (without yellow, which is lost on white), told apart by every eye."""
+
+CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
+"""Line styles in the order of `CYCLE`: a curve is never told by its colour alone."""
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+COLOURS = "viridis"  # perceptually even, the same order in grey
+JOINT_NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
+
+RC: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib: equal figures everywhere
+    "font.size": SMALL,
+    "axes.labelsize": NORMAL,
+    "axes.titlesize": NORMAL,
+    "axes.titlelocation": "left",
+    "figure.titlesize": NORMAL,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "legend.title_fontsize": SMALL,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.linewidth": 0.4,
+    "grid.color": "#dddddd",
+    "lines.linewidth": 0.9,
+    "lines.markersize": 3.0,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.hashsalt": "hpcclear",  # equal figures, equal bytes
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+    "mathtext.fontset": "dejavusans",
+}
+
+_P = ParamSpec("_P")
+
+
+def matplotlib() -> Any:
+    """The matplotlib module.
+
+    Raises
+    ------
+    InputError
+        It is not installed; the message names the extra that brings it.
+    """
+    try:
+        import matplotlib as module
+    except ModuleNotFoundError:
+        reason = "figures are drawn with matplotlib, which is not installed"
+        remedy = "Install it with: pip install 'hpcclear[analysis]'"
+        raise InputError("matplotlib", None, reason, remedy) from None
+    return module
+
+
+def drawn(function: "Callable[_P, Figure]") -> "Callable[_P, Figure]":
+    """Draw a figure in this style, whatever the user's settings, and leave those alone."""
+
+    @functools.wraps(function)
+    def styled(*args: _P.args, **kwargs: _P.kwargs) -> "Figure":
+        with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
+            return function(*args, **kwargs)
+
+    return styled
+
+
+def page(height: float) -> "Figure":
+    """An empty figure of one column's width and `height` in mm."""
+    matplotlib()
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    pads = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.02, hspace=0.02)
+    figure = Figure(figsize=(WIDTH / 25.4, height / 25.4), dpi=300, layout=pads)
+    return figure
+
+
+def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
+    """A page of equal panels; axes of shape (rows, columns), options as for `Figure.subplots`."""
+    figure = page(height)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def settle(axes: "Sequence[Axes] | np.ndarray", ticks: int = 5) -> None:
+    """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them."""
+    for axis in np.ravel(np.asarray(axes, dtype=object)):
+        axis.tick_params(labelsize=SMALL, length=2.0, pad=2.0)
+        for scale in ("x", "y"):
+            lines = getattr(axis, f"{scale}axis")
+            lines.get_offset_text().set_fontsize(SMALL)
+            if type(lines.get_major_locator()).__name__ == "AutoLocator":
+                axis.locator_params(axis=scale, nbins=ticks)
+
+
+def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
+    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes."""
+    stamp: dict[str, Any] = {
+        "png": {"Software": None},
+        "svg": {"Date": None, "Creator": None},
+        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    }[kind]
+    buffer = io.BytesIO()
+    with matplotlib().rc_context(RC):
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=stamp)
+    return buffer.getvalue()
+
+
+def save(figure: "Figure", path: str | Path) -> Path:
+    """Write a figure whole, in the format its suffix names.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    path : path
+        Ends in ``.png``, ``.svg`` or ``.pdf``.
+
+    Returns
+    -------
+    Path
+        Where it stands.
+
+    Raises
+    ------
+    InputError
+        The suffix is none of these, or the place cannot be written to.
+    StorageError
+        The disk is full or fails.
+    """
+    place = Path(path)
+    kind = place.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise InputError(
+            "figure",
+            str(place),
+            "figures are png, svg or pdf",
+            "End the name in .png, .svg or .pdf",
+        )
+    storage.write_bytes(place, render(figure, kind))
+    return place

@@ -1,0 +1,305 @@
+"""Figures of sensitivities and surrogates (kinds ``sensitivity`` and ``kriging``)."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, models, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@style.drawn
+def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
+    """Sensitivities against clearance, a panel for each response surface (the paper's Fig. 5, curves).
+
+    Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
+    changing and is determined, with its uncertainty.
+
+    Parameters
+    ----------
+    sensitivity : xarray.Dataset
+        Kind ``sensitivity``.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
+    rows = (len(surfaces) + 1) // 2
+    figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True, sharey=True)
+    unit = labels.of(sensitivity["sensitivity"])
+    across = labels.of(sensitivity["clearance"])
+    for panel, surface in zip(axes.flat, surfaces, strict=False):
+        _sensitivity_panel(panel, sensitivity.sel(surface=surface), across, unit)
+        panel.set_title(f"surface in {_surface(surface)}")
+    for panel in axes[:, 0]:
+        panel.set_ylabel(unit.label("slope × range"))
+    _finish_grid(axes, len(surfaces), across.label("clearance $C$"))
+    style.settle(figure.axes, 4)
+    return figure
+
+
+def _sensitivity_panel(
+    axes: "Axes", surface: xr.Dataset, across: labels.Scale, unit: labels.Scale
+) -> None:
+    widest = surface.isel(interval=int(np.argmax(surface["interval"].to_numpy())))
+    clearance = surface["clearance"].to_numpy() * across.factor
+    row = 0
+    for parameter in surface["parameter"].to_numpy():
+        one = widest.sel(parameter=parameter)
+        slope = one["sensitivity"].to_numpy() * unit.factor
+        if not np.isfinite(slope).any():
+            continue  # no input of this surface
+        error = 2.0 * one["standard_error"].to_numpy() * unit.factor
+        colour, dashes = style.CYCLE[row % 7], style.DASHES[row % 7]
+        axes.fill_between(clearance, slope - error, slope + error, color=colour, alpha=0.18, lw=0.0)
+        axes.plot(clearance, slope, ls=dashes, color=colour, label=symbol(str(parameter)))
+        if "best_sensitivity" in surface:
+            best = surface.sel(parameter=parameter)
+            where = best["converged"].to_numpy() != 0
+            y = best["best_sensitivity"].to_numpy()[where] * unit.factor
+            bar = 2.0 * best["uncertainty"].to_numpy()[where] * unit.factor
+            options: dict[str, Any] = {"fmt": style.MARKERS[row % 7], "ms": 2.6, "elinewidth": 0.7}
+            axes.errorbar(clearance[where], y, yerr=bar, color=colour, **options)
+        row += 1
+    axes.axhline(0.0, color="black", lw=0.5)
+    axes.margins(y=0.25)
+    columns = 3 if row > 4 else row
+    axes.legend(
+        loc="upper left", ncols=columns, handlelength=1.2, columnspacing=0.6, borderaxespad=0.0
+    )
+
+
+@style.drawn
+def fit_figure(sensitivity: xr.Dataset) -> "Figure":
+    """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
+
+    Parameters
+    ----------
+    sensitivity : xarray.Dataset
+        Kind ``sensitivity``.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
+    figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
+    across = labels.of(sensitivity["clearance"])
+    clearance = sensitivity["clearance"].to_numpy() * across.factor
+    intervals = sensitivity["interval"].to_numpy()
+    colours = style.matplotlib().colormaps[style.COLOURS](np.linspace(0.0, 0.9, len(intervals)))
+    for line, surface in zip(axes, surfaces, strict=True):
+        for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
+            for k, interval in enumerate(intervals):
+                values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
+                options: dict[str, Any] = {"marker": style.MARKERS[k % 7], "ms": 2.2, "lw": 0.7}
+                panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
+            panel.set_ylabel(label)
+        line[0].set_title(f"surface in {_surface(surface)}")
+        lowest = float(sensitivity["r2"].sel(surface=surface).min())
+        line[0].set_ylim(
+            max(-0.25, min(lowest, 0.75)) - 0.02, 1.03
+        )  # below 0 a mean is the better fit
+        line[1].set_ylim(0.0, min(2.0, line[1].get_ylim()[1]))
+    for panel in axes[-1]:
+        panel.set_xlabel(across.label("clearance $C$"))
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    title = "length of the interval, share of the whole"
+    figure.legend(
+        handles, words, loc="outside lower center", ncols=3, title=title, columnspacing=1.0
+    )
+    style.settle(axes, 4)
+    return figure
+
+
+@style.drawn
+def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
+    """Global sensitivity: first-order and total Sobol indices with two standard errors.
+
+    Parameters
+    ----------
+    sensitivity : xarray.Dataset
+        Kind ``sensitivity``, with Sobol indices.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    InputError
+        The file has no Sobol indices.
+    """
+    if "sobol_total" not in sensitivity:
+        reason = "the study left the Sobol indices out"
+        raise InputError(
+            "sensitivity.sobol_samples", 0, reason, "Set it to a power of two and run again"
+        )
+    names = [str(name) for name in sensitivity["parameter"].to_numpy()]
+    figure, axes = style.grid(1, 1, 22.0 + 7.0 * len(names))
+    panel = axes[0, 0]
+    order = np.argsort(np.nan_to_num(sensitivity["sobol_total"].to_numpy()), kind="stable")
+    rows = np.arange(len(names))
+    kinds = (
+        ("first", "first order", style.PALETTE["blue"], 0.2),
+        ("total", "total", style.PALETTE["orange"], -0.2),
+    )
+    for kind, label, colour, shift in kinds:
+        index = sensitivity[f"sobol_{kind}"].to_numpy()[order]
+        name = f"sobol_{kind}_error"
+        error = 2.0 * sensitivity[name].to_numpy()[order] if name in sensitivity else None
+        panel.barh(
+            rows + shift, index, 0.36, color=colour, label=label, xerr=error, error_kw={"lw": 0.7}
+        )
+    panel.set_yticks(rows, [symbol(names[k]) for k in order])
+    panel.set_ylabel("design variable (name)")
+    panel.set_xlabel("share of the variance of $f$ (–)")
+    panel.legend(loc="lower right")
+    panel.grid(axis="y", visible=False)
+    style.settle([panel])
+    return figure
+
+
+@style.drawn
+def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
+    """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
+
+    Parameters
+    ----------
+    kriging : xarray.Dataset
+        Kind ``kriging``; its models of two variables and the clearance are drawn.
+    levels : int
+        Steps of the colour scale.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    InputError
+        No model has three inputs, the clearance among them.
+    """
+    main = labels.clearance(kriging)
+    name = "" if main is None else str(main.attrs["scene_path"])
+    shown = {
+        k: m
+        for k, m in models.families(kriging).items()
+        if len(m[0].inputs) == 3 and name in m[0].inputs
+    }
+    if not shown:
+        reason = "no model is one of two design variables and the clearance"
+        raise InputError(
+            "study.surrogate.models", list(models.families(kriging)), reason, "Fit one, [x, y, C]"
+        )
+    figure, axes = style.grid(len(shown), 2, 24.0 + 40.0 * len(shown))
+    fields = [_fields(parts, parts[0].inputs.index(name)) for parts in shown.values()]
+    unit = labels.scale("m", np.concatenate([np.ravel(z) for _, _, z, _ in fields]))
+    finite = [z[np.isfinite(z)] * unit.factor for _, _, z, _ in fields]
+    limits = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
+    by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
+    across = labels.of(by_path[name])
+    for line, parts, (x, y, z, clearances) in zip(axes, shown.values(), fields, strict=True):
+        first, second = (by_path[i] for i in parts[0].inputs if i != name)
+        scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
+        for k, panel in enumerate(line):
+            grid = (x * scales[0].factor, y * scales[1].factor, z[k].T * unit.factor)
+            drawn = panel.contourf(*grid, levels=limits, cmap=style.COLOURS)
+            lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
+            panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
+            panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
+            panel.tick_params(labelleft=k == 0)
+            panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
+        line[0].set_ylabel(scales[1].label(symbol(str(second.attrs["scene_path"]))))
+    bar = figure.colorbar(drawn, ax=axes.ravel().tolist(), location="bottom", aspect=45, pad=0.01)
+    bar.set_label(unit.label("objective $f$"))
+    style.settle([*axes.flat, bar.ax], 4)
+    bar.ax.xaxis.set_major_locator(style.matplotlib().ticker.MaxNLocator(6))
+    return figure
+
+
+def _fields(parts: list[models.Model], main: int) -> tuple[Any, Any, Any, Any]:
+    """Predictions over the two inputs that are not the clearance: grids (n,), values (2, n, n), clearances (2,)."""
+    lower = np.min([model.lower for model in parts], axis=0)
+    upper = np.max([model.upper for model in parts], axis=0)
+    x, y = (np.linspace(lower[i], upper[i], 41) for i in range(3) if i != main)
+    clearances = np.array([lower[main], upper[main]])
+    mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    values = [
+        models.predict(parts, np.insert(mesh, main, clearance, axis=1)).reshape(len(x), len(y))
+        for clearance in clearances
+    ]
+    return x, y, np.array(values), clearances
+
+
+@style.drawn
+def parity_figure(kriging: xr.Dataset) -> "Figure":
+    """Surrogate against dynamics, every Kriging model (the paper's Figs. 6 and 8).
+
+    Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
+    points of the study stands in the titles.
+
+    Parameters
+    ----------
+    kriging : xarray.Dataset
+        Kind ``kriging``.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    found = models.families(kriging)
+    rows = (len(found) + 1) // 2
+    figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
+    unit = labels.of(kriging["training_output"])
+    family = kriging["family"].to_numpy() if "family" in kriging else kriging["model"].to_numpy()
+    for panel, (name, parts) in zip(axes.flat, found.items(), strict=False):
+        for k, model in enumerate(parts):
+            true, guess = model.values * unit.factor, model.leave_one_out() * unit.factor
+            marker = style.MARKERS[k % 7]
+            panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
+        worst = float(kriging["r2"].to_numpy()[family == name].min())
+        panel.set_title(f"{', '.join(map(symbol, parts[0].inputs))}\n$R^2$ = {worst:.3f}")
+    limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
+    ends = (min(limits)[0], max(high for _, high in limits))
+    for panel in axes.flat:
+        panel.plot(ends, ends, "k-", lw=0.5, zorder=0)
+        panel.set(xlim=ends, ylim=ends, aspect="equal")
+    for panel in axes[:, 0]:
+        panel.set_ylabel(unit.label("$f$ by the surrogate"))
+    _finish_grid(axes, len(found), unit.label("$f$ by the dynamics"))
+    style.settle(figure.axes, 4)
+    return figure
+
+
+def _surface(name: str) -> str:
+    """What a response surface is in."""
+    inputs = name.split()
+    return ", ".join(map(symbol, inputs)) if len(inputs) < 4 else f"{len(inputs)} variables"
+
+
+def symbol(name: str) -> str:
+    """A design variable in a formula's letters, or its path shortened."""
+    if name.endswith("_ratio"):
+        return f"{symbol(name.removesuffix('_ratio'))} ratio"
+    if len(name) == 2 and name[1].isdigit():
+        return f"${name[0]}_{name[1]}$"
+    if name == "C":
+        return "$C$"
+    return labels.literal(name if len(name) < 18 else "…" + name[-17:])
+
+
+def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
+    """Label the lowest panel of each column and take the unused ones away."""
+    for panel in axes.flat[used:]:
+        panel.remove()
+    columns = axes.shape[1]
+    for k in range(max(used - columns, 0), used):
+        axes.flat[k].set_xlabel(label)
+        axes.flat[k].tick_params(labelbottom=True)

@@ -1,0 +1,55 @@
+"""Figure of where the time went (kind ``timing``)."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import labels, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@style.drawn
+def timing_figure(timing: xr.Dataset) -> "Figure":
+    """How every rank spent its time, and how much of it each stage took.
+
+    Parameters
+    ----------
+    timing : xarray.Dataset
+        Kind ``timing``.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    shown = min(timing.sizes["rank"], 64), timing.sizes["stage"]
+    sizes = [max(3, size) for size in shown]
+    figure, axes = style.grid(2, 1, 40.0 + 5.0 * sum(sizes), height_ratios=sizes)
+    parts = [("busy", "computing", "blue"), ("compile", "compiling", "orange")]
+    parts += [("write", "writing", "green"), ("idle", "waiting", "grey")]
+    for panel, along, over in zip(axes[:, 0], ("rank", "stage"), ("stage", "rank"), strict=True):
+        names = [labels.literal(str(name)) for name in timing[along].to_numpy()]
+        left = np.zeros(len(names))
+        for name, label, colour in parts:
+            spent = timing[name].sum(over).to_numpy()
+            panel.barh(
+                np.arange(len(names)),
+                spent,
+                0.7,
+                left=left,
+                color=style.PALETTE[colour],
+                label=label,
+            )
+            left += spent
+        if len(names) <= 64:
+            panel.set_yticks(np.arange(len(names)), names)
+        panel.invert_yaxis()
+        panel.grid(axis="y", visible=False)
+        panel.set_ylabel(f"{along} ({'number' if along == 'rank' else 'name'})")
+        panel.set_xlabel("time (s)" if along == "rank" else "time of all ranks (s)")
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside lower center", ncols=4, columnspacing=1.0)
+    style.settle(axes)
+    return figure

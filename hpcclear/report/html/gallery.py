@@ -1,0 +1,124 @@
+"""Every figure that a directory of results allows, with its caption."""
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import (
+    accuracy as accuracy_figures,
+)
+from hpcclear.report.figures import (
+    designs,
+    portraits,
+    response,
+    samples,
+    style,
+    surrogates,
+    timing,
+)
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Html, image, tag
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Plan = tuple[str, "Callable[[xr.Dataset], Figure]", str]
+
+_RESULTS: tuple[Plan, ...] = (
+    (
+        "samples",
+        samples.samples_figure,
+        "Objective against every design variable, its spread and histogram.",
+    ),
+    (
+        "sensitivity",
+        surrogates.sensitivity_figure,
+        "Sensitivities against clearance: lines with bands over the whole interval, marks with bars where they "
+        "stopped changing; two standard errors.",
+    ),
+    (
+        "sensitivity",
+        surrogates.sobol_figure,
+        "Global sensitivities: Sobol indices with two standard errors.",
+    ),
+    (
+        "sensitivity",
+        surrogates.fit_figure,
+        "Fit of the response surfaces on test points, against clearance and length of the interval.",
+    ),
+    (
+        "kriging",
+        surrogates.surfaces_figure,
+        "Objective over pairs of design variables at the least and the largest clearance, by Kriging.",
+    ),
+    (
+        "kriging",
+        surrogates.parity_figure,
+        "Surrogate against dynamics: each point predicted without itself; R² on test points.",
+    ),
+    ("timing", timing.timing_figure, "Where the ranks' time went, by rank and by stage."),
+)
+"""Kind of file, figure, caption."""
+
+_RESPONSE = (
+    (portraits.orbit_figure, "journal-centre orbits in the clearance circle"),
+    (portraits.force_polar_figure, "contact force by its direction"),
+    (response.penetration_figure, "penetration"),
+    (portraits.phase_figure, "phase portraits of the slider"),
+    (portraits.poincare_figure, "Poincaré section, once a revolution"),
+    (response.spectrum_figure, "spectra"),
+    (response.energy_figure, "energy ledger"),
+)
+
+
+def figures(content: Content) -> Html | None:
+    """All figures as elements of the page."""
+    made = [
+        tag(
+            "figure",
+            image(style.render(figure, dpi=220), caption, 368),
+            tag("figcaption", caption),
+        )
+        for figure, caption in _drawn(content)
+    ]
+    return tag("div", *made, class_="figures") if made else None
+
+
+def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
+    for kind, draw, caption in _RESULTS:
+        yield from _tried(draw, content.get(kind), caption)
+    front = content.get("front")
+    if front is not None:
+        caption = "Pareto fronts of all runs, and the designs simulated directly."
+        yield designs.front_figure(front, content.get("verification")), caption
+    costs = content.get("accuracy")
+    if costs is not None:
+        for name, draw in accuracy_figures.FIGURES.items():
+            yield from _tried(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
+    found = content.responses
+    if len(found) > 1:
+        caption = "Responses of the designs, two revolutions."
+        yield designs.comparison_figure(found), caption
+    if found:
+        name = "original" if "original" in found else next(iter(found))
+        if len(found) == 1:
+            yield response.response_figure(found[name]), f"{name}: response, two revolutions."
+        for draw, what in _RESPONSE:
+            yield from _tried(draw, found[name], f"{name}: {what}.")
+
+
+def _tried(
+    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset | None, caption: str
+) -> "Iterator[tuple[Figure, str]]":
+    """The figure, unless the file is missing or has not what it needs (no Sobol indices, say)."""
+    if found is None:
+        return
+    try:
+        made = draw(found)
+    except InputError as error:
+        if error.key == "matplotlib":
+            raise
+        return
+    yield made, caption

@@ -1,0 +1,91 @@
+"""The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Html, Number, join, table, tag
+
+
+def effects(content: Content) -> Html | None:
+    """Which effects the scene has on, and the scene itself."""
+    scene = content.attribute("scene")
+    if not scene:
+        return None
+    try:
+        entries = tomllib.loads(scene)
+    except tomllib.TOMLDecodeError:
+        first = tag(
+            "p", "The scene stored with the results is not readable as TOML; it is shown as it is."
+        )
+    else:
+        shown = ("drive", "joints", "effects", "numerics")
+        rows = [row for name in shown for row in _flat(entries.get(name), name)]
+        words = "An effect that is not listed was off, and not even compiled."
+        first = join([tag("p", words), table(["entry", "value"], rows, "What was simulated")])
+    return join(
+        [
+            first,
+            tag("details", tag("summary", "The whole scene file"), tag("pre", scene, tabindex="0")),
+        ]
+    )
+
+
+def _flat(value: Any, path: str) -> Iterator[list[object]]:
+    """Entries of nested tables, a row each."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _flat(inner, f"{path}.{key}")
+    elif value is not None:
+        yield [path, str(value)]
+
+
+def timing(content: Content) -> Html | None:
+    """How every rank spent its time."""
+    found = content.get("timing")
+    if found is None:
+        return None
+    parts = ("busy", "idle", "compile", "write")
+    rows: list[list[object]] = []
+    for k, rank in enumerate(found["rank"].to_numpy()):
+        spent = [float(found[name].isel(rank=k).sum()) for name in parts]
+        share = spent[0] / sum(spent) if sum(spent) > 0.0 else 0.0
+        row: list[object] = [
+            f"rank {rank}",
+            *(Number(f"{s:.3g}") for s in spent),
+            Number(f"{share:.0%}"),
+        ]
+        if "samples" in found:
+            row.append(Number(int(found["samples"].isel(rank=k).sum())))
+        rows.append(row)
+    header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
+    header += ["samples"] if "samples" in found else []
+    return table(header, rows, "Where the ranks' time went, all stages")
+
+
+def reproduce(content: Content) -> Html:
+    """Command, versions and hash of the scene."""
+    found = content.get("timing")
+    steps: list[object] = []
+    if found is not None:
+        steps += [tag("p", "The command that made these results:")]
+        steps += [tag("pre", str(found["command"].item()), tabindex="0")]
+    words = (
+        "The same scene, seed and versions on the same type of processor give the same numbers to the last bit, on "
+        "any number of ranks."
+    )
+    rows = [
+        [label, content.attribute(name)]
+        for label, name in (
+            ("program", "source"),
+            ("versions", "versions"),
+            ("processor", "processor"),
+            ("hash of the scene", "scene_hash"),
+            ("after", "references"),
+        )
+        if content.attribute(name)
+    ]
+    if rows:
+        steps += [tag("p", words), table(["what", "value"], rows, "What made these files")]
+    return join(steps)

@@ -1,0 +1,207 @@
+"""What the page's script draws: the front with its designs, responses, and the moving mechanism, as plain content."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import labels, motion
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import quantity
+
+FRAMES = 180  # of a revolution
+_SERIES = (
+    ("contact_force", "crank_rod", "contact force 1 (O12)"),
+    ("contact_force", "rod_slider", "contact force 2 (O23)"),
+    ("crank_moment", "", "crank moment"),
+    ("slider_acceleration", "", "slider acceleration"),
+)
+
+
+def picture(content: Content) -> dict[str, Any]:
+    """Everything the script needs; parts without data are empty."""
+    return {
+        "front": front(content),
+        "responses": {name: series(one) for name, one in content.responses.items()},
+        "motions": {name: frames(one) for name, one in content.responses.items()},
+    }
+
+
+def front(content: Content) -> dict[str, Any]:
+    """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them."""
+    fronts, verified = content.get("front"), content.get("verification")
+    points: list[dict[str, Any]] = []
+    if fronts is not None:
+        points += _solutions(fronts, verified)
+    if verified is not None:
+        points += [_design(verified.isel(design=k)) for k in range(verified.sizes["design"])]
+    points = [p for p in points if np.isfinite(p["x"]) and np.isfinite(p["y"])]
+    if not points:
+        return {"points": []}
+    source = fronts if fronts is not None else verified
+    assert source is not None
+    ending = "" if fronts is not None else "_true"
+    units = [str(source[word + ending].attrs["units"]) for word in ("mean", "deviation")]
+    axes = [labels.scale(u, [p[k] for p in points]) for u, k in zip(units, "xy", strict=True)]
+    for point in points:
+        point["x"], point["y"] = (
+            float(f"{point[k] * a.factor:.6g}") for k, a in zip("xy", axes, strict=True)
+        )
+    points.sort(key=lambda point: (point["x"], point["y"]))
+    return {
+        "x": axes[0].label("mean of f"),
+        "y": axes[1].label("deviation of f"),
+        "cases": sorted({point["case"] for point in points}),
+        "points": points,
+    }
+
+
+def _solutions(fronts: xr.Dataset, verified: xr.Dataset | None) -> list[dict[str, Any]]:
+    """The swarm's solutions by the surrogate, each with its direct simulation where there is one."""
+    found = []
+    variables = labels.design_variables(fronts)
+    places = np.argwhere(np.isfinite(fronts["mean"].to_numpy()))
+    for place in places:
+        one = fronts.isel(dict(zip(fronts["mean"].dims, place.tolist(), strict=True)))
+        case = str(one["case"].item())
+        direct = _same(one, verified, case, [str(v.name) for v in variables])
+        found.append(
+            {
+                "kind": "solution",
+                "name": f"run {int(one['run'])}, solution {int(one['solution'])}",
+                "case": case,
+                "x": float(one["mean"]),
+                "y": float(one["deviation"]),
+                "design": _values(one),
+                "surrogate": _moments(one, "mean", "deviation"),
+                "direct": [] if direct is None else _direct(direct),
+                "response": "",
+            }
+        )
+    return found
+
+
+def _same(
+    one: xr.Dataset, verified: xr.Dataset | None, case: str, names: list[str]
+) -> xr.Dataset | None:
+    """The verified design of the same case and values."""
+    if verified is None or not set(names) <= set(map(str, verified.data_vars)):
+        return None
+    fit = np.ones(verified.sizes["design"], bool)
+    if "case" in verified:
+        fit = verified["case"].to_numpy() == case
+    for name in names:
+        fit &= np.isclose(verified[name].to_numpy(), float(one[name]), rtol=1e-9, atol=0.0)
+    found = np.flatnonzero(fit)
+    return None if found.size == 0 else verified.isel(design=int(found[0]))
+
+
+def _design(one: xr.Dataset) -> dict[str, Any]:
+    """A design that was simulated directly."""
+    name = str(one["design"].item())
+    surrogate = (
+        _moments(one, "mean_surrogate", "deviation_surrogate") if "mean_surrogate" in one else []
+    )
+    return {
+        "kind": "paper" if "paper" in name else "original" if "original" in name else "design",
+        "name": name,
+        "case": str(one["case"].item()) if "case" in one else "",
+        "x": float(one["mean_true"]),
+        "y": float(one["deviation_true"]),
+        "design": _values(one),
+        "surrogate": surrogate,
+        "direct": _direct(one),
+        "response": "original" if "original" in name else name,
+    }
+
+
+def _values(one: xr.Dataset) -> list[list[str]]:
+    """Design variables with units; those the case does not have are left out."""
+    rows = [
+        (labels.words(v), quantity(float(v), str(v.attrs["units"])))
+        for v in labels.design_variables(one)
+    ]
+    return [[name, str(value)] for name, value in rows if value != "–"]
+
+
+def _moments(one: xr.Dataset, mean: str, deviation: str) -> list[list[str]]:
+    return [
+        [word, str(quantity(float(one[name]), str(one[name].attrs["units"])))]
+        for word, name in (("mean", mean), ("deviation", deviation))
+    ]
+
+
+def _direct(one: xr.Dataset) -> list[list[str]]:
+    """True moments with confidence limits, surrogate errors, counts, and what the paper prints."""
+    rows = []
+    for word in ("mean", "deviation"):
+        units = str(one[f"{word}_true"].attrs["units"])
+        shown = str(quantity(float(one[f"{word}_true"]), units))
+        if f"{word}_lower" in one and np.isfinite(float(one[f"{word}_lower"])):
+            ends = (str(quantity(float(one[f"{word}_{end}"]), units)) for end in ("lower", "upper"))
+            shown += " (" + " to ".join(ends) + ")"
+        rows.append([word, shown])
+    for word in ("mean", "deviation"):
+        if f"{word}_error" in one and np.isfinite(float(one[f"{word}_error"])):
+            rows.append([f"surrogate's error of the {word}", f"{float(one[f'{word}_error']):+.2%}"])
+    rows += [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
+    for word in ("mean", "deviation"):
+        if f"{word}_paper" in one and np.isfinite(float(one[f"{word}_paper"])):
+            rows.append([f"{word} printed in the paper", f"{float(one[f'{word}_paper']):.4e} m"])
+    return rows
+
+
+def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
+    """Curves of the last two revolutions: crank angle from 0 in revolutions, values in readable units."""
+    shown = motion.latest(response, 2)
+    every = max(1, shown.sizes["time"] // most)
+    shown = shown.isel(time=slice(None, None, every))
+    turn = motion.turns(shown) - motion.turns(shown)[0]
+    found = []
+    for name, joint, word in _SERIES:
+        one = shown[name].sel(joint=joint) if joint else shown[name]
+        values = np.nan_to_num(one.to_numpy())
+        found.append(
+            {
+                "label": word,
+                "unit": str(one.attrs["units"]),
+                "x": _digits(turn),
+                "y": _digits(values),
+            }
+        )
+    return found
+
+
+def frames(response: xr.Dataset) -> dict[str, Any]:
+    """The mechanism in motion over the last two revolutions.
+
+    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
+    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
+    """
+    shown = motion.latest(response, 2)
+    every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
+    shown = shown.isel(time=slice(None, None, every))
+    e = np.stack([shown["eccentricity_x"].to_numpy(), shown["eccentricity_y"].to_numpy()], axis=-1)
+    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
+    crank, along = (
+        np.column_stack([np.cos(angle), np.sin(angle)])
+        for angle in (shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy())
+    )
+    # crank length * crank = rod - u2 * along + e12
+    both = np.column_stack([crank.ravel(), along.ravel()])
+    length = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0])
+    return {
+        "crank": length,
+        "clearance": np.nan_to_num(motion.clearances(response)).tolist(),
+        "turn": _digits(motion.turns(shown)),
+        "pin": _digits(length * crank),
+        "slider": _digits(shown["slider_position"].to_numpy()),
+        "e": _digits(e.reshape(len(e), 4)),
+        "force": _digits(shown["contact_force"].to_numpy()),
+    }
+
+
+def _digits(values: np.ndarray) -> Any:
+    """Numbers for the page: six digits."""
+    flat = [float(f"{value:.6g}") for value in np.ravel(values)]
+    return np.reshape(flat, np.shape(values)).tolist()

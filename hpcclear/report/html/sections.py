@@ -1,0 +1,296 @@
+"""Sections of the page on designs, findings and trust, made from what there is; None where nothing is."""
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Html, Number, join, number, quantity, table, tag
+
+_FLAGS = {
+    Flag.LATCHED: "a joint stayed in contact with the impact speed frozen: f may depend on the tolerance",
+    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
+    Flag.STIFF: "the implicit method was used for part of the run",
+}
+_MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
+LISTED = 40  # samples listed by number before the rest is only counted
+
+
+def summary(content: Content) -> Html:
+    """What was done and found, in plain words."""
+    words = [
+        *_samples_words(content),
+        *_designs_words(content),
+        *_claims_words(content),
+        *_time_words(content),
+    ]
+    if not words:
+        words = ["These are responses of single designs; nothing was sampled or optimised."]
+    rest = tag("ul", *(tag("li", word) for word in words[1:])) if words[1:] else Html("")
+    return join([tag("p", words[0], class_="lead"), rest, _facts(content)])
+
+
+def _samples_words(content: Content) -> list[str]:
+    samples = content.get("samples")
+    if samples is None:
+        return []
+    count, failed = samples.sizes["sample"], int((samples["status"] != 0).sum())
+    names = ", ".join(labels.words(v) for v in labels.design_variables(samples))
+    words = [f"{count} designs, different in {names}, were simulated; {_none(failed)} failed."]
+    f = samples["objective"]
+    if bool(f.notnull().any()):
+        low, high = (str(quantity(float(end), str(f.attrs["units"]))) for end in (f.min(), f.max()))
+        words.append(
+            f"The objective f, the mean distance from the clearance circle, lies between {low} and {high}."
+        )
+    return words
+
+
+def _designs_words(content: Content) -> list[str]:
+    verified = content.get("verification")
+    if verified is None:
+        return []
+    by_name = {str(name): verified.sel(design=name) for name in verified["design"].to_numpy()}
+    words = []
+    for name, one in by_name.items():
+        case, _, letter = name.rpartition(" ")
+        base = by_name.get(f"{case} original")
+        if letter not in ("alpha", "beta") or base is None:
+            continue  # not the averaged best of a case
+        what = "mean" if letter == "alpha" else "deviation"
+        change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
+        value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
+        words.append(
+            f"Design “{name}”, of the least {what} of f by the surrogate, has a {what} of {value} by direct "
+            f"simulation: {abs(change):.0%} {'less' if change < 0 else 'more'} than the original design."
+        )
+    return words
+
+
+def _claims_words(content: Content) -> list[str]:
+    claims = content.get("claims")
+    if claims is None:
+        return []
+    verdicts = [str(verdict) for verdict in claims["verdict"].to_numpy()]
+    counts = [verdicts.count(verdict) for verdict in _MARKS]
+    return [
+        f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, "
+        f"{counts[1]} do not, and {counts[2]} cannot be told."
+    ]
+
+
+def _time_words(content: Content) -> list[str]:
+    timing = content.get("timing")
+    if timing is None:
+        return []
+    spent = {name: float(timing[name].sum()) for name in ("busy", "idle", "compile", "write")}
+    total = sum(spent.values()) or 1.0
+    ranks = timing.sizes["rank"]
+    return [
+        f"{ranks} {'rank' if ranks == 1 else 'ranks'} worked on it, "
+        f"{spent['busy'] / total:.0%} of {'its' if ranks == 1 else 'their'} time on computing."
+    ]
+
+
+def _none(count: int) -> str:
+    return "none" if count == 0 else str(count)
+
+
+def _facts(content: Content) -> Html:
+    """Key numbers as tiles."""
+    facts: list[tuple[str, object]] = []
+    samples, verified = content.get("samples"), content.get("verification")
+    if samples is not None:
+        failed = int((samples["status"] != 0).sum())
+        evaluations = int(samples["rhs_evaluations"].sum())
+        facts += [
+            ("samples", samples.sizes["sample"]),
+            ("failed", failed),
+            ("force evaluations", f"{evaluations:.3g}"),
+        ]
+    timing = content.get("timing")
+    if timing is not None:
+        parts = [
+            timing[name].sum("stage").to_numpy() for name in ("busy", "idle", "compile", "write")
+        ]
+        wall = float(np.sum(parts, axis=0).max())
+        facts += [("ranks", timing.sizes["rank"]), ("wall time", f"{wall:.3g} s")]
+        if samples is not None and float(timing["busy"].sum()) > 0.0 and "samples" in timing:
+            rate = float(
+                timing["samples"].sum() / timing["busy"].where(timing["samples"] > 0).sum()
+            )
+            facts.append(("samples a second and core", f"{rate:.3g}"))
+    if verified is not None:
+        facts.append(("designs verified", verified.sizes["design"]))
+    return (
+        tag("dl", *(tag("div", tag("dt", k), tag("dd", v)) for k, v in facts), class_="facts")
+        if facts
+        else Html("")
+    )
+
+
+def designs(content: Content) -> Html | None:
+    """Optimised designs beside the paper's Table 4; the spread along the fronts apart."""
+    verified = content.get("verification")
+    if verified is None:
+        return None
+    names = [str(name) for name in verified["design"].to_numpy()]
+    spread = [k for k, name in enumerate(names) if " front " in name]
+    main = sorted(
+        (k for k in range(len(names)) if k not in spread), key=lambda k: _place(verified, k)
+    )
+    words = (
+        "Mean and deviation of f by direct simulation, with confidence limits; by the surrogate; and as the paper "
+        "prints them in its Table 4. The printed deviations are neither deviation nor variance of f as the model here "
+        "gives it; nothing was fitted to them."
+    )
+    remarks = str(verified.attrs.get("remarks", "none"))
+    parts = [tag("p", words)]
+    if remarks != "none":
+        parts.append(tag("p", remarks, class_="note"))
+    parts.append(_designs_table(verified.isel(design=main), "Table 4, ours and the paper's"))
+    if spread:
+        more = _designs_table(verified.isel(design=spread), "Designs along the fronts")
+        parts.append(
+            tag("details", tag("summary", f"{len(spread)} more designs, along the fronts"), more)
+        )
+    return join(parts)
+
+
+def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
+    """Case by case: the original, then each of ours before the paper's."""
+    name = str(verified["design"].to_numpy()[k])
+    case = str(verified["case"].to_numpy()[k]) if "case" in verified else ""
+    order = ("original", "paper alpha", "paper beta", "best alpha", "best beta", "alpha", "beta")
+    kind = next((word for word in order if name.endswith(word)), "")
+    ranks = {
+        "original": 0,
+        "alpha": 1,
+        "best alpha": 2,
+        "paper alpha": 3,
+        "beta": 4,
+        "best beta": 5,
+        "paper beta": 6,
+    }
+    return case, ranks.get(kind, 7)
+
+
+_MOMENTS = (
+    ("mean_true", "mean of f"),
+    ("deviation_true", "deviation of f"),
+    ("mean_surrogate", "surrogate: mean"),
+    ("deviation_surrogate", "surrogate: deviation"),
+    ("mean_paper", "printed: mean"),
+    ("deviation_paper", "printed: deviation"),
+)
+
+
+def _designs_table(verified: xr.Dataset, caption: str) -> Html:
+    """A row for each design; each column in one unit."""
+    columns = [(v, labels.words(v)) for v in labels.design_variables(verified)]
+    columns += [(verified[name], words) for name, words in _MOMENTS if name in verified]
+    scales = [labels.of(variable) for variable, _ in columns]
+    header = ["design", *(s.label(words) for s, (_, words) in zip(scales, columns, strict=True))]
+    rows = []
+    for k in range(verified.sizes["design"]):
+        row: list[object] = [verified["design"].to_numpy()[k]]
+        for scale, (variable, _) in zip(scales, columns, strict=True):
+            shown = number(float(variable[k]) * scale.factor)
+            row.append(
+                Number(shown + _half_width(verified.isel(design=k), str(variable.name), scale))
+            )
+        rows.append(row)
+    return table(header, rows, caption)
+
+
+def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
+    """Half of the confidence interval of a true moment, as text behind it."""
+    word, _, ending = name.partition("_")
+    if ending != "true" or f"{word}_lower" not in one or f"{word}_upper" not in one:
+        return ""
+    half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
+    return f" ± {half:.2g}" if np.isfinite(half) else ""
+
+
+def readings(content: Content) -> Html | None:
+    """The paper's designs under the possible readings of its text."""
+    found = content.get("readings")
+    if found is None:
+        return None
+    scale = labels.of(found["mean"])
+    names = [str(name) for name in found["design"].to_numpy()]
+    header = ["reading", *(scale.label(name) for name in names), "distance"]
+    rows: list[list[object]] = []
+    if "mean_paper" in found:
+        printed = [number(float(value) * scale.factor) for value in found["mean_paper"].to_numpy()]
+        rows.append(["printed in the paper", *printed, Number("–")])
+    for k in range(found.sizes["reading"]):
+        one = found.isel(reading=k)
+        cells = [number(float(value) * scale.factor) for value in one["mean"].to_numpy()]
+        distance = number(float(one["distance"]), 3) if "distance" in one else Number("–")
+        rows.append([one["reading"].item(), *cells, distance])
+    words = (
+        "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
+        "ln(mean / printed mean)."
+    )
+    return join([tag("p", words), table(header, rows, "Readings of the paper")])
+
+
+def claims(content: Content) -> Html | None:
+    """The paper's claims with our verdicts."""
+    found = content.get("claims")
+    if found is None:
+        return None
+    rows = []
+    for k in range(found.sizes["claim"]):
+        one = found.isel(claim=k)
+        verdict = str(one["verdict"].item())
+        mark, kind = _MARKS.get(verdict, ("", "open"))
+        badge = tag("span", f"{mark} {verdict}", class_=f"verdict {kind}")
+        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
+    return table(
+        ["claim", "verdict", "the numbers that decide"],
+        rows,
+        "Claims of the paper, tested on this data",
+    )
+
+
+def trust(content: Content) -> Html | None:
+    """Samples that failed, and those to be read with care."""
+    samples = content.get("samples")
+    if samples is None:
+        return None
+    status = samples["status"].to_numpy()
+    numbers = samples["sample"].to_numpy()
+    parts: list[object] = []
+    rows: list[list[object]] = []
+    for code in Status:
+        hit = numbers[status == code]
+        if code is not Status.OK and hit.size:
+            rows.append(
+                [code.name.lower(), Number(len(hit)), code.message, code.remedy, _listed(hit)]
+            )
+    if rows:
+        header = ["outcome", "samples", "what happened", "what to change", "which"]
+        parts.append(table(header, rows, "Samples that failed; their numbers are missing, never 0"))
+    else:
+        parts.append(tag("p", "No sample failed."))
+    rows = []
+    flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(numbers), int)
+    for flag, words in _FLAGS.items():
+        hit = numbers[(flags & flag) != 0]
+        if hit.size:
+            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit)])
+    if rows:
+        parts.append(
+            table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
+        )
+    else:
+        parts.append(tag("p", "No sample carries a warning."))
+    return join(parts)
+
+
+def _listed(numbers: np.ndarray) -> str:
+    shown = ", ".join(str(n) for n in numbers[:LISTED])
+    return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"

@@ -1,0 +1,383 @@
+"""Finished work on disk as it finishes, so that a killed run goes on where it stopped.
+
+Samples are written every few seconds as part files, each a whole dataset of kind ``samples``;
+eight parts of one size are merged into one of the next, so that their number grows with the
+logarithm of the run time and each record is rewritten a few times at most. Results of stages are
+files of plain arrays. Every file carries the key of its run, and only the same run goes on from it.
+"""
+
+import json
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hpcclear.results import dataset, files as storage
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
+
+INTERVAL = 5.0
+"""Seconds between two part files: what a kill costs at most."""
+
+KEY = "run_key"
+"""Global attribute with the key of a run, in part, stage and final files."""
+
+_FANOUT = 8
+_PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
+_STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
+_DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
+
+
+def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
+    """The key of a run as a global attribute, for files that `check_key` is to recognise."""
+    return {KEY: json.dumps(dict(sorted(key.items())), ensure_ascii=False)}
+
+
+def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
+    """Refuse results of another run.
+
+    Parameters
+    ----------
+    content : xarray.Dataset
+        What was read from `place`.
+    key : mapping of str to str
+        What makes this run what it is: scene, version, seed, ...; flattened entries of a scene
+        make the message name the entries that changed.
+    place : Path
+        For the message.
+
+    Raises
+    ------
+    InputError
+        The keys differ; the message lists where.
+    """
+    found = _parse_key(content)
+    differ = [name for name in sorted({*found, *key}) if found.get(name) != key.get(name)]
+    if differ:
+        shown = [
+            f"{n}: {_short(found.get(n))} there, {_short(key.get(n))} now" for n in differ[:10]
+        ]
+        more = f"; and {len(differ) - 10} more" if len(differ) > 10 else ""
+        raise InputError(
+            "output",
+            str(place),
+            f"it holds results of another run ({'; '.join(shown)}{more})",
+            "Choose another output, or start anew beside it with --fresh",
+        )
+
+
+def _parse_key(content: xr.Dataset) -> dict[str, object]:
+    try:
+        found = json.loads(str(content.attrs.get(KEY, "{}")))
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _short(value: object) -> str:
+    text = "nothing" if value is None else str(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def unfinished(directory: Path) -> bool:
+    """Whether a directory holds work to go on from: files of a `Checkpoint` that was not finished."""
+    names = [path.name for path in directory.glob("*.nc")]
+    return _DONE not in names and any(_PART.fullmatch(n) or _STAGE.fullmatch(n) for n in names)
+
+
+def discard(directory: Path) -> None:
+    """Remove what a `Checkpoint` wrote in a directory, and the directory unless more is in it.
+
+    The mark of `Checkpoint.finish` goes last: half of what was there is never taken for all of it.
+
+    Raises
+    ------
+    InputError, StorageError
+        The disk refuses.
+    """
+    try:
+        if directory.is_symlink() or not directory.is_dir():
+            return
+        for path in sorted(directory.iterdir()):
+            if any(form.fullmatch(path.name) for form in (_PART, _STAGE, storage.TEMPORARY)):
+                path.unlink(missing_ok=True)
+        (directory / _DONE).unlink(missing_ok=True)
+        if not any(directory.iterdir()):
+            directory.rmdir()
+    except OSError as error:
+        raise storage.refused(directory, error) from None
+
+
+@dataclass
+class _Part:
+    level: int
+    path: Path
+    records: np.ndarray
+    values: np.ndarray
+
+
+class Checkpoint:
+    """Finished samples and stages of one run, in a directory of their own.
+
+    Opening it makes the directory, removes rubbish that a kill left, and reads what is there. One
+    process uses it at a time: hold a `hpcclear.results.lock.Lock`.
+
+    Parameters
+    ----------
+    directory : Path
+        Where the files go; made when missing (its parent exists), never a symbolic link.
+    key : mapping of str to str
+        What makes the run what it is; see `check_key`.
+    interval : float
+        Seconds between two part files.
+    names : sequence of str
+        Design variables whose values `add` gets, by name or scene path.
+    units : mapping of str to str, optional
+        Units of those that are not the paper's.
+    attributes : mapping, optional
+        Global attributes of the part files (`hpcclear.results.dataset.provenance`).
+    clock : callable
+        Seconds since any instant.
+
+    Attributes
+    ----------
+    seconds : float
+        Time spent in this class.
+    problems : list of str
+        What was found on disk and could not be used, a sentence each.
+
+    Raises
+    ------
+    InputError
+        The directory holds another run's results, is a link, or cannot be written to.
+    StorageError
+        The disk fails.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        key: Mapping[str, str],
+        *,
+        interval: float = INTERVAL,
+        names: Sequence[str] = (),
+        units: Mapping[str, str] | None = None,
+        attributes: Mapping[str, object] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.directory = directory
+        self.key = dict(key)
+        self.interval = interval
+        self.names = tuple(names)
+        self.units = dict(units or {})
+        self.attributes = {**(attributes or {}), **key_attribute(key)}
+        self.seconds = 0.0
+        self.problems: list[str] = []
+        self._clock = clock
+        self._parts: list[_Part] = []
+        self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
+        with self._timed(), self._refusing():
+            self._number = self._open()
+        self._written = clock()
+
+    # -- samples --------------------------------------------------------------------------------
+
+    def add(self, records: np.ndarray, values: ArrayLike | None = None) -> None:
+        """Take finished samples into memory; the flushes write them.
+
+        `records` are of `hpcclear.base.outcome.OUTCOME`, shape (n,); `values`, shape (n, k), their
+        designs, a column for each of `names`.
+        """
+        columns = np.empty((len(records), 0)) if values is None else np.asarray(values, float)
+        if columns.shape != (len(records), len(self.names)):
+            raise ValueError(f"designs have shape {columns.shape}, names are {self.names}")
+        if len(records):
+            self._buffer.append((records.astype(OUTCOME), columns.copy()))
+
+    def flush_when_due(self) -> None:
+        """Write what has gathered when the interval is over; raises as `flush`."""
+        if self._clock() - self._written >= self.interval:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has gathered, now; nothing happens when nothing has.
+
+        Raises `InputError` or `StorageError` when the disk refuses; the samples stay in memory,
+        and a later call tries again.
+        """
+        if not self._buffer:
+            self._written = self._clock()
+            return
+        with self._timed():
+            records = np.concatenate([records for records, _ in self._buffer])
+            values = np.concatenate([values for _, values in self._buffer])
+            self._write_part(0, records, values)
+            self._buffer.clear()
+            self._merge()
+        self._written = self._clock()
+
+    def completed(self) -> np.ndarray:
+        """All samples on disk and in memory, by growing number, each once; shape (n,)."""
+        pieces = [part.records for part in self._parts] + [records for records, _ in self._buffer]
+        return _join(pieces, [np.empty((len(piece), 0)) for piece in pieces])[0]
+
+    def contents(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
+        pieces = [(part.records, part.values) for part in self._parts] + self._buffer
+        return _join([records for records, _ in pieces], [values for _, values in pieces])
+
+    def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
+        records, values = _join([records], [values])
+        content = dataset.samples_dataset(self.names, values, self.units, records, self.attributes)
+        path = self.directory / f"part-{level:02d}-{self._number:06d}.nc"
+        dataset.write(content, path)
+        self._parts.append(_Part(level, path, records, values))
+        self._number += 1
+
+    def _merge(self) -> None:
+        while True:
+            counts = Counter(part.level for part in self._parts)
+            level = next((level for level in sorted(counts) if counts[level] >= _FANOUT), None)
+            if level is None:
+                return
+            old = [part for part in self._parts if part.level == level]
+            merged = _join([part.records for part in old], [part.values for part in old])
+            self._write_part(level + 1, *merged)
+            # a kill in between leaves samples twice, which `_join` mends
+            for part in old:
+                part.path.unlink(missing_ok=True)
+            self._parts = [part for part in self._parts if part.level != level]
+
+    # -- stages ---------------------------------------------------------------------------------
+
+    def save_stage(self, name: str, data: Mapping[str, ArrayLike]) -> None:
+        """Write the results of a stage: arrays, numbers, truth values, text; raises as `flush`.
+
+        Parameters
+        ----------
+        name : str
+            Letters, digits, ``_`` and ``-``.
+        data : mapping of str to array
+            Real numbers, whole numbers, truth values or text, of any shape.
+        """
+        with self._timed():
+            variables = {key: _stage_variable(key, values) for key, values in data.items()}
+            content = xr.Dataset(variables, attrs={**self.attributes, "stage": name})
+            storage.save(content, self._stage_path(name))
+
+    def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
+        """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
+
+        Raises
+        ------
+        InputError
+            The file is another run's.
+        """
+        with self._timed():
+            path = self._stage_path(name)
+            if not path.exists():
+                return None
+            try:
+                content = storage.load(path)
+            except InputError as error:
+                self.problems.append(f"{path.name} is done again: {error.reason}")
+                return None
+            check_key(content, self.key, path)
+            found = {str(key): content[key] for key in content.data_vars}
+            return {
+                key: values.to_numpy().astype(bool if "truth" in values.attrs else values.dtype)
+                for key, values in found.items()
+            }
+
+    def _stage_path(self, name: str) -> Path:
+        path = self.directory / f"stage-{name}.nc"
+        if _STAGE.fullmatch(path.name) is None:
+            raise ValueError(f"{name!r} is no name of a stage")
+        return path
+
+    # -- opening and closing --------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Remove all that was written here; call it when the final files are in place."""
+        with self._timed():
+            storage.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
+            discard(self.directory)
+            self._parts.clear()
+            self._buffer.clear()
+
+    def _open(self) -> int:
+        """Read the parts that are there; the number of the next one."""
+        if (self.directory / _DONE).exists():
+            discard(self.directory)
+        xr.Dataset(coords={"sample": [0]})  # what xarray loads late is loaded before samples wait
+        self.directory.mkdir(exist_ok=True)
+        if self.directory.is_symlink():  # results are written where the user said, nowhere else
+            reason = "it is a symbolic link"
+            raise InputError("output", str(self.directory), reason, "Remove the link")
+        number = 0
+        for path in sorted(self.directory.iterdir()):
+            match = _PART.fullmatch(path.name)
+            if match is not None:
+                number = max(number, int(match[2]) + 1)
+                self._read_part(path, int(match[1]))
+            elif storage.TEMPORARY.fullmatch(path.name):
+                self.problems.append(f"{path.name} was never finished and is removed")
+                path.unlink(missing_ok=True)
+        return number
+
+    def _read_part(self, path: Path, level: int) -> None:
+        try:
+            content = dataset.read(path, "samples")
+        except InputError as error:
+            self.problems.append(f"samples of {path.name} are done again: {error.reason}")
+            return
+        check_key(content, self.key, path)
+        designs = dataset.designs(content)
+        if set(designs) != set(self.names):
+            self.problems.append(f"samples of {path.name} are done again: other design variables")
+            return
+        records = dataset.records(content)
+        columns = [designs[name] for name in self.names]
+        values = np.stack(columns, 1) if columns else np.empty((len(records), 0))
+        self._parts.append(_Part(level, path, records, values))
+
+    @contextmanager
+    def _refusing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise storage.refused(self.directory, error) from None
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds += time.perf_counter() - start
+
+
+def _join(
+    records: Sequence[np.ndarray], values: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """One array of each, by growing sample number, each sample once."""
+    if not records:
+        return np.empty(0, OUTCOME), np.empty((0, 0))
+    joined = np.concatenate(records)
+    first = np.unique(joined["sample"], return_index=True)[1]
+    return joined[first], np.concatenate(values)[first]
+
+
+def _stage_variable(name: str, values: ArrayLike) -> xr.Variable:
+    array = np.asarray(values)
+    dims = tuple(f"{name}_{axis}" for axis in range(array.ndim))
+    if array.dtype.kind == "b":  # NetCDF knows no truth values
+        return xr.Variable(dims, array.astype(np.int8), {"truth": "0 false, 1 true"})
+    return xr.Variable(dims, array)

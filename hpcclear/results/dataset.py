@@ -1,0 +1,381 @@
+"""Result files as xarray datasets: built from plain arrays and records, written whole, checked.
+
+The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
+`hpcclear.results.files`.
+"""
+
+import functools
+import os
+import platform
+import re
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from hpcclear.results import files as storage
+from hpcclear.base.errors import InputError
+from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Kind, Variable
+from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, Status
+
+CONVENTIONS = "CF-1.11"
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
+_REFERENCE = (
+    "Robust Optimization of Planar Constrained Mechanical System with Varying Joint Clearance "
+    "Size Based on Sensitivity Analysis"
+)
+_ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
+_LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
+
+
+# -----------------------------------------------------------------------------------------------
+# Building
+
+
+def dataset(
+    kind: str,
+    coords: Mapping[str, ArrayLike],
+    data: Mapping[str, ArrayLike],
+    attributes: Mapping[str, object] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> xr.Dataset:
+    """A dataset of one kind of result file, with every attribute the table knows.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `hpcclear.results.names.KINDS`.
+    coords : mapping of str to array, shape (size of the dimension,)
+        The coordinates of the kind, all of them.
+    data : mapping of str to array
+        Variables of the kind, and design variables under their names or scene paths; for Kriging
+        models also their limits, NAME_lower and NAME_upper. Shapes as in the table.
+    attributes : mapping, optional
+        Further global attributes, text or numbers; see `provenance`.
+    units : mapping of str to str, optional
+        Units of design variables; those of the paper's (`DESIGN_VARIABLES`) are known.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    ValueError
+        A name, shape or type that is not in the table, or a required variable missing.
+    InputError
+        A design variable whose name cannot be one.
+    """
+    table = KINDS[kind]
+    if set(coords) != set(table.coords):
+        raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
+    missing = table.required - set(data)
+    if missing:
+        raise ValueError(f"{kind} lacks {sorted(missing)}")
+    sizes = {name: np.shape(coords[name])[0] for name in table.coords}
+    variables = {
+        name: _variable(name, row, coords[name], sizes) for name, row in table.coords.items()
+    }
+    for name, values in data.items():
+        if name in table.data:
+            variables[name] = _variable(name, table.data[name], values, sizes)
+        else:
+            row, marks = _design_row(name, data, units or {}, table)
+            variable = _variable(name, row, values, sizes)
+            variable.attrs.update(marks)
+            variables[variable_name(name, kind)] = variable
+    fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
+    return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
+
+
+def _variable(name: str, row: Variable, values: ArrayLike, sizes: Mapping[str, int]) -> xr.Variable:
+    array = np.asarray(values)
+    expected = tuple(sizes[dim] for dim in row.dims)
+    if array.shape != expected:
+        raise ValueError(f"{name} has shape {array.shape}, not {expected} {row.dims}")
+    allowed = {"f8": "fiu", "i8": "iub", "i1": "iub", "text": "U"}[row.dtype]
+    if array.dtype.kind not in allowed:
+        raise ValueError(f"{name} has type {array.dtype}, not {row.dtype}")
+    if row.dtype != "text":
+        exact = array.astype(row.dtype)
+        if row.dtype != "f8" and not np.array_equal(exact, array):
+            raise ValueError(f"{name} does not fit into {row.dtype}")
+        array = exact
+    attributes: dict[str, object] = {"long_name": row.long_name}
+    if row.units:
+        attributes["units"] = row.units
+    return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
+
+
+def _design_row(
+    name: str, data: Mapping[str, ArrayLike], units: Mapping[str, str], table: Kind
+) -> tuple[Variable, dict[str, str]]:
+    """Row and further attributes of a design variable, or of a limit of one."""
+    dims, base, words, role = table.design_dims, name, "", _ROLE
+    if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
+        dims, base, words, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", _LIMIT
+    unit, long_name = DESIGN_VARIABLES.get(base, (None, f"design variable {base}"))
+    unit = units.get(base, unit)
+    if unit is None or dims is None:
+        raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
+    return Variable(dims, unit, words + long_name, "f8"), {"role": role, "scene_path": base}
+
+
+def variable_name(name: str, kind: str = "samples") -> str:
+    """The name a design variable has in a file: a scene path with its dots as underscores.
+
+    Raises
+    ------
+    InputError
+        The name is no name, or a result is called so.
+    """
+    plain = name.replace(".", "_")
+    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", plain) is None:
+        reason = "a name consists of letters, digits and underscores, a letter first"
+        raise InputError("study.variables", name, reason, "Choose another name")
+    if plain in KINDS[kind].data or plain in KINDS[kind].coords:
+        reason = "a result is called so"
+        raise InputError("study.variables", name, reason, "Choose another name")
+    return plain
+
+
+def samples_dataset(
+    names: Sequence[str],
+    values: ArrayLike,
+    units: Mapping[str, str],
+    records: np.ndarray,
+    attributes: Mapping[str, object] | None = None,
+) -> xr.Dataset:
+    """Outcome records and the designs they belong to, by growing sample number.
+
+    Parameters
+    ----------
+    names : sequence of str, length k
+        Design variables, by name or scene path.
+    values : array, shape (n, k)
+        Designs, a row for each record, in SI units.
+    units : mapping of str to str
+        Units of the design variables that are not the paper's.
+    records : array of `hpcclear.base.outcome.OUTCOME`, shape (n,)
+        In any order, each sample once.
+    attributes : mapping, optional
+        Further global attributes.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind ``samples``.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not match, a sample twice, a design that is not finite.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.shape != (len(records), len(names)):
+        raise ValueError(f"designs have shape {values.shape}, not {(len(records), len(names))}")
+    if not np.isfinite(values).all():
+        raise ValueError("a design is not finite")
+    order = np.argsort(records["sample"], kind="stable")
+    records, values = records[order], values[order]
+    if np.any(np.diff(records["sample"]) == 0):
+        raise ValueError("a sample occurs twice")
+    data = {variable_name(name): values[:, i] for i, name in enumerate(names)}
+    if len(data) != len(names):
+        raise ValueError(f"two of the names {list(names)} are the same in a file")
+    data = {name: values[:, i] for i, name in enumerate(names)}
+    asked = {name for name in ON_REQUEST if np.isfinite(records[name]).any()}
+    left_out = {"sample", *ON_REQUEST} - asked
+    data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
+    coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
+    return dataset("samples", coords, data, attributes, units)
+
+
+def records(samples: xr.Dataset) -> np.ndarray:
+    """The outcome records in a dataset of kind ``samples``, shape (n,) of `OUTCOME`."""
+    found = np.zeros(samples.sizes["sample"], OUTCOME)
+    for name in OUTCOME.names or ():
+        absent = name in ON_REQUEST and name not in samples
+        found[name] = np.nan if absent else samples[name].to_numpy()
+    return found
+
+
+def designs(samples: xr.Dataset) -> dict[str, np.ndarray]:
+    """The design variables in a dataset, by their names or scene paths."""
+    return {
+        str(variable.attrs["scene_path"]): variable.to_numpy()
+        for variable in samples.data_vars.values()
+        if variable.attrs.get("role") == _ROLE
+    }
+
+
+def response_dataset(
+    time: ArrayLike,
+    data: Mapping[str, ArrayLike],
+    attributes: Mapping[str, object] | None = None,
+) -> xr.Dataset:
+    """One response: series of shape (t,) or (t, 2), scalars, values of shape (2,) at the joints."""
+    return dataset("response", {"time": time, "joint": np.array(JOINTS)}, data, attributes)
+
+
+def timing_dataset(
+    stages: Sequence[str],
+    data: Mapping[str, ArrayLike],
+    command: str,
+    attributes: Mapping[str, object] | None = None,
+) -> xr.Dataset:
+    """Where the time went: arrays of shape (ranks, stages) in seconds; kind ``timing``."""
+    coords = {"rank": np.arange(np.shape(data["busy"])[0]), "stage": np.array(stages, dtype=str)}
+    return dataset("timing", coords, {**data, "command": command}, attributes)
+
+
+def provenance(scene: str, scene_hash: str) -> dict[str, str]:
+    """Global attributes that say what made a file; no time in them: equal runs, equal bytes."""
+    version = metadata.version("hpcclear")
+    return {
+        "source": f"hpcclear {version}",
+        "history": f"written by hpcclear {version}",
+        "references": _REFERENCE,
+        "scene": scene,
+        "scene_hash": scene_hash,
+        "hpcclear_version": version,
+        "versions": _versions(),
+        "processor": _processor(),
+    }
+
+
+@functools.cache
+def _versions() -> str:
+    found = [f"python {platform.python_version()}"]
+    return ", ".join(found + [f"{name} {metadata.version(name)}" for name in _PACKAGES])
+
+
+@functools.cache
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            for line in file:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        pass  # not Linux
+    return platform.processor() or platform.machine()
+
+
+# -----------------------------------------------------------------------------------------------
+# Files
+
+
+def write(content: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a dataset as NetCDF-4, whole or not at all; equal datasets give equal bytes.
+
+    The file is written under a temporary name in the same directory, synced, and renamed.
+
+    Raises
+    ------
+    InputError
+        The place cannot be written to.
+    StorageError
+        The disk is full or fails; what stood at `path` before still does.
+    """
+    storage.save(content, _path(path))
+
+
+def read(
+    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
+) -> xr.Dataset:
+    """Read a result file into memory and check it against the table.
+
+    Parameters
+    ----------
+    path : path
+    kind : str, optional
+        The kind it must be of; None: any.
+    scene_hash : str, optional
+        The scene it must have been made from; None: any.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        The file is missing, cut off, changed, foreign, of another kind or scene, or says what
+        cannot be.
+    """
+    place = _path(path)
+    content = storage.load(place)
+    fault = _fault(content, kind)
+    if fault is not None:
+        raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")
+    found = content.attrs.get("scene_hash")
+    if scene_hash is not None and found != scene_hash:
+        reason = f"it was made from another scene (hash {str(found)[:12]}, not {scene_hash[:12]})"
+        raise InputError("file", str(place), reason, "Use the results of this scene")
+    return content
+
+
+def _path(path: str | os.PathLike[str]) -> Path:
+    text = os.fspath(path)
+    if "\0" in text:
+        raise InputError("file", text, "a path holds no NUL character", "Choose another name")
+    return Path(text)
+
+
+def _fault(content: xr.Dataset, kind: str | None) -> str | None:
+    """What is wrong with a dataset that was read, or None."""
+    found = content.attrs.get("hpcclear_kind")
+    if not isinstance(found, str) or found not in KINDS:
+        return "it does not say which kind of result it holds"
+    if kind is not None and found != kind:
+        return f"it holds {found}, not {kind}"
+    table = KINDS[found]
+    missing = (table.required | set(table.coords)) - set(content.variables)
+    if missing:
+        return f"it lacks {', '.join(sorted(missing))}"
+    for key, variable in content.variables.items():
+        name = str(key)
+        row = table.coords.get(name) or table.data.get(name)
+        if row is None:
+            roles = {_ROLE: table.design_dims, _LIMIT: table.limit_dims}
+            dims = roles.get(str(variable.attrs.get("role")))
+            if dims is None:
+                return f"it holds {name}, which {found} has not"
+            if not isinstance(variable.attrs.get("scene_path"), str):
+                return f"{name} does not say which scene path it is"
+            row = Variable(dims, "", "", "f8")
+        if variable.dims != row.dims:
+            return f"{name} has dimensions {variable.dims}, not {row.dims}"
+        kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}
+        if variable.dtype.kind != kinds[row.dtype]:
+            return f"{name} has type {variable.dtype}, not {row.dtype}"
+        if name in table.coords and row.dtype == "f8" and not np.isfinite(variable.values).all():
+            return f"{name} is not finite everywhere"
+    return _outcome_fault(content) if "status" in content else None
+
+
+_NUMBERS = [name for name in OUTCOME.names or () if OUTCOME[name].base.kind == "f"]
+
+
+def _outcome_fault(content: xr.Dataset) -> str | None:
+    """Outcomes that cannot be, such as a number in a failed sample."""
+    status = content["status"]
+    if not np.isin(status, [int(code) for code in Status]).all():
+        return "a status is unknown"
+    finished = status == Status.OK
+    if bool((finished & ~np.isfinite(content["objective"])).any()):
+        return "a finished simulation has no objective"
+    for name in _NUMBERS:
+        if name in content and bool((~finished & content[name].notnull()).any()):
+            return f"a failed simulation has a number in {name}"
+    if "sample" in content.coords:
+        samples = content["sample"].to_numpy()
+        if (samples < 0).any() or (np.diff(samples) <= 0).any():
+            return "sample numbers are not in order"
+        if not all(np.isfinite(values).all() for values in designs(content).values()):
+            return "a design is not finite"
+    return None

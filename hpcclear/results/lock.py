@@ -1,0 +1,251 @@
+"""One run at a time in a results directory: a lock that names its holder and outlives no dead one.
+
+The lock is a file with the holder's host, process and batch job. While the holder lives, the
+operating system also holds an advisory lock on that file (flock), which no crash can leave behind;
+it alone decides between runs that start at the same instant. On file systems without flock the
+exclusive creation of the file decides, and what it says about its holder.
+"""
+
+import errno
+import fcntl
+import json
+import os
+import secrets
+import socket
+import subprocess
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from hpcclear.base.errors import InputError
+from hpcclear.results.files import refused
+
+_NO_FLOCK = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
+_ATTEMPTS = 100  # of taking a lock that others keep releasing in between
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who holds a lock; empty text where something is not known."""
+
+    host: str
+    boot: str  # changes when the host restarts
+    pid: int
+    started: str  # start time of the process, in ticks since the boot: tells reused numbers apart
+    job: str  # Slurm job
+    restart: str  # how often Slurm has requeued the job
+
+    @classmethod
+    def this_process(cls) -> "Holder":
+        """The running process."""
+        pid = os.getpid()
+        return cls(
+            host=socket.gethostname(),
+            boot=_boot(),
+            pid=pid,
+            started=_started(pid),
+            job=os.environ.get("SLURM_JOB_ID", ""),
+            restart=os.environ.get("SLURM_RESTART_COUNT", ""),
+        )
+
+    @classmethod
+    def parse(cls, text: bytes) -> "Holder | None":
+        """The holder a lock file names; None when its writer was killed while writing."""
+        try:
+            found = json.loads(text)
+            holder = cls(**{field.name: found[field.name] for field in fields(cls)})
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return None
+        texts = (holder.host, holder.boot, holder.started, holder.job, holder.restart)
+        if not all(isinstance(entry, str) for entry in texts):
+            return None
+        return holder if isinstance(holder.pid, int) and holder.pid > 0 else None
+
+    def is_over(self) -> bool:
+        """Whether the holder is known to be gone; False when that cannot be told."""
+        here = Holder.this_process()
+        if self.host == here.host:
+            return self.boot != here.boot or not _alive(self.pid, self.started)
+        if self.job and self.job == here.job:
+            return self.restart != here.restart  # this very job, requeued on another node
+        return bool(self.job) and _job_is_over(self.job)
+
+    def __str__(self) -> str:
+        job = f", Slurm job {self.job}" if self.job else ""
+        return f"process {self.pid} on {self.host}{job}"
+
+
+def _boot() -> str:
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return ""
+
+
+def _stat(pid: int) -> list[str]:
+    """Fields of /proc/PID/stat from the third, the state, on; empty where it cannot be read."""
+    try:
+        # the second field, the command, may itself hold blanks and brackets
+        return Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def _started(pid: int) -> str:
+    found = _stat(pid)
+    return found[19] if len(found) > 19 else ""
+
+
+def _alive(pid: int, started: str) -> bool:
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass  # somebody else's, so there is one
+    found = _stat(pid)
+    if len(found) <= 19:
+        return True
+    return found[0] not in "ZX" and (started == "" or found[19] == started)
+
+
+def _job_is_over(job: str) -> bool:
+    """Whether Slurm says that the job is not waiting and not running; False without an answer."""
+    if not job.isdecimal():
+        return False
+    command = ["squeue", "--noheader", "--format=%T", "--jobs", job]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    if answer.returncode != 0:
+        return "Invalid job id" in answer.stderr  # Slurm forgets a job some minutes after its end
+    return answer.stdout.strip() == ""
+
+
+class Lock:
+    """A context in which no other run works on a directory.
+
+    Parameters
+    ----------
+    directory : Path
+        The directory, which exists.
+    name : str
+        Name of the lock file in it.
+
+    Raises
+    ------
+    InputError
+        On entry: another run holds the lock, or the directory cannot be written to.
+    StorageError
+        On entry: the disk fails.
+    """
+
+    def __init__(self, directory: Path, name: str = ".hpcclear.lock") -> None:
+        self.path = directory / name
+        self._descriptor: int | None = None
+
+    def __enter__(self) -> Self:
+        self.acquire()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def acquire(self) -> None:
+        """Take the lock or refuse; see the class."""
+        for _ in range(_ATTEMPTS):
+            try:
+                descriptor, created = self._open()
+            except FileNotFoundError:
+                if self.path.parent.is_dir():
+                    continue  # released between two looks
+                raise refused(self.path, OSError(errno.ENOENT, "")) from None
+            except OSError as error:
+                raise refused(self.path, error) from None
+            try:
+                if self._take(descriptor, created):
+                    self._descriptor = descriptor
+                    return
+            except OSError as error:
+                raise refused(self.path, error) from None
+            finally:
+                if self._descriptor != descriptor:
+                    os.close(descriptor)
+        raise self._refusal(None)
+
+    def release(self) -> None:
+        """Give the lock back; nothing happens when it is not held."""
+        if self._descriptor is None:
+            return
+        if self._is_current(self._descriptor):
+            self.path.unlink(missing_ok=True)  # while flock still keeps others out
+        os.close(self._descriptor)
+        self._descriptor = None
+
+    def _open(self) -> tuple[int, bool]:
+        flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        try:
+            return os.open(self.path, flags | os.O_CREAT | os.O_EXCL, 0o644), True
+        except FileExistsError:
+            return os.open(self.path, flags), False
+
+    def _take(self, descriptor: int, created: bool) -> bool:
+        """Make the open file ours: True if it is, False to try again, `InputError` if refused."""
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            guarded = True
+        except BlockingIOError:
+            raise self._refusal(Holder.parse(os.read(descriptor, 4096))) from None
+        except OSError as error:
+            if error.errno not in _NO_FLOCK:
+                raise
+            guarded = False
+        if not self._is_current(descriptor):
+            return False  # its holder released it after we opened it
+        text = os.read(descriptor, 4096)
+        holder = Holder.parse(text)
+        if holder is not None and not holder.is_over():
+            raise self._refusal(holder)
+        if not guarded and not created:
+            if holder is None:
+                raise self._refusal(None)  # being written this moment, or its writer was killed
+            self._bury(text)
+            return False
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, json.dumps(asdict(Holder.this_process())).encode(), 0)
+        os.fsync(descriptor)
+        return True
+
+    def _bury(self, text: bytes) -> None:
+        """Remove a dead run's lock where there is no flock; of several who try, one succeeds."""
+        grave = self.path.with_name(f".hpcclear-lock-{secrets.token_hex(8)}.tmp")
+        try:
+            os.rename(self.path, grave)
+        except FileNotFoundError:
+            return
+        try:
+            if grave.read_bytes() != text:  # a new holder came in between: give it back
+                os.link(grave, self.path)
+        finally:
+            grave.unlink(missing_ok=True)
+
+    def _is_current(self, descriptor: int) -> bool:
+        try:
+            return os.path.samestat(os.fstat(descriptor), os.lstat(self.path))
+        except FileNotFoundError:
+            return False
+
+    def _refusal(self, holder: Holder | None) -> InputError:
+        who = f"{holder} holds it" if holder is not None else "another run is taking it"
+        remedy = (
+            f"Wait for that run or stop it. If it is gone for certain, remove {self.path} "
+            "and run the command again"
+        )
+        return InputError("output", str(self.path.parent), f"{who}", remedy)

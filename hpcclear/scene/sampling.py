@@ -1,0 +1,264 @@
+"""Points to simulate: Latin hypercubes, Monte Carlo samples, and a user's own table.
+
+Every number follows from the study's seed, a purpose ("train", "test", ...) and, for Monte Carlo,
+the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
+"""
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.base.errors import InputError
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import box, slender_inertias, study_of, to_physical
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.table import read_points
+from hpcclear.scene.variables import TAIL, RandomInput
+
+__all__ = [
+    "Points",
+    "check_points",
+    "generator",
+    "latin_hypercube",
+    "monte_carlo",
+    "read_points",
+    "unit_lhs",
+]
+
+Array = NDArray[np.float64]
+
+
+def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
+    """A Latin hypercube in the unit cube: each of `samples` equal strata of each axis holds one
+    point.
+
+    Parameters
+    ----------
+    samples, dimensions : int
+        Shape (n, d) of the result.
+    rng : Generator
+        Source of randomness; it is advanced.
+
+    References
+    ----------
+    McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
+    """
+    from scipy.stats import (
+        qmc,
+    )  # scipy.stats takes most of a second to import; a single response needs none of it
+
+    return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
+
+
+def latin_hypercube(
+    scene: Scene,
+    samples: int | None = None,
+    *,
+    names: Sequence[str] | None = None,
+    widen: Iterable[str] = (),
+    purpose: str = "train",
+) -> Points:
+    """The study's Latin hypercube over its variables.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    samples : int, optional
+        Number of points, `study.samples` by default.
+    names : sequence of str, optional
+        The variables that vary, in the order of the columns, all by default; the others stay as in
+        the scene.
+    widen : iterable of str
+        Random inputs by whose reach the box is widened.
+    purpose : str
+        Designs for different purposes are independent; the same purpose gives the same points.
+
+    Returns
+    -------
+    Points
+        In SI; a variable given as a ratio comes as the inertia it stands for.
+
+    Raises
+    ------
+    InputError
+        If the scene has no study, a name is unknown, or a point makes no mechanism.
+    """
+    study = study_of(scene)
+    count = study.samples if samples is None else samples
+    if count < 1:
+        raise InputError("samples", count, "a design needs at least one point", "Ask for 1 or more")
+    region = box(scene, names, widen)
+    rng = generator(study.seed, f"lhs {purpose}")
+    unit = unit_lhs(count, len(region.names), rng)
+    coordinates = region.lower + unit * (region.upper - region.lower)
+    points = Points(
+        region.names,
+        to_physical(scene, region.names, coordinates),
+        tuple(study.variable(name).paths for name in region.names),
+    )
+    check_points(scene, points)
+    return points
+
+
+def monte_carlo(
+    scene: Scene,
+    samples: int | None = None,
+    *,
+    random: Sequence[str] | None = None,
+    design: Mapping[str, float] | None = None,
+    purpose: str = "train",
+    first: int = 0,
+) -> Points:
+    """Samples `first` to `first + samples` of the study's random inputs.
+
+    Sample k is the same however many are drawn, and each input has a stream of its own, so that a
+    further random input leaves the others as they were.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    samples : int, optional
+        Number of points, `study.samples` by default.
+    random : sequence of str, optional
+        Random inputs in use, all by default; a case's `random` to verify its designs.
+    design : mapping of variable name to SI value, optional
+        Where the design is: columns that are not random hold it, and inputs that follow the design
+        scatter about it. Left out, variables without a distribution are uniform over their range,
+        and inputs scatter about the scene.
+    purpose, first
+        Which stream, and where in it to begin.
+
+    Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
+    """
+    study = study_of(scene)
+    count = study.samples if samples is None else samples
+    if count < 1 or first < 0:
+        reason = "at least one sample, from index 0 on, is needed"
+        raise InputError("samples", count, reason, "Ask for 1 or more")
+    inputs = {row.name: row for row in study.random}
+    chosen = _known("random", inputs if random is None else random, inputs)
+    fixed = (
+        None if design is None else {n: design[n] for n in _known("design", design, study.names)}
+    )
+    free = tuple(name for name in study.names if fixed is None or name in fixed)
+    names = (*free, *(name for name in chosen if name not in free))
+    paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
+    values = np.empty((count, len(names)))
+    for column, name in enumerate(names):
+        uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
+        if name in chosen:
+            centre = (fixed or {}).get(name, scene.number(paths[column][0]))
+            values[:, column] = _quantile(inputs[name], centre, uniform)
+        elif fixed is not None:
+            values[:, column] = fixed[name]
+        else:
+            lower, upper = study.variable(name).bounds
+            values[:, column] = lower + uniform * (upper - lower)
+    if fixed is None:
+        for column, name in enumerate(names):
+            if name not in chosen and study.variable(name).ratio is not None:
+                values[:, column] *= slender_inertias(scene, paths, values, paths[column][0])
+    points = Points(names, values, paths)
+    check_points(scene, points, lambda row: f"sample {first + row}")
+    return points
+
+
+def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str, ...]:
+    chosen = tuple(names)
+    for name in chosen:
+        if name not in known:
+            raise InputError(what, name, "is not one of the study's", f"Use {', '.join(known)}")
+    return chosen
+
+
+def _words(text: str) -> tuple[int, ...]:
+    """A text as words of a spawn key."""
+    return tuple(int(word) for word in np.frombuffer(hashlib.sha256(text.encode()).digest(), "<u4"))
+
+
+def generator(seed: int, *labels: str) -> np.random.Generator:
+    """A stream of random numbers of its own for each purpose, from the study's seed."""
+    return np.random.default_rng(_seed(seed, *labels))
+
+
+def _seed(seed: int, *labels: str) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=sum((_words(label) for label in labels), ()))
+
+
+def _uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array:
+    """Numbers `first` to `first + count` of one stream, strictly between 0 and 1, shape
+    (count,)."""
+    # Philox is counter-based: it can start anywhere. One step of its counter gives four numbers.
+    bits = np.random.Philox(_seed(seed, purpose, name))
+    bits.advance(first // 4)
+    numbers = np.random.Generator(bits).random(first % 4 + count)[first % 4 :]
+    return (
+        numbers + 2.0**-54
+    )  # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
+
+
+def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
+    """Values of a random input about `centre` (or its own) at the given probabilities."""
+    middle = centre if row.centre is None else row.centre
+    if row.distribution == "uniform":
+        return middle + row.reach * (2 * uniform - 1)
+    from scipy.special import (
+        ndtr,
+        ndtri,
+    )  # a quarter of a second to import, which "lhs" does not need
+
+    deviation = row.deviation
+    assert deviation is not None  # by validation
+    if row.distribution == "normal":
+        return middle + deviation * np.clip(ndtri(uniform), -TAIL, TAIL)
+    cut = row.reach / deviation
+    below = ndtr(-cut)
+    return middle + deviation * np.clip(ndtri(below + uniform * (1 - 2 * below)), -cut, cut)
+
+
+_PAGE = 4096  # points made at a time
+_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
+
+
+class MonteCarloPoints:
+    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    total : int
+        Number of points.
+    """
+
+    def __init__(self, scene: Scene, total: int) -> None:
+        self._scene, self._total = scene, total
+        self._pages: OrderedDict[int, Points] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._total
+
+    def page(self, number: int) -> Points:
+        """Points `number` * 4096 and on, at most 4096 of them."""
+        if number not in self._pages:
+            first = number * _PAGE
+            count = min(_PAGE, self._total - first)
+            self._pages[number] = monte_carlo(self._scene, count, first=first)
+            if len(self._pages) > _PAGES:
+                self._pages.popitem(last=False)
+        self._pages.move_to_end(number)
+        return self._pages[number]
+
+    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+        index = np.asarray(index, np.int64)
+        values = np.empty((index.size, len(self.page(0).names)))
+        numbers = index // _PAGE
+        for number in np.unique(numbers).tolist():
+            here = numbers == number
+            values[here] = self.page(number).values[index[here] - number * _PAGE]
+        return values

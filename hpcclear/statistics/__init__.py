@@ -1,0 +1,1 @@
+"""Statistics on arrays: surrogates, sensitivity, random inputs, search, sums of samples."""

@@ -1,0 +1,1 @@
+"""Random inputs: distributions, and the moments of an objective under them."""

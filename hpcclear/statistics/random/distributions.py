@@ -1,0 +1,282 @@
+"""Distributions of random inputs: draws, Gauss rules, integrals of a squared-exponential kernel.
+
+Sources: G. H. Golub and J. H. Welsch, "Calculation of Gauss quadrature rules", Math. Comp. 23
+(1969), doi:10.1090/S0025-5718-69-99647-1; W. Gautschi, "Orthogonal Polynomials" (2004), section 2.2
+(discretised Stieltjes procedure).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf, isfinite, pi, sqrt
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+from scipy.special import ndtr, ndtri, roots_legendre
+
+from hpcclear.base.errors import InputError
+
+TAIL = 6.0
+"""A normal input is taken to reach this many deviations: 2e-9 of it lies beyond, and is clipped."""
+FINE = 400
+"""Legendre nodes of the inner products that define the rule of a truncated normal."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Uniform between `lower` and `upper`."""
+
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _check_limits(self.lower, self.upper)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest value."""
+        return self.lower, self.upper
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Independent draws, ``(size,)``."""
+        return rng.uniform(self.lower, self.upper, size)
+
+    def density(self, x: np.ndarray) -> np.ndarray:
+        """Probability density at `x`, inside the support."""
+        return np.full(np.shape(x), 1.0 / (self.upper - self.lower))
+
+    def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
+        nodes, weights = legendre(count)
+        return self.lower + (self.upper - self.lower) * nodes, weights
+
+    def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
+        """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``, by error functions."""
+        low, high = ((limit - centres) / length for limit in self.support)
+        return sqrt(2 * pi) * length / (self.upper - self.lower) * _normal_between(low, high)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal with the given mean and standard deviation.
+
+    Draws, density and rules are cut off at `TAIL` deviations; `kernel_integral` is of all of it.
+    """
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        _check_normal(self.mean, self.deviation)
+
+    @property
+    def cut(self) -> "TruncatedNormal":
+        """What is left inside the support."""
+        return TruncatedNormal(self.mean, self.deviation, *self.support)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest value that counts: `TAIL` deviations either side."""
+        return self.mean - TAIL * self.deviation, self.mean + TAIL * self.deviation
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Independent draws, ``(size,)``, clipped to the support."""
+        return np.clip(rng.normal(self.mean, self.deviation, size), *self.support)
+
+    def density(self, x: np.ndarray) -> np.ndarray:
+        """Probability density at `x`, inside the support."""
+        return self.cut.density(x)
+
+    def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
+        return self.cut.rule(count)  # Hermite nodes would go beyond the support
+
+    def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
+        """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``."""
+        return _normal_kernel_integral(self.mean, self.deviation, centres, length, -inf, inf)
+
+
+@dataclass(frozen=True)
+class TruncatedNormal:
+    """Normal with the given mean and standard deviation, cut off at `lower` and `upper`."""
+
+    mean: float
+    deviation: float
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _check_normal(self.mean, self.deviation)
+        _check_limits(self.lower, self.upper)
+        if self._mass < 1e-9:
+            raise InputError(
+                "lower, upper",
+                (self.lower, self.upper),
+                "hold less than 1e-9 of the normal distribution",
+                "choose limits nearer to its mean",
+            )
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest value."""
+        return self.lower, self.upper
+
+    @property
+    def _limits(self) -> tuple[float, float]:
+        return (self.lower - self.mean) / self.deviation, (self.upper - self.mean) / self.deviation
+
+    @property
+    def _mass(self) -> float:
+        low, high = self._limits
+        return float(_normal_between(np.float64(low), np.float64(high)))
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Independent draws, ``(size,)``, by inversion."""
+        low, high = self._limits
+        side = (
+            1.0 if low < 0 else -1.0
+        )  # an upper tail is inverted as a lower one, to keep its digits
+        low, high = min(side * low, side * high), max(side * low, side * high)
+        chance = ndtr(low) + (ndtr(high) - ndtr(low)) * rng.random(size)
+        return np.clip(self.mean + self.deviation * side * ndtri(chance), self.lower, self.upper)
+
+    def density(self, x: np.ndarray) -> np.ndarray:
+        """Probability density at `x`, inside the support."""
+        return _bell((x - self.mean) / self.deviation) / (self.deviation * self._mass)
+
+    def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
+        nodes, weights = _truncated_rule(*self._limits, count)
+        return np.clip(self.mean + self.deviation * nodes, self.lower, self.upper), weights
+
+    def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
+        """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``."""
+        mean, deviation = self.mean, self.deviation
+        whole = _normal_kernel_integral(mean, deviation, centres, length, self.lower, self.upper)
+        return whole / self._mass
+
+
+Distribution = Uniform | Normal | TruncatedNormal
+
+
+@lru_cache(maxsize=64)
+def legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights (they add up to 1) of the Gauss-Legendre rule on [0, 1]; read-only."""
+    nodes, weights = roots_legendre(count)
+    nodes, weights = 0.5 * (1.0 + nodes), 0.5 * weights
+    nodes.setflags(write=False)
+    weights.setflags(write=False)
+    return nodes, weights
+
+
+def piece_rule(
+    distribution: Distribution, count: int, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rules over the part of the support between limits, ``(n, count)`` nodes and weights.
+
+    The weights of a row add up to the probability of its part: 0 where the limits leave nothing.
+    """
+    low, high = distribution.support
+    low, high = np.maximum(lower, low)[:, None], np.minimum(upper, high)[:, None]
+    width = np.maximum(high - low, 0.0)
+    nodes, weights = legendre(count)
+    places = low + width * nodes
+    return places, width * weights * distribution.density(places)
+
+
+def nodes_needed(
+    distribution: Distribution, length: float, tolerance: float, most: int, *, pieces: bool = False
+) -> int:
+    """Fewest nodes that integrate every kernel, and every product of two, to `tolerance`.
+
+    Second moments need the product of two kernels of length scale l, which is one of l / sqrt(2)
+    about the middle of their centres (times a factor <= 1): so that narrower kernel is tested, with
+    its centre all over the support and three length scales beyond.
+
+    Parameters
+    ----------
+    length : float
+        Length scale, in the unit of the distribution.
+    tolerance : float
+        Absolute; the kernel itself is at most 1.
+    most : int
+        Where to give up.
+    pieces : bool
+        Whether for `piece_rule` instead of the distribution's Gauss rule.
+
+    Returns
+    -------
+    int
+        0 if `most` nodes are not enough.
+    """
+    narrow = length / sqrt(2)
+    low, high = distribution.support
+    centres = np.linspace(low - 3 * narrow, high + 3 * narrow, 201)
+    within = distribution.cut if isinstance(distribution, Normal) else distribution
+    exact = within.kernel_integral(centres, narrow)
+    ends = np.array([low]), np.array([high])
+    for count in range(1, most + 1):
+        if pieces:
+            nodes, weights = (a[0] for a in piece_rule(distribution, count, *ends))
+        else:
+            nodes, weights = distribution.rule(count)
+        kernels = np.exp(-0.5 * ((nodes[:, None] - centres) / narrow) ** 2)
+        if abs(weights @ kernels - exact).max() <= tolerance:
+            return count
+    return 0
+
+
+@lru_cache(maxsize=256)
+def _truncated_rule(low: float, high: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss rule of the standard normal cut off at two limits (discretised Stieltjes)."""
+    low, high = max(low, -TAIL - 3), min(high, TAIL + 3)
+    nodes, weights = legendre(FINE)
+    x = low + (high - low) * nodes
+    weights = weights * np.exp(-0.5 * (x**2 - np.min(x**2)))
+    weights = weights / weights.sum()
+    diagonal, side = np.zeros(count), np.zeros(count)
+    before, now = np.zeros_like(x), np.ones_like(x)
+    for k in range(count):
+        diagonal[k] = weights @ (x * now**2)
+        following = (x - diagonal[k]) * now - side[k] * before
+        norm = sqrt(weights @ following**2)
+        before, now = now, following / norm
+        if k + 1 < count:
+            side[k + 1] = norm
+    places, vectors = eigh_tridiagonal(diagonal, side[1:])
+    return places, vectors[0] ** 2 / (vectors[0] ** 2).sum()
+
+
+def _normal_between(low: np.ndarray | np.float64, high: np.ndarray | np.float64) -> np.ndarray:
+    """Probability of a standard normal between limits, keeping its digits in the upper tail."""
+    flip = low > 0
+    low, high = np.where(flip, -high, low), np.where(flip, -low, high)
+    return ndtr(high) - ndtr(low)
+
+
+def _normal_kernel_integral(
+    mean: float, deviation: float, centres: np.ndarray, length: float, lower: float, upper: float
+) -> np.ndarray:
+    """Integral of normal density times kernel between limits: the product is normal again."""
+    width = sqrt(deviation**2 + length**2)
+    narrow = deviation * length / width
+    middle = (mean * length**2 + np.asarray(centres) * deviation**2) / width**2
+    height = length / width * np.exp(-0.5 * ((centres - mean) / width) ** 2)
+    return height * _normal_between((lower - middle) / narrow, (upper - middle) / narrow)
+
+
+def _bell(z: np.ndarray) -> np.ndarray:
+    return np.exp(-0.5 * np.square(z)) / sqrt(2 * pi)
+
+
+def _check_limits(lower: float, upper: float) -> None:
+    if not (isfinite(lower) and isfinite(upper) and lower < upper):
+        raise InputError(
+            "lower, upper", (lower, upper), "crossed or not finite", "give lower < upper"
+        )
+
+
+def _check_normal(mean: float, deviation: float) -> None:
+    if not (isfinite(mean) and isfinite(deviation) and deviation > 0):
+        raise InputError(
+            "mean, deviation", (mean, deviation), "no normal distribution", "give a deviation > 0"
+        )

@@ -1,0 +1,167 @@
+"""Random inputs of a surrogate, and how they and the design reach the surrogate's inputs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.random.distributions import Distribution
+
+
+@dataclass(frozen=True)
+class RandomInput:
+    """An input that scatters, independently of the others.
+
+    Attributes
+    ----------
+    name : str
+    distribution : Uniform, Normal or TruncatedNormal
+        Of the value, or of the offset from the design.
+    about_design : bool
+        Whether the distribution is an offset added to the design variable of this name.
+    """
+
+    name: str
+    distribution: Distribution
+    about_design: bool = False
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A model input computed from others.
+
+    Attributes
+    ----------
+    name : str
+        The model's input.
+    of : tuple of str
+        What it depends on: design variables, random or fixed inputs.
+    function : callable
+        Arrays of those, in this order, to an array of the same (broadcast) shape. It must take its
+        extremes at the corners of the random inputs' box (be monotone in each), since there it
+        is checked that the support stays inside the model's domain.
+    """
+
+    name: str
+    of: tuple[str, ...]
+    function: Callable[..., np.ndarray]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Model inputs that share random sources: one tensor rule."""
+
+    dims: tuple[int, ...]
+    sources: tuple[str, ...]  # the random inputs
+    moves: bool  # with the design
+
+
+class Wiring:
+    """Who feeds whom: design variables, random and fixed inputs to the model's inputs."""
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        design_names: Sequence[str],
+        random_inputs: Sequence[RandomInput],
+        fixed: Mapping[str, float],
+        derived: Sequence[Derived],
+    ) -> None:
+        self.names = tuple(names)
+        self.column = {name: k for k, name in enumerate(design_names)}
+        self.random = {one.name: one for one in random_inputs}
+        self.fixed = dict(fixed)
+        self.derived = {one.name: one for one in derived}
+        self._check(design_names, random_inputs)
+        self.groups = self._grouped()
+
+    def _sources(self, name: str) -> tuple[str, ...]:
+        return self.derived[name].of if name in self.derived else (name,)
+
+    def _check(self, design_names: Sequence[str], random_inputs: Sequence[RandomInput]) -> None:
+        if len(self.column) != len(design_names) or len(self.random) != len(random_inputs):
+            names = [*design_names, *(one.name for one in random_inputs)]
+            raise InputError("design_names, random_inputs", names, "a name twice", "name each once")
+        if not self.column:
+            raise InputError("design_names", design_names, "empty", "name the design variables")
+        used = {source for name in self.names for source in self._sources(name)}
+        for name in used - self.column.keys() - self.random.keys() - self.fixed.keys():
+            raise InputError(name, None, "the surrogate needs it and nothing gives it", "fix it")
+        for name in [*self.column, *self.random, *self.derived]:
+            if name not in used and name not in self.names:
+                raise InputError(name, None, "the surrogate does not depend on it", "leave it out")
+        for name in self.fixed.keys() & (self.column.keys() | self.random.keys()):
+            raise InputError(name, self.fixed[name], "fixed and variable at once", "choose one")
+        for name, one in self.random.items():
+            if one.about_design != (name in self.column):
+                reason = "not a design variable" if one.about_design else "also a design variable"
+                raise InputError(name, one.distribution, reason, "set about_design to match")
+
+    def _grouped(self) -> tuple[Group, ...]:
+        """Inputs joined while they share a random source; those without any are taken together."""
+        parts: list[tuple[list[int], set[str]]] = []
+        calm: dict[bool, list[int]] = {True: [], False: []}
+        for dim, name in enumerate(self.names):
+            sources = {source for source in self._sources(name) if source in self.random}
+            if not sources:
+                calm[any(s in self.column for s in self._sources(name))].append(dim)
+                continue
+            joined = [part for part in parts if part[1] & sources]
+            parts = [part for part in parts if not part[1] & sources]
+            dims = sorted([dim, *(d for part in joined for d in part[0])])
+            parts.append((dims, sources.union(*(part[1] for part in joined))))
+        groups = [
+            Group(
+                tuple(dims),
+                tuple(name for name in self.random if name in sources),
+                any(s in self.column for d in dims for s in self._sources(self.names[d])),
+            )
+            for dims, sources in parts
+        ]
+        return tuple(groups) + tuple(
+            Group(tuple(dims), (), moves) for moves, dims in calm.items() if dims
+        )
+
+    def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Independent draws of every random input, ``(1, samples)`` each."""
+        return {
+            name: one.distribution.draw(samples, rng)[None] for name, one in self.random.items()
+        }
+
+    def corners(self, group: Group) -> dict[str, np.ndarray]:
+        """The corners of a group's box of random inputs, as draws: an array of shape (corners,) for each input."""
+        ends = [np.array([self.random[name].distribution.support]) for name in group.sources]
+        return dict(zip(group.sources, tensor(ends), strict=True))
+
+    def places(
+        self, dims: Sequence[int], designs: np.ndarray, draws: Mapping[str, np.ndarray]
+    ) -> np.ndarray:
+        """Model inputs `dims`, ``(n, s, len(dims))``, of n designs and draws ``(n or 1, s)``."""
+
+        def value(name: str) -> np.ndarray:
+            if name in self.random and not self.random[name].about_design:
+                return draws[name]
+            if name in self.fixed:
+                return np.full((1, 1), self.fixed[name])
+            at_design = designs[:, self.column[name], None]
+            return at_design + draws[name] if name in self.random else at_design
+
+        size = max((array.shape[1] for array in draws.values()), default=1)
+        out = np.empty((len(designs), size, len(dims)))
+        for k, dim in enumerate(dims):
+            name = self.names[dim]
+            arguments = [value(source) for source in self._sources(name)]
+            made = self.derived[name].function(*arguments) if name in self.derived else arguments[0]
+            out[:, :, k] = made
+        return out
+
+
+def tensor(axes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Node arrays of shape ``(n or 1, N_k)`` of several axes over their tensor, last axis fastest."""
+    out = []
+    for k, axis in enumerate(axes):
+        after = int(np.prod([other.shape[1] for other in axes[k + 1 :]], dtype=int))
+        before = int(np.prod([other.shape[1] for other in axes[:k]], dtype=int))
+        out.append(np.tile(np.repeat(axis, after, axis=1), (1, before)))
+    return out

@@ -1,0 +1,224 @@
+"""Mean and deviation of a Kriging mean under random inputs (eqs. 19 to 21).
+
+Three ways, each a check on the others:
+
+- tensor Gauss rules (`RobustObjective`, the default): the kernel is a product over the inputs, so
+  N1 x N2 x ... nodes cost little more than N1 + N2 + ... kernels; no sampling noise;
+- Monte Carlo with standard errors, the paper's way;
+- the closed form in error functions, for independent inputs of one model.
+
+Random inputs are independent. They may stand for the model's inputs themselves or act through
+`Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
+and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel
+is still a product over the groups.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.random.inputs import Derived, RandomInput, Wiring
+from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
+from hpcclear.statistics.surrogate.kriging import inside
+
+
+@dataclass(frozen=True, eq=False)
+class SampledMoments:
+    """Monte Carlo estimates, an array over the designs each.
+
+    Attributes
+    ----------
+    mean, deviation : (n,) arrays
+    mean_error, deviation_error : (n,) arrays
+        Standard errors.
+    """
+
+    mean: np.ndarray
+    deviation: np.ndarray
+    mean_error: np.ndarray
+    deviation_error: np.ndarray
+
+
+def sample_moments(values: np.ndarray) -> SampledMoments:
+    """Mean and deviation of independent samples, with standard errors.
+
+    Parameters
+    ----------
+    values : (n, s) array
+        s samples of each of n quantities.
+
+    Raises
+    ------
+    InputError
+        Fewer than four samples.
+
+    Notes
+    -----
+    The variance of the variance estimate is (m4 - s^4 (s - 3) / (s - 1)) / s, m4 the fourth central
+    moment; the deviation's follows to first order.
+    """
+    count = values.shape[1]
+    if count < 4:
+        raise InputError("samples", count, "too few for a standard error", "draw at least 4")
+    mean = values.mean(axis=1)
+    steps = values - mean[:, None]
+    variance = np.square(steps).sum(axis=1) / (count - 1)
+    fourth = np.square(np.square(steps)).mean(axis=1)
+    spread = np.maximum(fourth - variance**2 * (count - 3) / (count - 1), 0.0) / count
+    deviation = np.sqrt(variance)
+    twice = np.where(deviation > 0, 2 * deviation, 1.0)
+    return SampledMoments(mean, deviation, deviation / sqrt(count), np.sqrt(spread) / twice)
+
+
+class RobustObjective:
+    """Mean and deviation of a surrogate under random inputs, for whole swarms of designs.
+
+    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
+    surrogate. The result of a design does not depend on the others in the call.
+
+    On a `PiecewiseKriging` the rules are split at the borders of the boxes (each piece is smooth);
+    this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
+    ``method="monte-carlo"``.
+
+    Parameters
+    ----------
+    model : Kriging or PiecewiseKriging
+    design_names : sequence of str
+        Names of the design variables, in the order of their columns.
+    random_inputs : sequence of RandomInput
+    fixed : mapping of str to float, optional
+        Values of inputs that are neither.
+    derived : sequence of Derived, optional
+        Model inputs that are computed from design variables and random inputs.
+    probes : (m, k) array, optional
+        Designs at which the nodes of derived inputs are chosen; spread them over the design space.
+        Needed only where a derived input depends on a random one.
+    method : {"quadrature", "monte-carlo"}
+    tolerance : float
+        Absolute error allowed in the integral of any kernel (at most 1) over one random input.
+    samples : int
+        Of "monte-carlo"; all designs see the same draws, so that their ranking is not noise.
+    rng : numpy Generator, optional
+        Draws them; needed for "monte-carlo" only.
+
+    Attributes
+    ----------
+    nodes : tuple of dict
+        For each model of the surrogate, the nodes of each random input.
+
+    Raises
+    ------
+    InputError
+        Names that do not fit together, a random input too wide for the tolerance, derived random
+        inputs on a piecewise model; and on a call, a support that leaves the surrogate's domain.
+    """
+
+    def __init__(
+        self,
+        model: Surrogate,
+        design_names: Sequence[str],
+        random_inputs: Sequence[RandomInput],
+        *,
+        fixed: Mapping[str, float] | None = None,
+        derived: Sequence[Derived] = (),
+        probes: np.ndarray | None = None,
+        method: str = "quadrature",
+        tolerance: float = 1e-8,
+        samples: int = 1000,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        if method not in ("quadrature", "monte-carlo"):
+            raise InputError("method", method, "unknown", "use quadrature or monte-carlo")
+        self.model = model
+        self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
+        self._draws: dict[str, np.ndarray] | None = None
+        self._rules: tuple[TensorRule, ...] = ()
+        if method == "monte-carlo":
+            if rng is None:
+                raise InputError("rng", None, "needed for Monte Carlo", "pass a numpy Generator")
+            self._draws = self._wiring.draw(samples, rng)
+        else:
+            self._rules = tuple(
+                TensorRule(leaf, model, self._wiring, tolerance, probes) for leaf in model.leaves
+            )
+        self.nodes = tuple(rule.counts for rule in self._rules)
+
+    def __call__(self, designs: np.ndarray) -> np.ndarray:
+        designs = self._checked(designs)
+        if self._draws is not None:
+            moments = sample_moments(self._sampled(designs, self._draws))
+            return np.stack([moments.mean, moments.deviation], axis=1)
+        share, mean, variance = (np.zeros((len(self._rules), len(designs))) for _ in range(3))
+        for k, rule in enumerate(self._rules):
+            share[k], mean[k], variance[k] = rule.moments(designs)
+        share /= share.sum(axis=0)
+        total = (share * mean).sum(axis=0)
+        spread = (share * (variance + (mean - total) ** 2)).sum(axis=0)
+        return np.stack([total, np.sqrt(spread)], axis=1)
+
+    def monte_carlo(
+        self, designs: np.ndarray, samples: int, rng: np.random.Generator
+    ) -> SampledMoments:
+        """The same by Monte Carlo, `samples` fresh draws that all designs share, with errors."""
+        designs = self._checked(designs)
+        return sample_moments(self._sampled(designs, self._wiring.draw(samples, rng)))
+
+    def closed_form(self, designs: np.ndarray) -> np.ndarray:
+        """The same in error functions, ``(n, 2)``: one `Kriging` model, no derived inputs."""
+        designs = self._checked(designs)
+        if len(self.model.leaves) > 1 or self._wiring.derived:
+            raise InputError(
+                "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
+            )
+        return np.array([self._closed(design) for design in designs]).reshape(-1, 2)
+
+    def _checked(self, designs: np.ndarray) -> np.ndarray:
+        """Designs as floats, after checking that their random inputs stay inside the domain."""
+        designs = np.ascontiguousarray(designs, dtype=np.float64)
+        wiring, model = self._wiring, self.model
+        if designs.ndim != 2 or designs.shape[1] != len(wiring.column):
+            expected = f"(n, {len(wiring.column)})"
+            raise InputError("designs", designs.shape, "wrong shape", f"give shape {expected}")
+        low, high = (np.empty((len(designs), len(model.names))) for _ in range(2))
+        for group in wiring.groups:
+            corners = wiring.places(group.dims, designs, wiring.corners(group))
+            low[:, group.dims], high[:, group.dims] = corners.min(axis=1), corners.max(axis=1)
+        for ends in (low, high):
+            inside(ends, model.names, model.lower, model.upper)
+        return designs
+
+    def _sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The surrogate at all draws of each design, ``(n, s)``, design by design for memory."""
+        dims = range(len(self.model.names))
+        size = max((array.shape[1] for array in draws.values()), default=1)
+        values = np.empty((len(designs), size))
+        for k in range(len(designs)):
+            places = self._wiring.places(dims, designs[k : k + 1], draws)
+            values[k] = self.model.predict(places[0])
+        return values
+
+    def _closed(self, design: np.ndarray) -> tuple[float, float]:
+        leaf, wiring = self.model.leaves[0], self._wiring
+        weights = leaf.scale * leaf.signal_variance * leaf.alpha
+        lengths = leaf.length_scales * (leaf.upper - leaf.lower)
+        single, double = np.ones(weights.size), np.ones((weights.size, weights.size))
+        for dim, name in enumerate(leaf.names):
+            length, about = lengths[dim], leaf.inputs[:, dim]
+            if name in wiring.random:
+                one = wiring.random[name]
+                if one.about_design:
+                    about = about - design[wiring.column[name]]
+                single *= one.distribution.kernel_integral(about, length)
+                apart = np.exp(-0.25 * ((about[:, None] - about) / length) ** 2)
+                middle = 0.5 * (about[:, None] + about)
+                double *= apart * one.distribution.kernel_integral(middle, length / sqrt(2))
+            else:
+                at = wiring.fixed[name] if name in wiring.fixed else design[wiring.column[name]]
+                row = np.exp(-0.5 * ((at - about) / length) ** 2)
+                single *= row
+                double *= row[:, None] * row
+        mean = float(weights @ single)
+        return leaf.mean + mean, sqrt(max(float(weights @ double @ weights) - mean**2, 0.0))

@@ -1,0 +1,1 @@
+"""The multi-objective swarm, and what dominates what."""

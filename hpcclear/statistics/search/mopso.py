@@ -1,0 +1,406 @@
+"""Multi-objective particle swarm (the paper's eqs. 22-23) with an archive of the best designs.
+
+The swarm is the paper's: learning factors c1 = c2 = 1.8, inertia weight falling linearly from 1.2
+to 0.1, r1 and r2 one random number each per particle. What the paper leaves open is fixed here, one
+setting for all problems:
+
+- **Archive**: the feasible non-dominated points met, thinned where crowded (`pareto.Archive`).
+- **Leaders** (P_g): tournaments of `tournament` archive members; the loneliest one wins.
+- **Personal best** (P): the newest point, unless the old one dominates or equals it.
+- **Bounds**: speeds clipped at `speed_limit` of each range; a particle that leaves is put on the
+  bound and that component of its velocity is reversed.
+- **Mutation** (an addition: the paper's text does without): on average `mutation_share` of the
+  particles continue from a child of two archive members (the leader and another, coordinates
+  mixed at random) with polynomial mutation (Deb & Goyal 1996) in one coordinate on average. Their
+  velocity is kept. It keeps the swarm from collapsing to one point and pays off most with many
+  variables; `mutation_share=0` leaves eqs. 22-23 alone.
+- **Constraints** (Deb 2000, doi:10.1016/S0045-7825(99)00389-8): feasible beats infeasible, among
+  infeasible points the smaller total violation wins. A point whose objectives are not all finite
+  is infeasible, without limit if no violation was given. Only feasible points enter the archive.
+- **Front**: the archive cut to the size asked for (`pareto.cut`).
+
+All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.search import generator_state as rng_state
+from hpcclear.statistics.search.pareto import (
+    Archive,
+    Floats,
+    Front,
+    cut,
+    hypervolume,
+    relative_gain,
+)
+
+_SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
+_ARRAYS = (
+    "positions",
+    "velocities",
+    "personal_positions",
+    "personal_values",
+    "personal_violations",
+    "earlier_values",
+    "history",
+    "lower",
+    "upper",
+    "reference",
+)
+_COUNTS = ("iterations", "iteration", "evaluations", "failed", "infeasible")
+
+
+@dataclass(frozen=True)
+class SwarmSettings:
+    """The defaults are the one documented setting; raises `InputError` for senseless values."""
+
+    particles: int = 100
+    c1: float = 1.8  # pull to the particle's own best
+    c2: float = 1.8  # pull to its leader
+    inertia_first: float = 1.2  # w_max of eq. 23
+    inertia_last: float = 0.1  # w_min of eq. 23
+    speed_limit: float = 0.5  # of each variable's range, per iteration
+    mutation_share: float = 0.2
+    mutation_index: float = 20.0  # of the polynomial distribution; larger is nearer
+    archive_capacity: int = 400
+    tournament: int = 3
+
+    def __post_init__(self) -> None:
+        for key in ("particles", "archive_capacity", "tournament"):
+            _whole(f"swarm.{key}", getattr(self, key))
+        for key in ("c1", "c2", "inertia_first", "inertia_last", "mutation_index"):
+            _within(f"swarm.{key}", getattr(self, key), np.inf)
+        _within("swarm.speed_limit", self.speed_limit, 1.0)
+        _within("swarm.mutation_share", self.mutation_share, 1.0)
+
+
+class Swarm:
+    """A particle swarm that asks for points to evaluate and is told their objectives.
+
+    Parameters
+    ----------
+    bounds : array_like, shape (d, 2)
+        Lower and upper bound of each variable.
+    iterations : int
+        Number of `tell` calls; sets the slope of the inertia weight (k_max of eq. 23).
+    rng : numpy.random.Generator
+        Owned by the swarm from here on.
+    settings : SwarmSettings, optional
+    start : array_like, shape (k, d), optional
+        Known designs that replace the first k random particles.
+    reference : array_like, shape (m,), optional
+        Reference point of the hypervolume in `history`; without it no history is kept.
+
+    Raises
+    ------
+    InputError
+        For bounds that are not finite or cross, or start points outside them.
+    """
+
+    def __init__(
+        self,
+        bounds: ArrayLike,
+        iterations: int,
+        rng: np.random.Generator,
+        *,
+        settings: SwarmSettings | None = None,
+        start: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
+    ) -> None:
+        _whole("iterations", iterations)
+        self.settings = SwarmSettings() if settings is None else settings
+        self._lower, self._upper = _checked_bounds(bounds)
+        self.iterations = int(iterations)
+        self.iteration = 0
+        self.evaluations = self.failed = self.infeasible = 0
+        self._rng = rng
+        self._reference = (
+            np.empty(0) if reference is None else np.atleast_1d(np.array(reference, dtype=float))
+        )
+        shape = (self.settings.particles, len(self._lower))
+        self._positions: Floats = rng.random(shape)
+        if start is not None:
+            self._place(np.array(start, dtype=float))
+        self._velocities: Floats = np.zeros(shape)
+        self._personal_positions: Floats = self._positions.copy()
+        self._personal_values: Floats = np.empty((shape[0], 0))
+        self._personal_violations: Floats = np.full(shape[0], np.inf)
+        self._archive = Archive(
+            self.settings.archive_capacity, np.empty((0, shape[1])), np.empty((0, 0))
+        )
+        self._earlier_values: Floats = np.empty((0, 0))
+        self._history: Floats = np.empty(0)
+
+    @property
+    def done(self) -> bool:
+        """Whether all iterations have been told."""
+        return self.iteration >= self.iterations
+
+    def ask(self) -> Floats:
+        """Points to evaluate, shape (particles, d); the same ones until `tell` is called."""
+        return self._points(self._positions)
+
+    def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
+        """Take the objectives of the points asked for and move the swarm on.
+
+        Parameters
+        ----------
+        values : array_like, shape (n, m)
+            Objectives, minimised; a row with a number that is not finite is infeasible.
+        violations : array_like, shape (n,) or (n, c), optional
+            Constraint violations, > 0 where broken; c constraints are summed. NaN is infinite.
+
+        Raises
+        ------
+        InputError
+            For wrong shapes, or when all iterations are done.
+        """
+        if self.done:
+            raise InputError(
+                "iterations",
+                self.iterations,
+                "the swarm has had all its iterations",
+                "Start another one with start=front.points.",
+            )
+        told, total = self._checked(values, violations)
+        self._remember(told, total)
+        feasible = total == 0.0
+        self._archive.add(self._positions[feasible], told[feasible])
+        self.iteration += 1
+        if len(self._reference):
+            grown = hypervolume(self._archive.values, self._reference)
+            self._history = np.append(self._history, grown)
+        if self.iteration == self.iterations - max(1, self.iterations // 10):
+            self._earlier_values = self._archive.values.copy()
+        if not self.done:
+            self._move()
+
+    def front(self, size: int = 100) -> Front:
+        """The best points so far, at most `size` (not below the number of objectives)."""
+        objectives = self._archive.values.shape[1]
+        if size < max(1, objectives):
+            raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
+        kept = cut(self._archive.values, size)
+        if len(kept):
+            kept = kept[np.lexsort(self._archive.values[kept].T[::-1])]
+        gain = self._gain()
+        return Front(
+            points=self._points(self._archive.positions[kept]),
+            values=self._archive.values[kept],
+            evaluations=self.evaluations,
+            failed=self.failed,
+            infeasible=self.infeasible,
+            history=self._history.copy(),
+            gain=gain,
+            settled=bool(self.done and gain < _SETTLED),
+            remark=self._remark(gain),
+        )
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything the swarm knows, random generator included, as plain arrays (no objects)."""
+        state = {name: getattr(self, f"_{name}").copy() for name in _ARRAYS}
+        state["archive_positions"] = self._archive.positions.copy()
+        state["archive_values"] = self._archive.values.copy()
+        state["counts"] = np.array([getattr(self, name) for name in _COUNTS], dtype=np.int64)
+        state["settings"] = np.array([float(value) for value in asdict(self.settings).values()])
+        state["generator"] = rng_state.to_array(self._rng)
+        return state
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, np.ndarray]) -> Self:
+        """A swarm that goes on, bit for bit, where the one that gave `state` stood."""
+        names = {*_ARRAYS, "archive_positions", "archive_values", "counts", "settings", "generator"}
+        if names - set(state):
+            found = sorted(state)
+            raise InputError("swarm state", found, "entries missing", "Save all of Swarm.state().")
+        swarm = cls.__new__(cls)  # the constructor would draw from the generator
+        swarm._rng = rng_state.from_array(state["generator"])
+        kinds = [type(value) for value in asdict(SwarmSettings()).values()]
+        told = zip(kinds, state["settings"], strict=True)
+        swarm.settings = SwarmSettings(*(kind(value) for kind, value in told))
+        for name, count in zip(_COUNTS, state["counts"], strict=True):
+            setattr(swarm, name, int(count))
+        for name in _ARRAYS:
+            setattr(swarm, f"_{name}", np.array(state[name], dtype=float))
+        swarm._archive = Archive(
+            swarm.settings.archive_capacity,
+            np.array(state["archive_positions"], dtype=float),
+            np.array(state["archive_values"], dtype=float),
+        )
+        shape = (swarm.settings.particles, len(swarm._lower))
+        if {swarm._positions.shape, swarm._velocities.shape} != {shape}:
+            raise InputError("swarm state", shape, "shapes differ", "Give what state() gave.")
+        return swarm
+
+    def _place(self, start: Floats) -> None:
+        """Put known designs in the place of the first particles."""
+        known = np.atleast_2d(start)
+        if known.shape[1] != len(self._lower) or len(known) > len(self._positions):
+            remedy = f"Give at most {len(self._positions)} points of {len(self._lower)} variables."
+            raise InputError("start", known.shape, "wrong shape", remedy)
+        if not np.all((known >= self._lower) & (known <= self._upper)):
+            raise InputError("start", known.tolist(), "outside the bounds", "Widen the bounds.")
+        self._positions[: len(known)] = (known - self._lower) / (self._upper - self._lower)
+
+    def _points(self, unit: Floats) -> Floats:
+        # this form meets both bounds exactly; the clip removes the last rounding error inside
+        return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
+
+    def _checked(self, values: ArrayLike, violations: ArrayLike | None) -> tuple[Floats, Floats]:
+        """Objectives (n, m) and total violation (n,), infinite where the objectives failed."""
+        told = np.array(values, dtype=float)
+        told = told[:, None] if told.ndim == 1 else told
+        particles, known = self._personal_values.shape
+        if told.ndim != 2 or len(told) != particles or told.shape[1] != (known or told.shape[1]):
+            remedy = f"Give ({particles}, {known or 'm'}) objectives."
+            raise InputError("values", told.shape, "wrong shape", remedy)
+        if len(self._reference) not in (0, told.shape[1]) or told.shape[1] == 0:
+            found = (len(self._reference), told.shape[1])
+            raise InputError("reference, values", found, "lengths differ", "Give m >= 1 of each.")
+        total = np.zeros(particles)
+        if violations is not None:
+            broken = np.array(violations, dtype=float)
+            if broken.shape[:1] != (particles,):
+                raise InputError("violations", broken.shape, "wrong shape", "Give a row per point.")
+            broken = np.where(np.isnan(broken), np.inf, np.maximum(broken, 0.0))
+            total = broken.reshape(particles, -1).sum(axis=1)
+        failed = ~np.isfinite(told).all(axis=1)
+        self.evaluations += particles
+        self.failed += int(failed.sum())
+        self.infeasible += int((~failed & (total > 0.0)).sum())
+        # a model that skips the objectives of an infeasible point still gives its violation
+        return told, np.where(failed & (total == 0.0), np.inf, total)
+
+    def _remember(self, values: Floats, total: Floats) -> None:
+        """Update the personal bests: the new point unless the old one is better or equal."""
+        if self._personal_values.shape[1] == 0:
+            self._personal_values = np.full_like(values, np.nan)
+        old, old_total = self._personal_values, self._personal_violations
+        both_feasible = (old_total == 0.0) & (total == 0.0)
+        taken = ~((old_total < total) | (both_feasible & (old <= values).all(axis=1)))
+        self._personal_positions[taken] = self._positions[taken]
+        self._personal_values[taken] = values[taken]
+        self._personal_violations[taken] = total[taken]
+
+    def _leaders(self) -> tuple[Floats, Floats]:
+        """Positions that guide and how lonely each is; without an archive, the least violating."""
+        if len(self._archive):
+            return self._archive.positions, self._archive.loneliness()
+        return self._personal_positions, -self._personal_violations
+
+    def _move(self) -> None:
+        """Equations 22 and 23, bounds and mutation."""
+        s, rng = self.settings, self._rng
+        particles = len(self._positions)
+        elite, merit = self._leaders()
+        drawn = rng.integers(len(elite), size=(particles, s.tournament))
+        leader = elite[drawn[np.arange(particles), merit[drawn].argmax(axis=1)]]
+
+        fall = (s.inertia_first - s.inertia_last) * self.iteration / self.iterations
+        r1, r2 = rng.random((2, particles, 1))  # one number a particle, as eq. 22 has it
+        speed = (
+            (s.inertia_first - fall) * self._velocities
+            + s.c1 * r1 * (self._personal_positions - self._positions)
+            + s.c2 * r2 * (leader - self._positions)
+        )
+        speed = np.clip(speed, -s.speed_limit, s.speed_limit)
+        moved = self._positions + speed
+        left = (moved < 0.0) | (moved > 1.0)
+        self._velocities = np.where(left, -speed, speed)
+        self._positions = np.clip(moved, 0.0, 1.0)
+
+        chosen = np.flatnonzero(rng.random(particles) < s.mutation_share)
+        partner = elite[rng.integers(len(elite), size=len(chosen))]
+        mixed = np.where(rng.random(partner.shape) < 0.5, leader[chosen], partner)
+        self._positions[chosen] = _mutated(mixed, s.mutation_index, rng)
+
+    def _gain(self) -> float:
+        """Share of the hypervolume won in the last tenth of the iterations."""
+        if not self.done:
+            return float("nan")
+        return relative_gain(self._earlier_values, self._archive.values)
+
+    def _remark(self, gain: float) -> str:
+        if not len(self._archive):
+            least = float(self._personal_violations.min())
+            return f"no feasible point in {self.evaluations} evaluations; least violation {least:g}"
+        if not self.done:
+            text = f"not finished: {self.iteration} of {self.iterations} iterations"
+        elif np.isnan(gain):
+            text = "cannot tell whether settled: nothing feasible before the last iterations"
+        else:
+            word = "settled" if gain < _SETTLED else "still improving, give it more iterations"
+            text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
+        if len(self._archive) == 1 and self._archive.values.shape[1] > 1:
+            text += "; one point only: the objectives do not conflict, or the swarm collapsed"
+        if self.failed:
+            text += f"; {self.failed} of {self.evaluations} points failed"
+        return text
+
+
+def minimise(
+    function: Callable[[Floats], ArrayLike | tuple[ArrayLike, ArrayLike]],
+    bounds: ArrayLike,
+    *,
+    iterations: int,
+    rng: np.random.Generator,
+    size: int = 100,
+    settings: SwarmSettings | None = None,
+    start: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+) -> Front:
+    """Run a swarm to its end.
+
+    `function` takes points (n, d) and returns objectives (n, m), or a tuple of them and violations
+    (see `Swarm.tell`). `size` is the largest number of points in the front. The other parameters
+    and the errors raised are those of `Swarm`.
+    """
+    swarm = Swarm(bounds, iterations, rng, settings=settings, start=start, reference=reference)
+    while not swarm.done:
+        told = function(swarm.ask())
+        if isinstance(told, tuple):
+            swarm.tell(*told)
+        else:
+            swarm.tell(told)
+    return swarm.front(size)
+
+
+def _whole(key: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(key, value, "not a positive whole number", "Use 1, 2, 3, …")
+
+
+def _within(key: str, value: float, most: float) -> None:
+    if not (np.isfinite(value) and 0.0 <= value <= most):
+        raise InputError(key, value, f"not between 0 and {most}", "See SwarmSettings.")
+
+
+def _checked_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
+    table = np.array(bounds, dtype=float)
+    if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:
+        raise InputError("bounds", table.shape, "wrong shape", "Give (lower, upper) per variable.")
+    for row, (lower, upper) in enumerate(table):
+        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+            reason = "lower bound not below the upper one, or not finite"
+            remedy = "Give lower < upper, and leave out a variable that is fixed."
+            raise InputError(f"bounds[{row}]", (float(lower), float(upper)), reason, remedy)
+    return table[:, 0].copy(), table[:, 1].copy()
+
+
+def _mutated(unit: Floats, index: float, rng: np.random.Generator) -> Floats:
+    """Polynomial mutation (Deb & Goyal 1996) in the unit cube, on one coordinate on average."""
+    hit = rng.random(unit.shape) < 1.0 / unit.shape[1]
+    u = rng.random(unit.shape)[hit]
+    x = unit[hit]
+    power = 1.0 / (index + 1.0)
+    down = (2.0 * u + (1.0 - 2.0 * u) * (1.0 - x) ** (index + 1.0)) ** power - 1.0
+    up = 1.0 - (2.0 * (1.0 - u) + (2.0 * u - 1.0) * x ** (index + 1.0)) ** power
+    result = unit.copy()
+    result[hit] = np.clip(x + np.where(u < 0.5, down, up), 0.0, 1.0)
+    return result

@@ -1,0 +1,41 @@
+"""Sensitivity of a function to its inputs: derivatives at a point, their trust, global indices."""
+
+from hpcclear.statistics.sensitivity.convergence import (
+    ConvergenceIntervals,
+    best_estimates,
+    convergence_intervals,
+)
+from hpcclear.statistics.sensitivity.intervals import (
+    IntervalDesign,
+    IntervalSettings,
+    SensitivityHistory,
+    analyse_intervals,
+    design_intervals,
+    sensitivity_history,
+)
+from hpcclear.statistics.sensitivity.selection import Influence, Selection, select_influential
+from hpcclear.statistics.sensitivity.sobol import (
+    SobolIndices,
+    analyse_sobol,
+    sobol_design,
+    sobol_indices,
+)
+
+__all__ = [
+    "ConvergenceIntervals",
+    "Influence",
+    "IntervalDesign",
+    "IntervalSettings",
+    "Selection",
+    "SensitivityHistory",
+    "SobolIndices",
+    "analyse_intervals",
+    "analyse_sobol",
+    "best_estimates",
+    "convergence_intervals",
+    "design_intervals",
+    "select_influential",
+    "sensitivity_history",
+    "sobol_design",
+    "sobol_indices",
+]

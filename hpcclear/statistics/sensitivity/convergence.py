@@ -1,0 +1,198 @@
+"""The interval in which a first-order sensitivity no longer changes.
+
+"No longer changes" is a statement about numbers with errors. In a wide interval the polynomial
+cannot follow f (truncation, falling as the length to the power of the order); a short one amplifies
+the scatter of f (standard error, growing as 1/length). The rule, for each clearance and each
+variable on its own:
+
+1. Two estimates agree if they differ by no more than t * sqrt(SE_i^2 + SE_j^2), t being Student's
+   quantile for the stated confidence, or by no more than a stated fraction of the derivative. Every
+   interval has points of its own, so that the errors are independent.
+2. The plateau begins at the widest interval from which on *all* estimates agree with each other.
+   Agreement of two neighbours alone comes by chance, or from a truncation that changes slowly.
+   (Lepski's choice of a bandwidth, DOI 10.1137/1135065.)
+3. The uncertainty of an estimate joins its standard error with the truncation that may be left: the
+   change since the interval before it, extrapolated to length 0.
+4. A derivative is determined in an interval if it differs from 0 by more than t' uncertainties, and
+   in the interval before it by more than t' standard errors (of the same sign, or they would not
+   agree). t' is t corrected for the number of intervals looked at (Bonferroni).
+5. The convergence interval is the widest one after the beginning of the plateau in which the
+   derivative is determined. As in the paper, it is the second of two that agree.
+
+Pure noise agrees with itself in every interval, but fails step 4: "not determined". So does a
+derivative that is 0; its standard error then says how large it could be.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.sensitivity.intervals import SensitivityHistory
+from hpcclear.statistics.surrogate.metrics import check_confidence
+from hpcclear.statistics.surrogate.response_surface import FloatArray
+
+
+@dataclass(frozen=True)
+class ConvergenceIntervals:
+    """Where the sensitivities stopped changing; the rule is in the module's text.
+
+    Attributes
+    ----------
+    found : numpy.ndarray of bool, shape (c, d)
+        Interval found and derivative determined; False is "not determined".
+    interval : numpy.ndarray of int, shape (c, d)
+        Index of the convergence interval in the history, -1 where not determined.
+    plateau : numpy.ndarray of int, shape (c, d)
+        Index of the widest interval from which on the estimates agree, -1 if not even the last two
+        do. Not determined with a plateau: not distinguishable from 0. Without: still changing.
+    sensitivity, uncertainty : numpy.ndarray, shape (c, d)
+        There, in units of f per unit of the variable; the uncertainty holds the standard error and
+        the truncation that may be left. NaN where not determined.
+    converged : numpy.ndarray of bool, shape (k, c, d)
+        The convergence interval and all shorter ones.
+    confidence, tolerance : float
+        The rule's settings.
+    """
+
+    found: NDArray[np.bool_]
+    interval: NDArray[np.int64]
+    plateau: NDArray[np.int64]
+    sensitivity: FloatArray
+    uncertainty: FloatArray
+    converged: NDArray[np.bool_]
+    confidence: float
+    tolerance: float
+
+
+def convergence_intervals(
+    history: SensitivityHistory, *, confidence: float = 0.99, tolerance: float = 0.02
+) -> ConvergenceIntervals:
+    """Find where each sensitivity stopped changing (rule: module text; paper: 4.2, step 1).
+
+    Parameters
+    ----------
+    history : SensitivityHistory
+    confidence : float
+        Two-sided, of each comparison, in (0, 1).
+    tolerance : float
+        Relative change of a derivative that counts as none, at least 0. It matters for an f
+        without scatter, whose standard errors are small; the change is part of the uncertainty.
+
+    Returns
+    -------
+    ConvergenceIntervals
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range.
+    """
+    check_confidence(confidence)
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError("tolerance", tolerance, "not a fraction", "take 0 <= tolerance < 1")
+    n_steps, *shape = history.sensitivity.shape
+    interval, plateau = np.full((2, *shape), -1, np.int64)
+    estimate = np.full((2, *shape), np.nan)
+    lengths = np.ptp(history.intervals[:, 0], axis=1)
+    for c, j in np.ndindex(*shape):
+        usable = np.flatnonzero(np.isfinite(history.standard_error[:, c, j]))
+        slope, error = history.sensitivity[usable, c, j], history.standard_error[usable, c, j]
+        freedom = history.degrees_of_freedom[usable, c]
+        start = _plateau_start(slope, error, _student(freedom, 1.0 - confidence), tolerance)
+        if start >= len(usable) - 1:
+            continue  # a plateau needs two
+        plateau[c, j] = usable[start]
+        uncertainty = _uncertainty(slope, error, lengths[usable] ** history.order)
+        critical = _student(freedom, (1.0 - confidence) / (len(usable) - 1))
+        at = _first_determined(slope, error, uncertainty, critical, start)
+        if at is not None:
+            interval[c, j] = usable[at]
+            estimate[:, c, j] = slope[at], uncertainty[at]
+    found = interval >= 0
+    later = np.arange(n_steps)[:, np.newaxis, np.newaxis] >= interval
+    return ConvergenceIntervals(
+        found=found,
+        interval=interval,
+        plateau=plateau,
+        sensitivity=estimate[0],
+        uncertainty=estimate[1],
+        converged=found & later,
+        confidence=confidence,
+        tolerance=tolerance,
+    )
+
+
+def best_estimates(
+    history: SensitivityHistory, intervals: ConvergenceIntervals
+) -> tuple[FloatArray, FloatArray]:
+    """One derivative and its uncertainty for each clearance and variable, to rank and select by.
+
+    Taken in the convergence interval; where the derivative is not distinguishable from 0, at the
+    beginning of its plateau, where the standard error says how large it could be; NaN where it
+    never stopped changing.
+
+    Parameters
+    ----------
+    history : SensitivityHistory
+    intervals : ConvergenceIntervals
+        From the same history.
+
+    Returns
+    -------
+    sensitivity, uncertainty : numpy.ndarray, shape (c, d)
+    """
+    start = np.maximum(intervals.plateau, 0)[np.newaxis]
+    bounded = ~intervals.found & (intervals.plateau >= 0)
+    slope = np.take_along_axis(history.sensitivity, start, axis=0)[0]
+    error = np.take_along_axis(history.standard_error, start, axis=0)[0]
+    return (
+        np.where(bounded, slope, intervals.sensitivity),
+        np.where(bounded, error, intervals.uncertainty),
+    )
+
+
+def _student(freedom: NDArray[np.int64], doubt: float) -> FloatArray:
+    """Two-sided Student quantiles that chance passes with probability `doubt`."""
+    return np.asarray(stdtrit(freedom, 1.0 - doubt / 2.0))
+
+
+def _plateau_start(
+    slope: FloatArray, error: FloatArray, critical: FloatArray, tolerance: float
+) -> int:
+    """The widest interval from which on all estimates agree: the last if none does."""
+    start = len(slope) - 1
+    while start > 0:
+        wide, short = start - 1, slice(start, None)
+        quantile = np.maximum(critical[wide], critical[short])
+        allowed = np.maximum(
+            quantile * np.hypot(error[wide], error[short]), tolerance * np.abs(slope[short])
+        )
+        if np.any(np.abs(slope[wide] - slope[short]) > allowed):
+            break
+        start -= 1
+    return start
+
+
+def _uncertainty(slope: FloatArray, error: FloatArray, truncation: FloatArray) -> FloatArray:
+    """Standard errors joined with the truncation left; NaN in the widest interval.
+
+    All arrays run over the intervals, the widest first. `truncation` is what the truncation error
+    is proportional to; the change between two intervals, extrapolated to length 0, is what is left.
+    """
+    left = np.abs(np.diff(slope)) * truncation[1:] / -np.diff(truncation)
+    return np.append(np.nan, np.hypot(error[1:], left))
+
+
+def _first_determined(
+    slope: FloatArray, error: FloatArray, uncertainty: FloatArray, critical: FloatArray, start: int
+) -> int | None:
+    """The widest interval after `start` in which, and before which, the slope is surely not 0."""
+    sure = np.abs(slope) > critical * uncertainty
+    sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
+    for at in range(start + 1, len(slope)):
+        if sure[at] and sure_before[at - 1]:
+            return at
+    return None

@@ -1,0 +1,288 @@
+"""First-order sensitivity from response surfaces over ever shorter intervals.
+
+Section 4.2 of the paper. The derivative of the fitted surface at the midpoint of the design
+interval is taken for each clearance, over intervals that are shortened together about their
+midpoints. `hpcclear.statistics.sensitivity.convergence` says in which of them it can be trusted.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.response_surface import (
+    Evaluate,
+    FloatArray,
+    ResponseSurface,
+    Sampler,
+    check_bounds,
+    fit_response_surface,
+    latin_hypercube,
+    n_terms,
+)
+
+
+@dataclass(frozen=True)
+class IntervalSettings:
+    """Size of an interval study; the defaults for a surface in two variables follow the paper.
+
+    Attributes
+    ----------
+    steps : int
+        Number of intervals; 1 gives the sensitivity over the global interval alone.
+    shrink : float
+        Fraction of its length by which every interval is shortened from one step to the next,
+        in (0, 1).
+    n_points, n_test, order : int
+        Training points, test points and total order of each surface.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range.
+    """
+
+    steps: int = 6
+    shrink: float = 0.3
+    n_points: int = 45
+    n_test: int = 5
+    order: int = 3
+
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise InputError("steps", self.steps, "no interval at all", "take at least 1")
+        if not 0.0 < self.shrink < 1.0:
+            raise InputError("shrink", self.shrink, "not a fraction", "take 0 < shrink < 1")
+        if self.order < 1:
+            raise InputError("order", self.order, "a constant has no slope", "take at least 1")
+        if self.n_test < 2:
+            raise InputError("n_test", self.n_test, "R2 needs two test points", "take at least 2")
+
+
+DEFAULTS = IntervalSettings()
+
+
+@dataclass(frozen=True)
+class IntervalDesign:
+    """Points to simulate for every interval and clearance, all known beforehand.
+
+    Attributes
+    ----------
+    points : numpy.ndarray, shape (n, d + 1)
+        The d variables and, last, the clearance. By interval, then clearance, then the training
+        points followed by the test points.
+    intervals : numpy.ndarray, shape (k, d, 2)
+        Limits of the variables, the widest first.
+    clearances : numpy.ndarray, shape (c,)
+    settings : IntervalSettings
+    """
+
+    points: FloatArray
+    intervals: FloatArray
+    clearances: FloatArray
+    settings: IntervalSettings
+
+
+@dataclass(frozen=True)
+class SensitivityHistory:
+    """Midpoint derivatives of every surface; NaN where too few simulations succeeded.
+
+    Attributes
+    ----------
+    intervals : numpy.ndarray, shape (k, d, 2)
+        Limits of the variables, the widest first.
+    clearances : numpy.ndarray, shape (c,)
+    sensitivity, standard_error : numpy.ndarray, shape (k, c, d)
+        Derivatives at the midpoint, in units of f per unit of the variable.
+    r2, rmae : numpy.ndarray, shape (k, c)
+        Accuracy on the test points (`hpcclear.statistics.surrogate.metrics`).
+    leave_one_out_r2 : numpy.ndarray, shape (k, c)
+    degrees_of_freedom, failed : numpy.ndarray of int, shape (k, c)
+        Of the residuals (0 where no surface was fitted); simulations that failed.
+    order : int
+        Total order of the surfaces.
+    """
+
+    intervals: FloatArray
+    clearances: FloatArray
+    sensitivity: FloatArray
+    standard_error: FloatArray
+    r2: FloatArray
+    rmae: FloatArray
+    leave_one_out_r2: FloatArray
+    degrees_of_freedom: NDArray[np.int64]
+    failed: NDArray[np.int64]
+    order: int
+
+
+def design_intervals(
+    bounds: ArrayLike,
+    clearances: ArrayLike,
+    rng: np.random.Generator,
+    settings: IntervalSettings = DEFAULTS,
+    sample: Sampler = latin_hypercube,
+) -> IntervalDesign:
+    """Lay out the samples of every interval at every clearance.
+
+    Parameters
+    ----------
+    bounds : array_like, shape (d, 2)
+        The global interval of every variable, in its own unit.
+    clearances : array_like, shape (c,)
+    rng : numpy.random.Generator
+    settings : IntervalSettings
+    sample : callable
+        ``sample(n, bounds, rng)`` -> points of shape (n, d).
+
+    Returns
+    -------
+    IntervalDesign
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range, or there would be too few points for a standard error.
+    """
+    limits = check_bounds(bounds)
+    gaps = np.asarray(clearances, float)
+    _check_design(gaps, settings, n_terms(len(limits), settings.order))
+    fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
+    middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
+    lower = middle - fractions[:, np.newaxis] * half
+    upper = middle + fractions[:, np.newaxis] * half
+    intervals = np.stack([lower, upper], axis=2)
+    intervals[0] = limits  # bit for bit
+    blocks = [
+        np.column_stack([sample(n, interval, rng), np.full(n, gap)])
+        for interval in intervals
+        for gap in gaps
+        for n in (settings.n_points, settings.n_test)
+    ]
+    return IntervalDesign(np.vstack(blocks), intervals, gaps, settings)
+
+
+def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityHistory:
+    """Fit a surface for every interval and clearance and take its midpoint derivatives (eq. 14).
+
+    Parameters
+    ----------
+    design : IntervalDesign
+    values : array_like, shape (n,)
+        f at `design.points`; those that are not finite are failed simulations, counted in `failed`.
+        A surface left with too few points is NaN in the history.
+
+    Returns
+    -------
+    SensitivityHistory
+
+    Raises
+    ------
+    InputError
+        If the number of values does not fit, or no surface at all can be fitted.
+    """
+    y = np.asarray(values, float)
+    if y.shape != (len(design.points),):
+        raise InputError(
+            "values", y.shape, f"not one for {len(design.points)} points", "match them"
+        )
+    steps, n_variables, _ = design.intervals.shape
+    shape = steps, len(design.clearances)
+    y = y.reshape(*shape, -1)
+    x = design.points[:, :-1].reshape(*y.shape, n_variables)
+    gradient = np.full((2, *shape, n_variables), np.nan)
+    quality = np.full((3, *shape), np.nan)
+    freedom = np.zeros(shape, np.int64)
+    for k, c in np.ndindex(*shape):
+        surface = _surface(design, k, x[k, c], y[k, c])
+        if surface is not None:
+            gradient[:, k, c] = surface.gradient(design.intervals[k].mean(axis=1))
+            quality[:, k, c] = *_tested(design, surface, x[k, c], y[k, c]), surface.leave_one_out_r2
+            freedom[k, c] = surface.degrees_of_freedom
+    failed = np.count_nonzero(~np.isfinite(y), axis=2)
+    if not freedom.any():
+        raise InputError(
+            "values",
+            int(failed.sum()),
+            "so many simulations failed that no surface can be fitted",
+            "look at their status, mend them, or take more points",
+        )
+    return SensitivityHistory(
+        intervals=design.intervals,
+        clearances=design.clearances,
+        sensitivity=gradient[0],
+        standard_error=gradient[1],
+        r2=quality[0],
+        rmae=quality[1],
+        leave_one_out_r2=quality[2],
+        degrees_of_freedom=freedom,
+        failed=failed,
+        order=design.settings.order,
+    )
+
+
+def sensitivity_history(
+    evaluate: Evaluate,
+    bounds: ArrayLike,
+    clearances: ArrayLike,
+    rng: np.random.Generator,
+    settings: IntervalSettings = DEFAULTS,
+    sample: Sampler = latin_hypercube,
+) -> SensitivityHistory:
+    """Design, evaluate and analyse in one call; `evaluate` gets all points at once.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Points of shape (n, d + 1), the clearance last -> values of shape (n,), NaN where failed.
+    bounds, clearances, rng, settings, sample
+        See `design_intervals`.
+
+    Returns
+    -------
+    SensitivityHistory
+
+    Raises
+    ------
+    InputError
+        See `design_intervals` and `analyse_intervals`.
+    """
+    design = design_intervals(bounds, clearances, rng, settings, sample)
+    return analyse_intervals(design, evaluate(design.points))
+
+
+def _surface(
+    design: IntervalDesign, k: int, points: FloatArray, values: FloatArray
+) -> ResponseSurface | None:
+    """Surface over interval k on its training points; None if failures left too few of them."""
+    limits, settings = design.intervals[k], design.settings
+    values = values[: settings.n_points]
+    if np.count_nonzero(np.isfinite(values)) <= n_terms(len(limits), settings.order):
+        return None
+    return fit_response_surface(points[: len(values)], values, limits, settings.order)
+
+
+def _tested(
+    design: IntervalDesign, surface: ResponseSurface, points: FloatArray, values: FloatArray
+) -> tuple[float, float]:
+    """R2 and RMAE on the test points; NaN if fewer than two of them succeeded."""
+    points, values = points[design.settings.n_points :], values[design.settings.n_points :]
+    if np.count_nonzero(np.isfinite(values)) < 2:
+        return float("nan"), float("nan")
+    reached = accuracy(values, surface.predict(points))
+    return reached.r2, reached.rmae
+
+
+def _check_design(clearances: FloatArray, settings: IntervalSettings, terms: int) -> None:
+    if clearances.ndim != 1 or clearances.size == 0 or not np.isfinite(clearances).all():
+        raise InputError(
+            "clearances", clearances.tolist(), "not a list of numbers", "give at least one"
+        )
+    if settings.n_points <= terms:
+        raise InputError(
+            "n_points",
+            settings.n_points,
+            f"a surface of {terms} terms leaves nothing to estimate the scatter from",
+            f"take at least {terms + 1}, better {2 * terms}",
+        )

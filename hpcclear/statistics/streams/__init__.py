@@ -1,0 +1,1 @@
+"""Summaries of samples that merge in any order to the same bits."""

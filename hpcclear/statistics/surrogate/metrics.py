@@ -1,0 +1,169 @@
+"""How well a surrogate reproduces the true function on points it has not seen.
+
+The paper prints two measures whose formulas and text disagree. Both forms of each are computed;
+the first of each pair decides, the printed one stands beside it for comparison:
+
+==================  ============================================  ===============
+field               formula                                       source
+==================  ============================================  ===============
+``r2``              1 - sum (f - fhat)^2 / sum (f - mean f)^2     decides
+``r2_explained``    sum (fhat - mean f)^2 / sum (f - mean f)^2    eq. 26, printed
+``rmae``            max abs(f - fhat) / standard deviation of f   decides
+``rmae_mean``       max abs(f - fhat) / abs(mean f)               eq. 27, printed
+==================  ============================================  ===============
+
+The printed R2 can pass 1: it rewards predictions that scatter more than the truth does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hpcclear.base.errors import InputError
+
+ROUNDING = 32.0 * np.finfo(np.float64).eps
+"""Relative rounding that computed values are taken to carry: differences below it mean nothing."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Accuracy on test points; see the module's table for the formulas.
+
+    Attributes
+    ----------
+    r2, r2_explained, rmae, rmae_mean : float
+        Without unit; NaN where the test values do not vary (or, for `rmae_mean`, have mean 0).
+    rmse : float
+        Root mean square error, in the unit of the function.
+    n_test : int
+        Test points that counted.
+    n_dropped : int
+        Test points whose true value was not finite (a failed simulation).
+    constant : bool
+        The test values are equal up to rounding, so that R2 and RMAE are undefined.
+    scale : float
+        Largest magnitude of the test values, in the unit of the function.
+    """
+
+    r2: float
+    r2_explained: float
+    rmae: float
+    rmae_mean: float
+    rmse: float
+    n_test: int
+    n_dropped: int
+    constant: bool
+    scale: float
+
+    def meets(self, r2_min: float, rmae_max: float) -> bool:
+        """Whether ``r2 >= r2_min`` and ``rmae <= rmae_max``.
+
+        A constant leaves nothing to explain: it is met by reproducing it up to rounding.
+        """
+        if self.constant:
+            return bool(self.rmse <= 4.0 * ROUNDING * self.scale)
+        return bool(self.r2 >= r2_min and self.rmae <= rmae_max)
+
+
+def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
+    """Compare predictions with true values (eqs. 26 and 27, both readings).
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        True values; those that are not finite are failed simulations, dropped and counted.
+    predictions : array_like, shape (n,)
+        Predictions at the same points, in the same unit.
+
+    Returns
+    -------
+    Accuracy
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, a prediction is not finite, or fewer than two true values are finite.
+
+    Notes
+    -----
+    The standard deviation divides by n, so that ``1 - r2 == (rmse / standard deviation)**2``.
+    """
+    true, predicted = _pair(values, predictions)
+    finite = np.isfinite(true)
+    n_dropped = int(np.count_nonzero(~finite))
+    true, predicted = true[finite], predicted[finite]
+    if true.size < 2:
+        raise InputError(
+            "test points",
+            true.size,
+            f"accuracy needs at least two finite test values, {n_dropped} failed",
+            "take more test points or mend the failing simulations",
+        )
+    error, mean = true - predicted, float(true.mean())
+    scale = float(np.abs(true).max())
+    constant = bool(np.ptp(true) <= ROUNDING * scale)
+    # dividing by NaN, not by 0: an undefined measure must not look like a number
+    total = np.nan if constant else float(np.sum((true - mean) ** 2))
+    deviation = np.sqrt(total / true.size)
+    worst = float(np.abs(error).max())
+    return Accuracy(
+        r2=float(1.0 - np.sum(error**2) / total),
+        r2_explained=float(np.sum((predicted - mean) ** 2) / total),
+        rmae=float(worst / deviation),
+        rmae_mean=worst / abs(mean) if mean != 0.0 else float("nan"),
+        rmse=float(np.sqrt(np.mean(error**2))),
+        n_test=int(true.size),
+        n_dropped=n_dropped,
+        constant=constant,
+        scale=scale,
+    )
+
+
+def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> NDArray[np.float64]:
+    """Errors at each point of the linear least-squares fit made without it.
+
+    No refit is needed: the error is ``residual / (1 - leverage)``, the leverage being the diagonal
+    of the hat matrix (Allen 1974, DOI 10.1080/00401706.1974.10489157).
+
+    Parameters
+    ----------
+    residuals, leverages : array_like, shape (n,)
+        Residuals of the full fit in the unit of the function, and leverages in [0, 1].
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        NaN where the leverage is 1: the fit without that point does not exist.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ.
+    """
+    residual, leverage = _pair(residuals, leverages)
+    remaining = 1.0 - leverage
+    return residual / np.where(remaining > ROUNDING, remaining, np.nan)
+
+
+def check_confidence(confidence: float) -> None:
+    """Refuse a confidence that is not in (0, 1), by an InputError."""
+    if not 0.0 < confidence < 1.0:
+        raise InputError("confidence", confidence, "not a probability", "take 0.99, for example")
+
+
+def _pair(first: ArrayLike, second: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two equally long vectors; the second must be finite."""
+    a, b = np.asarray(first, float), np.asarray(second, float)
+    if a.ndim != 1 or a.shape != b.shape:
+        raise InputError(
+            "values", (a.shape, b.shape), "two vectors of one length are needed", "pass shape (n,)"
+        )
+    if not np.isfinite(b).all():
+        raise InputError(
+            "predictions",
+            int(np.count_nonzero(~np.isfinite(b))),
+            "some predictions are not finite",
+            "a surrogate must answer at every test point: check the points it was asked for",
+        )
+    return a, b

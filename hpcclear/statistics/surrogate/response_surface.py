@@ -1,0 +1,290 @@
+"""Polynomial response surfaces by least squares (eqs. 24 and 25), with standard errors.
+
+The inputs are scaled to [-1, 1] over stated bounds; a surface never answers outside them.
+With n inputs and total order m a surface has C(n + m, m) terms: 10 for a cubic in two inputs
+(the count the paper prints), 20 in three, 56 in five, 120 in seven.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from math import comb
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.metrics import ROUNDING, leave_one_out
+
+FloatArray = NDArray[np.float64]
+Evaluate = Callable[[FloatArray], FloatArray]
+"""True function: points of shape (n, d) -> values of shape (n,), NaN where it failed."""
+Sampler = Callable[[int, FloatArray, np.random.Generator], FloatArray]
+"""``sample(n, bounds, generator)`` -> points of shape (n, d) inside bounds of shape (d, 2)."""
+
+OUTSIDE = 1e-9  # in half-lengths: how far rounding may carry a point past a bound
+
+
+@dataclass(frozen=True)
+class ResponseSurface:
+    """A fitted polynomial ``f(x) = offset + sum coefficients * z**exponents``, z in [-1, 1].
+
+    Attributes
+    ----------
+    bounds : numpy.ndarray, shape (d, 2)
+        Lower and upper limit of every input, in its own unit.
+    order : int
+        Total order.
+    exponents : numpy.ndarray of int, shape (t, d)
+        One row a term.
+    coefficients : numpy.ndarray, shape (t,)
+        Of the scaled inputs, in the unit of f; the offset is already in the constant term.
+    unscaled_covariance : numpy.ndarray, shape (t, t)
+        (X'X)^-1; times `residual_variance` it is the covariance of the coefficients.
+    residual_variance : float
+        SSE / degrees of freedom, no less than the rounding of the values; NaN without any
+        degrees of freedom.
+    degrees_of_freedom : int
+        Points that counted minus terms.
+    leave_one_out_errors : numpy.ndarray, shape (n,)
+        Error at each point of the surface fitted without it.
+    leave_one_out_r2 : float
+        1 - sum of squares of those errors / SST; NaN if the values do not vary.
+    condition : float
+        Condition number of the design matrix.
+    n_points, n_dropped : int
+        Points that counted, and those dropped because their value was not finite.
+    """
+
+    bounds: FloatArray
+    order: int
+    exponents: NDArray[np.int64]
+    coefficients: FloatArray
+    unscaled_covariance: FloatArray
+    residual_variance: float
+    degrees_of_freedom: int
+    leave_one_out_errors: FloatArray
+    leave_one_out_r2: float
+    condition: float
+    n_points: int
+    n_dropped: int
+
+    def predict(self, points: ArrayLike) -> FloatArray:
+        """Values at points of shape (n, d), in the unit of f, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If a point is not finite or lies outside the bounds: a surface never extrapolates.
+        """
+        z = scale_inputs(points, self.bounds)
+        return np.asarray(_terms(z, self.exponents) @ self.coefficients)
+
+    def gradient(self, point: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """First derivatives at one point and their standard errors (eq. 14).
+
+        Parameters
+        ----------
+        point : array_like, shape (d,)
+            Physical units, inside the bounds.
+
+        Returns
+        -------
+        derivatives, standard_errors : numpy.ndarray, shape (d,)
+            In units of f per unit of each input. The errors come from the residual variance: they
+            hold for the polynomial's own scatter, not for terms it lacks; NaN without any degrees
+            of freedom.
+
+        Raises
+        ------
+        InputError
+            As in `predict`.
+        """
+        z = scale_inputs(np.asarray(point, float)[np.newaxis], self.bounds)
+        rows = np.vstack([_slopes(z, self.exponents, j) for j in range(len(self.bounds))])
+        rows *= (2.0 / np.ptp(self.bounds, axis=1))[:, np.newaxis]  # dz/dx
+        spread = np.einsum("ij,jk,ik->i", rows, self.unscaled_covariance, rows)
+        return rows @ self.coefficients, np.sqrt(self.residual_variance * spread)
+
+
+def n_terms(n_inputs: int, order: int) -> int:
+    """Number of terms of a polynomial of total order `order` in `n_inputs` inputs."""
+    return comb(n_inputs + order, order)
+
+
+def check_bounds(bounds: ArrayLike) -> FloatArray:
+    """Bounds as a finite array of shape (d, 2), each lower limit below its upper one.
+
+    Raises
+    ------
+    InputError
+        Otherwise.
+    """
+    limits = np.asarray(bounds, float)
+    if limits.ndim != 2 or limits.shape[1] != 2 or len(limits) == 0:
+        raise InputError("bounds", limits.shape, "not a table of limits", "pass shape (d, 2)")
+    wrong = ~(np.isfinite(limits).all(axis=1) & (limits[:, 0] < limits[:, 1]))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(
+            f"bounds[{row}]",
+            limits[row].tolist(),
+            "limits must be finite and the lower one below the upper one",
+            "swap or widen them",
+        )
+    return limits
+
+
+def scale_inputs(points: ArrayLike, bounds: FloatArray) -> FloatArray:
+    """Points of shape (n, d) in physical units, scaled to [-1, 1] over the bounds.
+
+    Raises
+    ------
+    InputError
+        If the shape does not fit, a coordinate is not finite, or a point lies outside.
+    """
+    x = np.asarray(points, float)
+    if x.ndim != 2 or x.shape[1] != len(bounds):
+        raise InputError(
+            "points", x.shape, f"{len(bounds)} inputs are bounded", f"pass shape (n, {len(bounds)})"
+        )
+    z = (2.0 * x - bounds[:, 0] - bounds[:, 1]) / (bounds[:, 1] - bounds[:, 0])
+    outside = ~(np.abs(z) <= 1.0 + OUTSIDE)  # true for NaN as well
+    if outside.any():
+        row = int(np.argmax(outside.any(axis=1)))
+        raise InputError(
+            f"points[{row}]",
+            x[row].tolist(),
+            "a coordinate is not finite or lies outside the bounds",
+            "a surface does not extrapolate: move the point or widen the bounds",
+        )
+    return z
+
+
+def latin_hypercube(n: int, bounds: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Latin hypercube of n points, shape (n, d): one point in each n-th of every input."""
+    strata = np.stack([rng.permutation(n) for _ in bounds], axis=1)
+    unit = (strata + rng.random(strata.shape)) / n
+    return np.asarray(bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0]))
+
+
+def fit_response_surface(
+    points: ArrayLike, values: ArrayLike, bounds: ArrayLike, order: int
+) -> ResponseSurface:
+    """Least-squares polynomial of total order `order` through points and values.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, d)
+        Physical units, inside the bounds.
+    values : array_like, shape (n,)
+        Values of f; those that are not finite are failed simulations, dropped and counted.
+    bounds : array_like, shape (d, 2)
+        Limits of the inputs; they fix the scaling.
+    order : int
+        Total order, at least 0.
+
+    Returns
+    -------
+    ResponseSurface
+
+    Raises
+    ------
+    InputError
+        If fewer values than terms are finite, if the points do not determine every term (too few
+        distinct values of an input, say), or if shapes, bounds or points cannot be used.
+
+    Notes
+    -----
+    Solved through the singular value decomposition, not the normal equations of section 4.2,
+    which square the condition number. Values are taken relative to one of them, so that a
+    constant gives coefficients of exactly 0.
+    """
+    limits = check_bounds(bounds)
+    z, y, n_dropped = _finite_rows(scale_inputs(points, limits), values)
+    exponents = _exponents(len(limits), order)
+    design, offset = _terms(z, exponents), y[0] if len(y) else 0.0
+    left, singular, right = _decomposed(design, order, n_dropped)
+    inverse = right.T / singular
+    coefficients = inverse @ (left.T @ (y - offset))
+    residuals = (y - offset) - design @ coefficients
+    coefficients[0] += offset
+    freedom = len(y) - len(exponents)
+    rounding = (ROUNDING * np.abs(y).max()) ** 2
+    errors = leave_one_out(residuals, np.sum(left**2, axis=1))
+    total = float(np.sum((y - y.mean()) ** 2))
+    return ResponseSurface(
+        bounds=limits,
+        order=order,
+        exponents=exponents,
+        coefficients=coefficients,
+        unscaled_covariance=inverse @ inverse.T,
+        residual_variance=max(float(residuals @ residuals) / freedom, rounding)
+        if freedom
+        else float("nan"),
+        degrees_of_freedom=freedom,
+        leave_one_out_errors=errors,
+        leave_one_out_r2=float(1 - np.sum(errors**2) / total)
+        if total > len(y) * rounding
+        else float("nan"),
+        condition=float(singular[0] / singular[-1]),
+        n_points=len(y),
+        n_dropped=n_dropped,
+    )
+
+
+def _decomposed(
+    design: FloatArray, order: int, n_dropped: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Singular value decomposition of a design matrix that determines every term."""
+    n_points, terms = design.shape
+    if n_points < terms:
+        dropped = f"; {n_dropped} points failed and were dropped" if n_dropped else ""
+        raise InputError(
+            "points",
+            n_points,
+            f"too few: order {order} has {terms} terms{dropped}",
+            f"take at least {terms} points, better twice as many, or a lower order",
+        )
+    left, singular, right = np.linalg.svd(design, full_matrices=False)
+    if singular[-1] <= n_points * np.finfo(float).eps * singular[0]:
+        raise InputError(
+            "points",
+            n_points,
+            f"they do not determine all {terms} terms of order {order}",
+            "give every input more distinct values than the order, or lower the order",
+        )
+    return left, singular, right
+
+
+def _finite_rows(z: FloatArray, values: ArrayLike) -> tuple[FloatArray, FloatArray, int]:
+    y = np.asarray(values, float)
+    if y.shape != (len(z),):
+        raise InputError("values", y.shape, f"not one value for {len(z)} points", "pass shape (n,)")
+    finite = np.isfinite(y)
+    return z[finite], y[finite], int(np.count_nonzero(~finite))
+
+
+def _exponents(n_inputs: int, order: int) -> NDArray[np.int64]:
+    """Exponents of all terms up to a total order, shape (t, d), the constant first."""
+    if order < 0:
+        raise InputError("order", order, "a polynomial has no negative order", "take 0 or more")
+    chosen = (
+        c for k in range(order + 1) for c in combinations_with_replacement(range(n_inputs), k)
+    )
+    return np.array([[c.count(j) for j in range(n_inputs)] for c in chosen], dtype=np.int64)
+
+
+def _terms(z: FloatArray, exponents: NDArray[np.int64]) -> FloatArray:
+    """All terms at scaled points, shape (n, t)."""
+    terms = np.ones((len(z), len(exponents)))
+    for j in range(z.shape[1]):  # input by input: no array of n x t x d
+        terms *= z[:, j, np.newaxis] ** exponents[:, j]
+    return terms
+
+
+def _slopes(z: FloatArray, exponents: NDArray[np.int64], j: int) -> FloatArray:
+    """Derivatives of all terms with respect to scaled input j, shape (n, t)."""
+    lowered = exponents.copy()
+    lowered[:, j] = np.maximum(exponents[:, j] - 1, 0)
+    return exponents[:, j] * _terms(z, lowered)

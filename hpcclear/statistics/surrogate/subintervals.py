@@ -1,0 +1,351 @@
+"""Kriging over a wide domain as a product of models, each on its own subinterval of the inputs.
+
+The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's interval, L'_i that of
+its subintervals). A box is accepted by R2 and RMAE on test points of its own; a refused one gets
+more training points, then is cut in half across the input that varies fastest, down to a stated
+depth. A query uses the model of the box it is in. A single model is the case of one box.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.kriging import FIELDS, Kriging, fit_kriging, inside
+from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
+from hpcclear.statistics.surrogate.response_surface import Evaluate, Sampler, latin_hypercube
+
+SHARED = ("names",)
+RAGGED = ("inputs", "values", "alpha")
+PIECEWISE_FIELDS: dict[str, tuple[str, ...]] = {
+    name: dims if name in SHARED + RAGGED else ("leaf", *dims) for name, dims in FIELDS.items()
+} | {"training_points": ("leaf",), "r2": ("leaf",), "rmae": ("leaf",), "accepted": ("leaf",)}
+"""What is stored, with dimensions; the leaves' training points lie end to end."""
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseKriging:
+    """Kriging models on boxes that tile a domain.
+
+    Attributes
+    ----------
+    leaves : tuple of Kriging
+        One model a box, all with the same names.
+    r2, rmae : (l,) arrays
+        Accuracy of each on its own test points (NaN where the test values do not vary).
+    accepted : (l,) array of bool
+        Whether it met the targets; a False is the best that could be had within the limits.
+
+    Raises
+    ------
+    InputError
+        No boxes, different names, or boxes that overlap or leave gaps.
+    """
+
+    leaves: tuple[Kriging, ...]
+    r2: np.ndarray
+    rmae: np.ndarray
+    accepted: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not self.leaves or any(leaf.names != self.leaves[0].names for leaf in self.leaves):
+            raise InputError("leaves", len(self.leaves), "no models of one kind", "give some")
+        for name in ("r2", "rmae", "accepted"):
+            if np.shape(getattr(self, name)) != (len(self.leaves),):
+                raise InputError(name, np.shape(getattr(self, name)), "not one per box", "give all")
+        lower, upper = self._corners
+        volume = np.prod((upper - lower) / (self.upper - self.lower), axis=1).sum()
+        shared = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
+        overlaps = (shared > 0).all(axis=-1).sum() > len(self.leaves)  # each overlaps itself
+        if overlaps or abs(volume - 1.0) > 1e-9:
+            raise InputError("leaves", len(self.leaves), "boxes do not tile the domain", "refit")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.leaves[0].names
+
+    @cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([k.lower for k in self.leaves]), np.array([k.upper for k in self.leaves])
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """Lower corner of the domain, ``(d,)``."""
+        return np.asarray(self._corners[0].min(axis=0))
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """Upper corner of the domain, ``(d,)``."""
+        return np.asarray(self._corners[1].max(axis=0))
+
+    def locate(self, points: np.ndarray) -> np.ndarray:
+        """Index of the box that each of ``(n, d)`` points is in; a border belongs to the upper box.
+
+        Raises
+        ------
+        InputError
+            A point lies outside the domain.
+        """
+        points = inside(points, self.names, self.lower, self.upper)
+        points = np.clip(points, self.lower, self.upper)  # round-off beyond the outer border
+        index = np.full(len(points), -1)
+        for k, (low, high) in enumerate(zip(*self._corners, strict=True)):
+            below = (points < high) | (high == self.upper)
+            index[((points >= low) & below).all(axis=1)] = k
+        return index
+
+    def predict(self, points: np.ndarray) -> np.ndarray:
+        """Kriging mean at ``(n, d)`` points, each by its box's model; see `Kriging.predict`."""
+        return self._by_leaf(points, lambda leaf, part: leaf.predict(part))
+
+    def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
+        """Kriging variance at ``(n, d)`` points; see `Kriging.variance`."""
+        return self._by_leaf(points, lambda leaf, part: leaf.variance(part, noise=noise))
+
+    def _by_leaf(self, points: np.ndarray, answer) -> np.ndarray:  # type: ignore[no-untyped-def]
+        index = self.locate(points)
+        points, out = np.asarray(points, dtype=np.float64), np.empty(len(index))
+        for k in np.unique(index):
+            leaf, here = self.leaves[k], index == k
+            out[here] = answer(leaf, np.clip(points[here], leaf.lower, leaf.upper))
+        return out
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """The models as plain arrays, without pickle; `PIECEWISE_FIELDS` names their dimensions."""
+        parts = [leaf.to_arrays() for leaf in self.leaves]
+        arrays = {
+            name: np.stack([part[name] for part in parts]) for name in FIELDS if name not in RAGGED
+        }
+        arrays["names"] = parts[0]["names"]
+        arrays |= {name: np.concatenate([part[name] for part in parts]) for name in RAGGED}
+        arrays["training_points"] = np.array([part["values"].size for part in parts])
+        return arrays | {
+            name: np.asarray(getattr(self, name)) for name in ("r2", "rmae", "accepted")
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "PiecewiseKriging":
+        """The models that `to_arrays` stored; they predict the same to the last bit.
+
+        Raises
+        ------
+        InputError
+            An array is missing, has the wrong shape, or is not finite; the boxes do not tile.
+        """
+        remedy = "use a file written by this package"
+        for name in PIECEWISE_FIELDS:
+            if name not in arrays:
+                raise InputError(name, None, "missing from the stored model", remedy)
+        counts = np.asarray(arrays["training_points"])
+        stored = np.shape(arrays["values"])
+        if counts.ndim != 1 or counts.dtype.kind not in "iu" or (counts < 1).any():
+            raise InputError("training_points", counts, "not one count per box", remedy)
+        if stored != (counts.sum(),):
+            raise InputError("values", stored, "not as many as training_points says", remedy)
+        ends = np.cumsum(counts)
+        leaves = []
+        for k, (count, end) in enumerate(zip(counts, ends, strict=True)):
+            part = {name: np.asarray(arrays[name]) for name in SHARED}
+            part |= {name: np.asarray(arrays[name])[end - count : end] for name in RAGGED}
+            for name in FIELDS:
+                if name not in part:
+                    if np.shape(arrays[name])[:1] != counts.shape:
+                        raise InputError(name, np.shape(arrays[name]), "not one per box", remedy)
+                    part[name] = np.asarray(arrays[name])[k]
+            leaves.append(Kriging.from_arrays(part))
+        r2, rmae = (np.asarray(arrays[name], dtype=np.float64) for name in ("r2", "rmae"))
+        return cls(tuple(leaves), r2, rmae, np.asarray(arrays["accepted"], dtype=bool))
+
+
+@dataclass(eq=False)
+class _Box:
+    """A subinterval on its way to a model."""
+
+    bounds: np.ndarray
+    rng: np.random.Generator
+    points: np.ndarray
+    values: np.ndarray
+    tests: np.ndarray
+    truths: np.ndarray
+    depth: int = 0
+    resampled: int = 0
+    wanted: list[np.ndarray] = field(default_factory=list)  # training and test points to evaluate
+
+
+def fit_subintervals(
+    evaluate: Evaluate,
+    bounds: np.ndarray,
+    *,
+    rng: np.random.Generator,
+    names: Sequence[str] | None = None,
+    cuts: Sequence[int] | None = None,
+    samples: int = 200,
+    test_samples: int = 100,
+    r2_min: float = 0.99,
+    rmae_max: float = 0.3,
+    max_resamples: int = 1,
+    max_depth: int = 3,
+    restarts: int = 3,
+    sample: Sampler = latin_hypercube,
+) -> PiecewiseKriging:
+    """Fit Kriging models on subintervals until each is accepted or a limit is reached.
+
+    Boxes of one generation are evaluated in a single call, so that many ranks can share it.
+
+    Parameters
+    ----------
+    evaluate : callable
+        The true function, ``(n, d)`` points to ``(n,)`` values, NaN where it failed.
+    bounds : (d, 2) array
+        The domain.
+    rng : numpy Generator
+        Every box draws from a stream of its own, spawned from this one.
+    names : sequence of str, optional
+        Names of the inputs.
+    cuts : sequence of int, optional
+        Subintervals of each input to begin with (default 1 each: a single model).
+    samples, test_samples : int
+        Training and test points of a box.
+    r2_min, rmae_max : float
+        A box is accepted with R2 at least and RMAE at most this on its test points.
+    max_resamples : int
+        How often a refused box gets `samples` further training points before it is cut.
+    max_depth : int
+        How often a box may be cut in half; a refused box at this depth stays, not accepted.
+    restarts : int
+        See `fit_kriging`.
+    sample : callable
+        ``sample(n, bounds, rng)`` draws points in a box.
+
+    Returns
+    -------
+    PiecewiseKriging
+
+    Raises
+    ------
+    InputError
+        As `fit_kriging` and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
+    """
+    pending, done = _first_boxes(np.asarray(bounds, dtype=np.float64), cuts, rng), []
+    for box in pending:
+        box.wanted = [sample(n, box.bounds, box.rng) for n in (samples, test_samples)]
+    while pending:
+        _evaluate_wanted(evaluate, pending)
+        following: list[_Box] = []
+        for box in pending:
+            model = fit_kriging(
+                box.points, box.values, box.bounds, rng=box.rng, names=names, restarts=restarts
+            )
+            reached = accuracy(box.truths, model.predict(box.tests))
+            accepted = reached.meets(r2_min, rmae_max)
+            if not accepted and box.resampled < max_resamples:
+                box.resampled += 1
+                box.wanted = [sample(samples, box.bounds, box.rng), box.tests[:0]]
+                following.append(box)
+            elif not accepted and box.depth < max_depth:
+                for half in _halves(box, int(np.argmin(model.length_scales))):
+                    half.wanted = [
+                        sample(n, half.bounds, half.rng) for n in (samples, test_samples)
+                    ]
+                    following.append(half)
+            else:
+                done.append((model, reached, accepted))
+        pending = following
+    return _joined(done)
+
+
+def _first_boxes(
+    bounds: np.ndarray, cuts: Sequence[int] | None, rng: np.random.Generator
+) -> list[_Box]:
+    """The grid of subintervals to begin with, each without points."""
+    if bounds.ndim != 2 or bounds.shape[1] != 2 or not (bounds[:, 0] < bounds[:, 1]).all():
+        raise InputError(
+            "bounds", bounds.tolist(), "not (d, 2) with lower < upper", "mend the bounds"
+        )
+    dims = len(bounds)
+    pieces = (1,) * dims if cuts is None else tuple(cuts)
+    if len(pieces) != dims or any(piece < 1 for piece in pieces):
+        raise InputError(
+            "cuts", pieces, "not a count of at least 1 per input", f"give {dims} counts"
+        )
+    edges = [
+        np.linspace(low, high, piece + 1) for (low, high), piece in zip(bounds, pieces, strict=True)
+    ]
+    corners = list(product(*(range(piece) for piece in pieces)))
+    nothing, none = np.empty((0, dims)), np.empty(0)
+    return [
+        _Box(
+            np.array([edges[d][k : k + 2] for d, k in enumerate(corner)]),
+            own,
+            nothing,
+            none,
+            nothing,
+            none,
+        )
+        for corner, own in zip(corners, rng.spawn(len(corners)), strict=True)
+    ]
+
+
+def _evaluate_wanted(evaluate: Evaluate, boxes: list[_Box]) -> None:
+    """Evaluate what all boxes want in one call and add it to them."""
+    batches = [batch for box in boxes for batch in box.wanted]
+    values = np.asarray(evaluate(np.concatenate(batches)), dtype=np.float64)
+    if values.shape != (sum(len(batch) for batch in batches),):
+        raise InputError("evaluate", values.shape, "not one value per point", "return shape (n,)")
+    parts = iter(np.split(values, np.cumsum([len(batch) for batch in batches])[:-1]))
+    for box in boxes:
+        points, tests = box.wanted
+        box.points, box.values = (
+            np.concatenate([box.points, points]),
+            np.concatenate([box.values, next(parts)]),
+        )
+        box.tests, box.truths = (
+            np.concatenate([box.tests, tests]),
+            np.concatenate([box.truths, next(parts)]),
+        )
+        box.wanted = []
+
+
+def _halves(box: _Box, dim: int) -> list[_Box]:
+    """The two halves of a box across one input; training points are kept, test points are not.
+
+    (The parent's test points have decided that the box be cut, so they are no longer fresh; as
+    training points they are welcome.)
+    """
+    middle = box.bounds[dim].mean()
+    points, values = (
+        np.concatenate([box.points, box.tests]),
+        np.concatenate([box.values, box.truths]),
+    )
+    halves = []
+    for side, rng in enumerate(box.rng.spawn(2)):
+        bounds = box.bounds.copy()
+        bounds[dim, 1 - side] = middle
+        here = (points[:, dim] < middle) if side == 0 else (points[:, dim] >= middle)
+        halves.append(
+            _Box(
+                bounds,
+                rng,
+                points[here],
+                values[here],
+                box.tests[:0],
+                box.truths[:0],
+                box.depth + 1,
+            )
+        )
+    return halves
+
+
+def _joined(done: list[tuple[Kriging, Accuracy, bool]]) -> PiecewiseKriging:
+    """One object, boxes in the order of their lower corners."""
+    done = sorted(done, key=lambda item: tuple(item[0].lower))
+    return PiecewiseKriging(
+        leaves=tuple(model for model, _, _ in done),
+        r2=np.array([reached.r2 for _, reached, _ in done]),
+        rmae=np.array([reached.rmae for _, reached, _ in done]),
+        accepted=np.array([accepted for _, _, accepted in done]),
+    )

@@ -1,0 +1,177 @@
+"""The search for a response surface that is accurate enough (section 4.2, step 1)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
+from hpcclear.statistics.surrogate.response_surface import (
+    Evaluate,
+    FloatArray,
+    ResponseSurface,
+    Sampler,
+    check_bounds,
+    fit_response_surface,
+    latin_hypercube,
+)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One surface that was tried: its order, the points it had, and what came of it.
+
+    `accuracy` is None where no surface could be fitted; `note` then says why.
+    """
+
+    order: int
+    n_points: int
+    accuracy: Accuracy | None
+    note: str
+
+
+@dataclass(frozen=True)
+class SurfaceSearch:
+    """Outcome of `fit_until_accepted`.
+
+    Attributes
+    ----------
+    surface : ResponseSurface
+        The accepted surface, or the one with the least RMSE on the test points if none was.
+    accuracy : Accuracy
+        Its accuracy on the test points.
+    accepted : bool
+        Whether it met the targets.
+    reason : str
+        The verdict in one sentence.
+    attempts : tuple of Attempt
+        Everything that was tried, in order.
+    """
+
+    surface: ResponseSurface
+    accuracy: Accuracy
+    accepted: bool
+    reason: str
+    attempts: tuple[Attempt, ...]
+
+
+def fit_until_accepted(
+    evaluate: Evaluate,
+    bounds: ArrayLike,
+    rng: np.random.Generator,
+    *,
+    sample: Sampler = latin_hypercube,
+    orders: Sequence[int] = (3, 2, 4),
+    n_points: int = 45,
+    n_test: int = 5,
+    max_points: int = 360,
+    r2_min: float = 0.9,
+    rmae_max: float = 0.5,
+) -> SurfaceSearch:
+    """Raise the sample or change the order until a surface passes, or say that none does.
+
+    At each sample size the orders are tried as listed and the first that passes is taken (section
+    4.2, step 1: 45 points, 5 test points, a cubic). If none does, the sample is doubled by new
+    points, up to `max_points`. The test points are drawn once and never trained on: fresh ones in
+    each round would let a poor surface pass by luck.
+
+    Parameters
+    ----------
+    evaluate : callable
+        True function, (n, d) -> (n,).
+    bounds : array_like, shape (d, 2)
+    rng : numpy.random.Generator
+    sample : callable
+        ``sample(n, bounds, rng)`` -> points of shape (n, d).
+    orders : sequence of int
+        Total orders, the preferred one first.
+    n_points, n_test, max_points : int
+        First training sample, test points, and the largest training sample.
+    r2_min, rmae_max : float
+        Targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`.
+
+    Returns
+    -------
+    SurfaceSearch
+
+    Raises
+    ------
+    InputError
+        If no order can be fitted at any allowed sample, or fewer than two test values are finite.
+    """
+    limits = check_bounds(bounds)
+    _check_search(orders, n_points, n_test, max_points)
+    test = sample(n_test, limits, rng)
+    true = _test_values(evaluate(test))
+    attempts: list[Attempt] = []
+    best: tuple[ResponseSurface, Accuracy] | None = None
+    for points, values in _growing_sample(evaluate, sample, limits, rng, n_points, max_points):
+        for order in orders:
+            try:
+                surface = fit_response_surface(points, values, limits, order)
+            except InputError as refusal:
+                attempts.append(Attempt(order, len(points), None, str(refusal)))
+                continue
+            reached = accuracy(true, surface.predict(test))
+            attempts.append(Attempt(order, len(points), reached, ""))
+            if reached.meets(r2_min, rmae_max):
+                reason = f"order {order} on {len(points)} points meets the targets"
+                return SurfaceSearch(surface, reached, True, reason, tuple(attempts))
+            if best is None or reached.rmse < best[1].rmse:
+                best = surface, reached
+    if best is None:
+        raise InputError(
+            "surrogate",
+            tuple(orders),
+            f"no surface could be fitted: {attempts[-1].note}",
+            "raise max_points, lower the orders, or mend the failing simulations",
+        )
+    reason = (
+        f"no order of {tuple(orders)} reaches R2 >= {r2_min:g} and RMAE <= {rmae_max:g} with up to "
+        f"{attempts[-1].n_points} points; the best has R2 = {best[1].r2:.3g}, "
+        f"RMAE = {best[1].rmae:.3g}"
+    )
+    return SurfaceSearch(*best, False, reason, tuple(attempts))
+
+
+def _test_values(values: FloatArray) -> FloatArray:
+    """The test values, refused before anything is spent on training if most of them failed."""
+    if np.count_nonzero(np.isfinite(values)) < 2:
+        raise InputError(
+            "test points",
+            len(values),
+            "fewer than two of them have a finite value",
+            "take more test points or mend the failing simulations",
+        )
+    return values
+
+
+def _growing_sample(
+    evaluate: Evaluate,
+    sample: Sampler,
+    bounds: FloatArray,
+    rng: np.random.Generator,
+    n_points: int,
+    max_points: int,
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """The training sample, doubled each time by new points and never past `max_points`."""
+    points = sample(n_points, bounds, rng)
+    values = evaluate(points)
+    yield points, values
+    while len(points) < max_points:
+        more = sample(min(len(points), max_points - len(points)), bounds, rng)
+        points, values = np.vstack([points, more]), np.append(values, evaluate(more))
+        yield points, values
+
+
+def _check_search(orders: Sequence[int], n_points: int, n_test: int, max_points: int) -> None:
+    if len(orders) == 0:
+        raise InputError("orders", tuple(orders), "no order to try", "list at least one")
+    if n_test < 2:
+        raise InputError("n_test", n_test, "R2 needs two test points", "take at least 2")
+    if not 1 <= n_points <= max_points:
+        raise InputError(
+            "n_points", n_points, "outside 1 .. max_points", f"take 1 to {max_points} points"
+        )

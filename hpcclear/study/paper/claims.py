@@ -1,0 +1,312 @@
+"""The paper's twelve claims on our own data: each holds, does not hold, or cannot be told.
+
+A difference counts when it is larger than `SURE` standard errors. A claim of several parts holds
+when each part does, and does not hold when one part is refuted; otherwise it cannot be told.
+"""
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from hpcclear.results import dataset
+from hpcclear.study.paper.printed import CLAIMS, case_names
+from hpcclear.study.responses import QUANTITIES, STATISTICS
+from hpcclear.study.run import Result, Run
+from hpcclear.study.sensitivities import surfaces
+
+Array = NDArray[np.float64]
+SURE = 2.5758293035489004
+"""Standard errors that decide: 99 % two-sided."""
+
+HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told"
+Finding = tuple[str, str]
+"""Verdict, and the numbers behind it."""
+
+
+def verdict(supported: Iterable[bool], refuted: Iterable[bool]) -> str:
+    """Verdict on a claim of several parts, each supported, refuted, or neither."""
+    if any(refuted):
+        return FAILS
+    parts = list(supported)
+    return HOLDS if parts and all(parts) else OPEN
+
+
+class Sensitivities:
+    """First-order sensitivities as evidence: effects over the ranges, by surface and clearance.
+
+    Parameters
+    ----------
+    run : Run
+    result : dict
+        Of `hpcclear.study.sensitivities.analyse`.
+    """
+
+    def __init__(self, run: Run, result: Result) -> None:
+        self.names = run.study.names
+        self.inputs = surfaces(run)
+        self.result = result
+        self.settings = run.study.sensitivity
+
+    def has(self, *names: str) -> bool:
+        """Whether all of them are inputs of some surface."""
+        return set(names) <= {name for inputs in self.inputs for name in inputs}
+
+    def of(self, name: str) -> tuple[Array, Array]:
+        """Effects and standard errors of a variable, (surfaces, clearances)."""
+        rows = [k for k, inputs in enumerate(self.inputs) if name in inputs]
+        column = self.names.index(name)
+        found = (self.result[key] for key in ("best_sensitivity", "uncertainty"))
+        effect, error = (array[rows, :, column] for array in found)
+        return effect, error
+
+    def influential(self) -> list[str]:
+        """X_G-I."""
+        chosen = self.result["selected"].astype(bool)
+        return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
+
+    def sign(self, name: str, sign: int) -> tuple[bool, bool, str]:
+        """Whether the slope has that sign at every clearance; at some the other; in words."""
+        effect, error = self.of(name)
+        agree = (sign * effect > SURE * error).any(axis=0)
+        oppose = (sign * effect < -SURE * error).any(axis=0)
+        word = "grows" if sign > 0 else "falls"
+        text = f"f {word} with {name} at {agree.sum()} of {agree.size} clearances"
+        if oppose.any():
+            text += f", the opposite at {oppose.sum()}"
+        return bool(agree.all() and not oppose.any()), bool(oppose.any()), text
+
+    def signs(self, wanted: Sequence[tuple[str, int]]) -> Finding:
+        """Verdict on the signs of several variables."""
+        if not self.has(*(name for name, _ in wanted)):
+            return OPEN, "not among the study's surfaces"
+        parts = [self.sign(name, sign) for name, sign in wanted]
+        text = "; ".join(part[2] for part in parts)
+        return verdict((part[0] for part in parts), (part[1] for part in parts)), text
+
+
+def _grows_with_clearance(found: Sensitivities) -> Finding:
+    mean, error = found.result["mean_objective"], found.result["mean_objective_error"]
+    step = np.diff(mean)
+    allowed = SURE * np.hypot(error[1:], error[:-1])
+    text = (
+        f"mean f over the box from {mean[0]:.3g} to {mean[-1]:.3g}; smallest step "
+        f"{step.min():.2g}, told from 0 beyond {allowed[step.argmin()]:.2g}"
+    )
+    return verdict(step > allowed, step < -allowed), text
+
+
+def _hardly_moves(found: Sensitivities) -> Finding:
+    names = [name for name in ("m1", "u1", "I1") if found.has(name)]
+    if len(names) < 3:
+        return OPEN, "m1, u1 and I1 are not all among the study's surfaces"
+    known = [abs(found.of(name)[0]) for name in found.names if found.has(name)]
+    largest = np.fmax.reduce(np.concatenate(known))  # NaN only where nothing is known
+    upper, lower = [], []
+    for name in names:
+        effect, error = found.of(name)
+        upper.append(np.fmin.reduce((abs(effect) + SURE * error) / largest).max())
+        lower.append(np.fmax.reduce((abs(effect) - SURE * error) / largest).max())
+    limit = found.settings.influence
+    shares = ", ".join(f"{n} {100 * u:.2g} %" for n, u in zip(names, upper, strict=True))
+    text = f"at most {shares} of the largest effect (limit {100 * limit:g} %)"
+    return verdict((u < limit for u in upper), (low > limit for low in lower)), text
+
+
+def _order_is_kept(found: Sensitivities) -> Finding:
+    names = found.influential()
+    kept: list[str] = []
+    changed: list[str] = []
+    unsure: list[str] = []
+    for a, b in itertools.combinations(names, 2):
+        rows = [k for k, inputs in enumerate(found.inputs) if a in inputs and b in inputs]
+        for row in rows:
+            pair = [
+                (
+                    found.result["best_sensitivity"][row, :, c],
+                    found.result["uncertainty"][row, :, c],
+                )
+                for c in (found.names.index(a), found.names.index(b))
+            ]
+            lead = abs(pair[0][0]) - abs(pair[1][0])
+            allowed = SURE * np.hypot(pair[0][1], pair[1][1])
+            first, second = lead > allowed, lead < -allowed
+            where = changed if first.any() and second.any() else kept
+            if not (first.all() or second.all() or where is changed):
+                where = unsure
+            where.append(f"{a}-{b}")
+    text = f"of the pairs of {', '.join(names)}: {len(kept)} keep their order at every clearance"
+    text += f", {len(changed)} change it" + (f" ({', '.join(changed)})" if changed else "")
+    text += f", {len(unsure)} are within their errors"
+    supported = [True] * len(kept) + [False] * len(unsure)
+    return verdict(supported, [True] * len(changed)), text
+
+
+def _size_varies(found: Sensitivities) -> Finding:
+    parts, texts = [], []
+    for name in found.influential():
+        effects, errors = found.of(name)
+        known = [
+            np.isfinite(e) & np.isfinite(s) & (s > 0) for e, s in zip(effects, errors, strict=True)
+        ]
+        row = int(np.argmax([k.sum() for k in known]))
+        effect, error = effects[row][known[row]], errors[row][known[row]]
+        if len(effect) < 2:
+            parts.append((False, False))
+            continue
+        mean = np.average(effect, weights=error**-2)
+        chi = float(np.sum(((effect - mean) / error) ** 2))
+        varies = chi > chdtri(len(effect) - 1, 0.01)
+        precise = bool((error < 0.1 * abs(mean)).all())
+        parts.append((varies, precise and not varies))
+        texts.append(f"{name} {abs(effect).min():.2g} to {abs(effect).max():.2g}")
+    text = "effects over the range: " + ", ".join(texts)
+    return verdict((p[0] for p in parts), (p[1] for p in parts)), text
+
+
+def _global_for_masses(found: Sensitivities) -> Finding:
+    masses, others = {"m1", "m2", "m3"}, {"u1", "u2", "I1", "I2"}
+    fit, target = found.result["leave_one_out_r2"], found.settings.r2
+    supported, refuted, texts = [], [], []
+    for row, inputs in enumerate(found.inputs):
+        if not (set(inputs) <= masses or set(inputs) <= others):
+            continue
+        whole = fit[row, 0] >= target
+        later = (fit[row, 1:] >= target).any(axis=0)
+        if set(inputs) <= masses:
+            supported.append(bool(whole.all()))
+            refuted.append(bool(np.mean(whole) < 0.5))
+        else:
+            supported.append(bool((~whole & later).all()))
+            refuted.append(bool(whole.all() or not (whole | later).any()))
+        least = np.nanmin(fit[row, 0]) if np.isfinite(fit[row, 0]).any() else np.nan
+        texts.append(
+            f"{' '.join(inputs)}: whole interval at {whole.sum()} of {whole.size} clearances "
+            f"(lowest R2 {least:.2f}), only a shorter one at {(~whole & later).sum()}"
+        )
+    if not texts:
+        return OPEN, "the study has no such surfaces"
+    text = f"leave-one-out R2 of at least {target:g}; " + "; ".join(texts)
+    return verdict(supported, refuted), text
+
+
+class Responses:
+    """Responses at one clearance as evidence: differences between designs and their scatter."""
+
+    def __init__(self, series: Result) -> None:
+        self.names = series["names"].tolist()
+        self.statistics = series["statistics"]
+
+    def change(self, a: str, b: str, statistic: str, quantity: str) -> tuple[float, float]:
+        """Relative change from design b to design a, and what it must exceed to be sure."""
+        s, q = STATISTICS.index(statistic), QUANTITIES.index(quantity)
+        one, other = (self.statistics[self.names.index(name), :, s, q] for name in (a, b))
+        error = np.hypot(*(x.std(ddof=1) / np.sqrt(len(x)) for x in (one, other)))
+        level = abs(other.mean())
+        return float((one.mean() - other.mean()) / level), float(SURE * error / level)
+
+    def judged(self, wanted: Sequence[tuple[str, str, str, str, int]]) -> Finding:
+        """Verdict on changes (a, b, statistic, quantity, wanted sign)."""
+        supported, refuted, texts = [], [], []
+        for a, b, statistic, quantity, sign in wanted:
+            change, sure = self.change(a, b, statistic, quantity)
+            supported.append(sign * change > sure)
+            refuted.append(sign * change < -sure)
+            if not supported[-1]:
+                texts.append(f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} %")
+        text = f"{sum(supported)} of {len(wanted)} comparisons as claimed"
+        if texts:
+            text += "; not: " + "; ".join(texts)
+        return verdict(supported, refuted), text
+
+
+def _peaks_cut(run: Run, found: Responses) -> Finding:
+    wanted = [
+        (name, "original", "peak", quantity, -1)
+        for name in found.names
+        if name != "original"
+        for quantity in QUANTITIES[:3]
+    ]
+    return found.judged(wanted)
+
+
+def _alpha_lower_beta_calmer(run: Run, found: Responses) -> Finding:
+    wanted = []
+    for case in run.study.cases:
+        alpha, beta = f"{case.name} alpha", f"{case.name} beta"
+        for quantity in QUANTITIES:
+            wanted.append((alpha, beta, "mean", quantity, -1))
+            wanted.append((beta, alpha, "fluctuation", quantity, -1))
+    return found.judged(wanted)
+
+
+def _case_2_cuts_more(run: Run, found: Responses) -> Finding:
+    first, second = case_names(run.scene)
+    if first is None or second is None:
+        return OPEN, "the study has not both of the paper's cases"
+    wanted = [
+        (f"{second} {letter}", f"{first} {letter}", "peak", quantity, -1)
+        for letter in ("alpha", "beta")
+        for quantity in QUANTITIES
+    ]
+    acceleration = (f"{second} alpha", f"{first} alpha", "peak", QUANTITIES[3])
+    wanted[wanted.index((*acceleration, -1))] = (*acceleration, 1)
+    return found.judged(wanted)
+
+
+def _beta_of_case_2(run: Run, found: Responses) -> Finding:
+    case = case_names(run.scene)[1]
+    if case is None:
+        return OPEN, "the study has not the paper's case 2"
+    alpha, beta = f"{case} alpha", f"{case} beta"
+    wanted = [(beta, alpha, "mean", QUANTITIES[0], 1)]
+    return found.judged([*wanted, (beta, alpha, "fluctuation", QUANTITIES[0], -1)])
+
+
+def _kriging_accurate(run: Run, kriging: Result) -> Finding:
+    checks = np.array([kriging[f"model{k}_check"] for k in range(len(run.study.models))])
+    r2, rmse = checks[:, 0], checks[:, 4]
+    texts = [
+        f"{' '.join(names)}: R2 {one:.4f}, RMSE {error:.2g}"
+        for names, one, error in zip(run.study.models, r2, rmse, strict=True)
+    ]
+    passed = r2 >= run.study.surrogate.r2
+    text = f"on fresh points, R2 of at least {run.study.surrogate.r2:g} asked for; "
+    return verdict(passed, r2 < 0.9), text + "; ".join(texts)
+
+
+def judge(run: Run, sensitivity: Result | None, kriging: Result, series: Result) -> list[Finding]:
+    """A verdict and its numbers for each of `CLAIMS`."""
+    effects = None if sensitivity is None else Sensitivities(run, sensitivity)
+    responses = Responses(series)
+
+    def on_effects(rule: Callable[[Sensitivities], Finding]) -> Finding:
+        return (OPEN, "the study has no response surfaces") if effects is None else rule(effects)
+
+    return [
+        on_effects(_grows_with_clearance),
+        on_effects(lambda found: found.signs([("m2", 1), ("m3", 1)])),
+        on_effects(_hardly_moves),
+        on_effects(lambda found: found.signs([("u2", -1), ("I2", 1)])),
+        on_effects(_order_is_kept),
+        _peaks_cut(run, responses),
+        _alpha_lower_beta_calmer(run, responses),
+        on_effects(_global_for_masses),
+        _case_2_cuts_more(run, responses),
+        _beta_of_case_2(run, responses),
+        _kriging_accurate(run, kriging),
+        on_effects(_size_varies),
+    ]
+
+
+def write(run: Run, findings: Sequence[Finding]) -> None:
+    """Write claims.nc."""
+    data = {
+        "text": np.array(CLAIMS),
+        "verdict": np.array([one for one, _ in findings]),
+        "figure": np.array([text for _, text in findings]),
+    }
+    coords = {"claim": np.arange(1, len(CLAIMS) + 1)}
+    run.write(dataset.dataset("claims", coords, data), "claims.nc")

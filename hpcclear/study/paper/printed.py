@@ -1,0 +1,62 @@
+"""What the paper prints: its Table 4 and the claims that are tested (its sections 5 and 6)."""
+
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of
+from hpcclear.study.optimisation import Choice
+
+TABLE_4 = {
+    ("case 1", "alpha"): ((0.105, 0.0715, 0.0451, 1.2432e-4), (1.7787e-4, 3.6658e-8)),
+    ("case 1", "beta"): ((0.1811, 0.2232, 0.0382, 2.9562e-4), (3.4977e-4, 3.1934e-8)),
+    ("case 2", "alpha"): ((0.1053, 0.07, 0.0118, 1.4054e-4), (1.8544e-4, 9.6491e-7)),
+    ("case 2", "beta"): ((0.2128, 0.0734, 0.0031, 6.3581e-4), (2.6217e-4, 8.3406e-8)),
+}
+"""Designs m2 (kg), m3 (kg), u2 (m), I2 (kg m2), and their printed mean and deviation."""
+
+DESIGN = ("m2", "m3", "u2", "I2")
+
+CLAIMS = (
+    "f grows with the clearance",
+    "f grows with m2 and with m3",
+    "f hardly moves with m1, u1 and I1",
+    "f falls with u2 and grows with I2",
+    "the order of the sensitivities does not change with the clearance",
+    "the optimised designs cut the peaks of both contact forces and of the crank moment",
+    "alpha has the lower average, beta the lower fluctuation of the responses",
+    "the fit is global for m1, m2, m3, but for u1, u2, I1, I2 holds in shortened intervals only",
+    "case 2 cuts peaks more than case 1: alpha but for the slider acceleration, beta including it",
+    "case-2 beta has the larger mean and the smaller fluctuation of contact force 1 than alpha",
+    "Kriging reaches R2 near 1 and an error near 0",
+    "the size of the sensitivities varies with the clearance",
+)
+
+
+def case_names(scene: Scene) -> tuple[str | None, str | None]:
+    """The study's cases that are the paper's case 1 (C alone is random) and case 2; None if none.
+
+    Both have the paper's four design variables.
+    """
+    study = study_of(scene)
+    found: list[str | None] = [None, None]
+    for case in study.cases:
+        if set(study.design_variables(case.name)) != set(DESIGN):
+            continue
+        absolute = all(study.random_input(name).absolute for name in case.random)
+        found[0 if absolute else 1] = case.name
+    return found[0], found[1]
+
+
+def is_comparable(scene: Scene) -> bool:
+    """Whether the study's objective is the paper's: what it prints and claims says nothing of another one."""
+    return study_of(scene).objective == "mean-gap"
+
+
+def printed_designs(scene: Scene) -> list[Choice]:
+    """The designs of Table 4, each in its case, as far as the study has these cases; none for another objective."""
+    if not is_comparable(scene):
+        return []
+    names = dict(zip(("case 1", "case 2"), case_names(scene), strict=True))
+    return [
+        Choice(f"{own} paper {letter}", own, dict(zip(DESIGN, design, strict=True)), None, printed)
+        for (case, letter), (design, printed) in TABLE_4.items()
+        if (own := names[case]) is not None
+    ]

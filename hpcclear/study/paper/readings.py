@@ -1,0 +1,204 @@
+"""The paper's own designs under the possible readings of its text: which comes nearest?
+
+Open are: whether the stiffness of eq. 4 has the factor sqrt(R_J), which its dimension asks for and
+the print lacks; the coefficient of restitution (0.9 here, 0.46 in works it builds on); whether the
+bearing's or the journal's radius stays as built when the clearance varies; and whether the mean of
+eq. 13 runs over time or over the steps of the solver. Nothing is fitted to the printed values.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.base.outcome import JOINTS, Status
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.progress import Progress
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import study_of
+from hpcclear.scene.points import Points
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.paper.printed import printed_designs
+from hpcclear.study.run import Result, Run
+from hpcclear.study.verification import moments, samples_of
+
+Array = NDArray[np.float64]
+STAGE = "readings"
+OTHER_RESTITUTION = 0.46
+STEP_SAMPLES = 16
+"""Samples whose every solver step is recorded; a response at a time, so they are few."""
+
+_COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read the text."""
+
+    restitution: float
+    with_journal_radius: bool  # in eq. 4
+    bearing_fixed: bool  # else the journal
+    over_steps: bool = False
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        return ", ".join(
+            (
+                f"c_e {self.restitution:g}",
+                f"eq. 4 {'with' if self.with_journal_radius else 'without'} R_J",
+                f"{'R_B' if self.bearing_fixed else 'R_J'} fixed",
+                "f over solver steps" if self.over_steps else "f over time",
+            )
+        )
+
+
+def applies(scene: Scene) -> bool:
+    """Whether the scene is near enough to the paper's for the comparison to mean something."""
+    contact = scene.effects.contact
+    return (
+        study_of(scene).verification.audit_samples > 0
+        and contact is not None
+        and contact.law == "lankarani-nikravesh"
+        and scene.clearance_joints() == JOINTS
+        and bool(printed_designs(scene))
+    )
+
+
+def readings(run: Run) -> list[Reading]:
+    """All combinations over time, and the scene's own over solver steps."""
+    own = run.scene.number("effects.contact.restitution")
+    restitutions = [own] if own == OTHER_RESTITUTION else [own, OTHER_RESTITUTION]
+    combinations = itertools.product(restitutions, (True, False), (True, False))
+    return [*(Reading(*one) for one in combinations), Reading(own, True, True, True)]
+
+
+def evaluate(run: Run) -> Result:
+    """Mean, deviation and f at the smallest clearance for each reading and printed design.
+
+    Returns
+    -------
+    dict of arrays
+        The data variables of readings.nc, of shape (readings, designs).
+    """
+    rows = [
+        run.part(f"{STAGE}-{k}", _row, reading)["row"] for k, reading in enumerate(readings(run))
+    ]
+    table = np.array(rows)
+    result = {name: table[..., k] for k, name in enumerate((*_COLUMNS, "objective_smallest"))}
+    result["failed"] = result["failed"].astype(np.int64)
+    return result
+
+
+def write(run: Run, result: Result) -> None:
+    """Write readings.nc; `distance` says how far a reading is from the printed means."""
+    designs = printed_designs(run.scene)
+    printed = np.array([choice.printed for choice in designs])
+    coords = {
+        "reading": np.array([reading.text for reading in readings(run)]),
+        "design": np.array([choice.name for choice in designs]),
+    }
+    data = {**result, "mean_paper": printed[:, 0], "deviation_paper": printed[:, 1]}
+    data["case"] = np.array([choice.case for choice in designs])
+    data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed[:, 0]) ** 2, axis=1))
+    run.write(dataset.dataset("readings", coords, data), "readings.nc")
+
+
+def _row(run: Run, reading: Reading) -> dict[str, Array]:
+    """Moments and f at the smallest clearance of all printed designs in one reading."""
+    designs = printed_designs(run.scene)
+    if reading.over_steps:
+        return {"row": np.array([_over_steps(run, reading, one) for one in designs])}
+    return {"row": np.array(_over_time(run, reading, designs))}
+
+
+def _over_time(run: Run, reading: Reading, designs: Sequence[Choice]) -> list[tuple[float, ...]]:
+    """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
+    count = run.study.verification.audit_samples
+    batches = [
+        batch for one in designs for batch in (samples_of(run, one, count), _smallest(run, one))
+    ]
+    points = Points(
+        batches[0].names, np.vstack([batch.values for batch in batches]), batches[0].paths
+    )
+    records = sample_points(
+        _scene(run, reading),
+        _read(run, reading, points),
+        run.ranks,
+        None,
+        Progress("", style="quiet"),
+        stage=f"{STAGE}: simulations",
+    )
+    f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
+    return [(*moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
+
+
+def _over_steps(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]:
+    sampled = samples_of(run, choice, STEP_SAMPLES)
+    scene = _scene(run, reading)
+    values = [
+        _mean_over_steps(run, scene, sampled.names, row)
+        for row in np.vstack([sampled.values, _smallest(run, choice).values])
+    ]
+    return (*moments(np.array(values[:-1])), values[-1])
+
+
+def _mean_over_steps(run: Run, scene: Scene, names: Sequence[str], row: Array) -> float:
+    """f of one sample, the mean of eq. 13 taken over the accepted steps; NaN if it failed."""
+    run.ranks.raise_if_stopped()
+    changes: dict[str, object] = {"output.instants_per_revolution": 0}
+    for name, value in zip(names, row, strict=True):
+        changes |= dict.fromkeys(run.study.variable(name).paths, float(value))
+    response = simulate(scene.with_(changes))
+    if int(response["status"]) != Status.OK:
+        return float("nan")
+    turn = 2.0 * np.pi * scene.numerics.transient_revolutions
+    steady = response["crank_angle"].to_numpy() >= turn
+    distance = np.hypot(
+        response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy()
+    )[steady]
+    clearance = [row[list(names).index("C")]] * len(JOINTS)
+    return float(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
+
+
+def _smallest(run: Run, choice: Choice) -> Points:
+    """The design itself at the smallest clearance."""
+    names = (*choice.design, "C")
+    lowest = run.study.variable("C").bounds[0]
+    return run.simulations.filled(names, np.array([[*choice.design.values(), lowest]]))
+
+
+def _scene(run: Run, reading: Reading) -> Scene:
+    return run.scene.with_({"study": None, "effects.contact.restitution": reading.restitution})
+
+
+def _read(run: Run, reading: Reading, points: Points) -> Points:
+    """Samples with the further columns that a reading moves."""
+    clearance = points.column("C")
+    built = {joint: run.scene.number(f"joints.{joint}.bearing_radius") for joint in JOINTS}
+    names, columns, paths = list(points.names), [points.values], list(points.paths)
+
+    def add(path: str, values: Array) -> None:
+        names.append(path)
+        columns.append(values[:, None])
+        paths.append((path,))
+
+    for joint in JOINTS:
+        bearing = np.full(len(points), built[joint])
+        if not reading.bearing_fixed:
+            bearing = BUILT_JOURNAL + clearance
+            add(f"joints.{joint}.bearing_radius", bearing)
+        if not reading.with_journal_radius:
+            # K is proportional to the moduli, so they can take the factor 1 / sqrt(R_J)
+            for part in ("bearing", "journal"):
+                path = f"joints.{joint}.{part}.youngs_modulus"
+                add(path, run.scene.number(path) / np.sqrt(bearing - clearance))
+    return Points(tuple(names), np.hstack(columns), tuple(paths))
+
+
+BUILT_JOURNAL = 19.95e-3
+"""Radius of the journal as built, m (the paper's Table 2)."""
