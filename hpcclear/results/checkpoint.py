@@ -19,9 +19,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hpcclear.results import dataset, files as storage
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
+from hpcclear.results import dataset
+from hpcclear.results import files as storage
 
 INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""

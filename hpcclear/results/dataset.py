@@ -16,10 +16,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hpcclear.results import files as storage
 from hpcclear.base.errors import InputError
-from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Kind, Variable
 from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, Status
+from hpcclear.results import files as storage
+from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Kind, Variable
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
