@@ -23,10 +23,10 @@ import numpy as np
 import xarray as xr
 from numba import carray, cfunc, njit
 from numbalsoda import lsoda, lsoda_sig
-from numpy.typing import NDArray
 from plain_loop import motion
 from scenes import JOB, Setup, setup
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
@@ -34,8 +34,6 @@ from hpcclear.dynamics.lowering import parameters
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.results.dataset import provenance
 from hpcclear.scene import load_scene
-
-Array = NDArray[np.float64]
 
 SCENES = {
     # name: contact, friction coefficient, ramp speed in m/s, whether thresholds were chosen on it

@@ -10,13 +10,11 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE
-
-Array = NDArray[np.float64]
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
 OUTPUTS = ("objective", "slider_position", "slider_velocity", "evaluations", "steps", "status")

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.ensemble.parts import part_length
 from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
 from hpcclear.ranks.team import FLUSH_INTERVAL
@@ -29,7 +29,7 @@ Policy = Callable[[int, int, Need], Allotment]
 class Costs(NamedTuple):
     """What things take, in seconds."""
 
-    samples: NDArray[np.float64]  # of one core, (m,): drawn from with replacement
+    samples: Array  # of one core, (m,): drawn from with replacement
     message: float  # root, to take in and answer one message
     record: float  # root, for each finished record
     handed: float  # root, for each sample handed out

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Problem
-from hpcclear.dynamics.lowering import Array, parameters, problem_of, start_states
+from hpcclear.dynamics.lowering import parameters, problem_of, start_states
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 from CyRK import nb_diffeq_addr, nbsolve2_ivp
-from hpcclear.system import SLIDER, STATES, end_time, right_hand_side, start, tolerances
 from numba import carray
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
+from peers.system import SLIDER, STATES, end_time, right_hand_side, start, tolerances
 
 
 def _right_hand_side(dy, t, y, args):

@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 import exudyn as exu
 import exudyn.itemInterface as items
-from hpcclear.system import end_time
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
+from peers.system import end_time
 
 _HUGE = 1e12  # kg m^2
 

@@ -9,10 +9,10 @@ from functools import cache
 
 import heyoka as hy
 import numpy as np
-from hpcclear.system import SLIDER, STATES, Array, end_time, start
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
+from peers.system import SLIDER, STATES, Array, end_time, start
 
 _NAMES = ("x2", "y2", "theta", "x3", "vx2", "vy2", "spin", "v3")
 # what the equations read, in the order of heyoka's run-time parameters

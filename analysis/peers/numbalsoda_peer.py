@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 import numpy as np
-from hpcclear.system import SLIDER, STATES, end_time, right_hand_side, start
 from numba import carray, cfunc
 from numbalsoda import dop853, lsoda, lsoda_sig
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
+from peers.system import SLIDER, STATES, end_time, right_hand_side, start
 
 
 @cfunc(lsoda_sig)

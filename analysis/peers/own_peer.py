@@ -6,12 +6,12 @@ from functools import cache
 
 import numpy as np
 import plain_loop
-from hpcclear.system import SLIDER, Array
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TABLEAUS
 from hpcclear.dynamics.lanes import Lanes, Problem
+from peers.system import SLIDER, Array
 
 POSITION = at.OUT_STATE + SLIDER
 WIDTH = 32

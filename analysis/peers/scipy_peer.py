@@ -6,11 +6,12 @@ Lankarani-Nikravesh runs from event to event, DOP853 restarted at each impact an
 from collections.abc import Callable
 
 import numpy as np
-from hpcclear.system import SLIDER, STATES, end_time, right_hand_side, start, tolerances
 from numba import njit
 from plain_loop import motion
 from scenes import Setup
 from scipy.integrate import solve_ivp
+
+from peers.system import SLIDER, STATES, end_time, right_hand_side, start, tolerances
 
 
 @njit

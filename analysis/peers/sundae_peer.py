@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 
-from hpcclear.system import SLIDER, end_time, right_hand_side, start, tolerances
 from scenes import Setup
 from sksundae.cvode import CVODE
+
+from peers.system import SLIDER, end_time, right_hand_side, start, tolerances
 
 
 def _solver(method: str) -> Callable[[Setup, int], float]:

@@ -2,14 +2,13 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from plain_loop import motion
 from scenes import Setup
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 
-Array = NDArray[np.float64]
 STATES = 8
 SLIDER = 3  # index of the slider's position
 

@@ -12,18 +12,16 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.accuracy.profile import Profile
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.lowering import parameters, problem_of, start_states
 from hpcclear.dynamics.revolutions import objective, turn_by_turn
 from hpcclear.scene import Scene
-
-Array = NDArray[np.float64]
 
 KICK = 1e-10
 """Relative size of the kicks at the start."""
@@ -48,8 +46,8 @@ class Averaging:
         Time of one revolution of one copy in a full block of lanes.
     """
 
-    transient: NDArray[np.int64]
-    averaged: NDArray[np.int64]
+    transient: Integers
+    averaged: Integers
     error: Array
     floor: float
     seconds: float
@@ -70,7 +68,7 @@ def analyse(gaps: Array, seconds: float) -> Averaging:
     return Averaging(transient, averaged, error, float(late.std(ddof=1) / truth), seconds)
 
 
-def doubling(most: int, start: int) -> NDArray[np.int64]:
+def doubling(most: int, start: int) -> Integers:
     """`start`, then powers of two up to `most`, shape (n,)."""
     powers = 2 ** np.arange(1 + int(np.log2(max(most, 1))))
     return np.unique(np.append(start, powers)).astype(np.int64)

@@ -6,14 +6,12 @@ For integrators that are not the kernel's. A state is y = (q, v, integrals of th
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Problem
 from hpcclear.dynamics.linkage.rhs import accelerations
-
-Array = NDArray[np.float64]
 
 OPEN, FORCE, RATE = 0, 1, 2
 """Columns of what `seen` holds at each joint: gap (m), contact force (N), rate of the gap (m/s)."""

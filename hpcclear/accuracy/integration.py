@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hpcclear.accuracy.methods import (
     QUANTITIES,
@@ -19,10 +18,9 @@ from hpcclear.accuracy.methods import (
     timed,
 )
 from hpcclear.accuracy.profile import Profile
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.scene import Scene
-
-Array = NDArray[np.float64]
 
 REFERENCE_RTOL = 1e-13
 MARGIN = 100.0

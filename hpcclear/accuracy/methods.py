@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from hpcclear.accuracy.equations import FORCE, OPEN, RATE, Equations
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
@@ -19,8 +19,6 @@ from hpcclear.dynamics.linkage import geometry
 from hpcclear.dynamics.lowering import parameters, problem_of, start_states, topology
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-
-Array = NDArray[np.float64]
 
 QUANTITIES = ("slider_position", "slider_velocity", "peak_contact_force", "objective")
 LARGEST_STEP = 1.0 / 64.0

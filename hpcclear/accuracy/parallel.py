@@ -5,19 +5,17 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.resting import SOME_RANKS
 from hpcclear.accuracy.surrogate import region_of
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import study_of, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator
-
-Array = NDArray[np.float64]
 
 LOSSES = ("start-up", "compilation", "imbalance", "writing")
 
@@ -26,7 +24,7 @@ LOSSES = ("start-up", "compilation", "imbalance", "writing")
 class Parallel:
     """The panel; arrays over the numbers of ranks, seconds."""
 
-    ranks: NDArray[np.int64]
+    ranks: Integers
     strong: Array
     weak: Array
     samples: int  # of the fixed batch

@@ -4,11 +4,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.surrogate import objectives
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
@@ -17,8 +17,6 @@ from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.study.optimisation import problem_of
-
-Array = NDArray[np.float64]
 
 ESTIMATES = ("surrogate", "simulation")
 MOMENTS = ("mean", "deviation")
@@ -30,7 +28,7 @@ LEAST_BLOCKS = 4
 class RandomInputs:
     """The panel; arrays (2 estimates, 2 moments, sizes) relative to the moment, NaN where nothing was measured."""
 
-    draws: NDArray[np.int64]
+    draws: Integers
     error: Array
     lower: Array  # 95 % confidence limits of the error
     upper: Array

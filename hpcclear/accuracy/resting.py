@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.simulate import MAKERS as WORK_MAKERS
 from hpcclear.ensemble.simulate import make_evaluator
@@ -22,11 +22,11 @@ class Resting:
     lanes = 1
     pending = 1 << 40  # never hungry
 
-    def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
+    def submit(self, index: Integers, points: Array) -> None:
         """Nothing is ever submitted to it: no index, no points."""
         raise AssertionError("a resting rank was given samples")
 
-    def advance(self, seconds: float) -> NDArray[np.void]:
+    def advance(self, seconds: float) -> Records:
         """Rest; no records."""
         time.sleep(seconds)
         return np.zeros(0, OUTCOME)

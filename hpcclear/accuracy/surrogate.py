@@ -4,9 +4,9 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hpcclear.accuracy.profile import Profile
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import Ranks
@@ -20,8 +20,6 @@ from hpcclear.statistics.surrogate.response_surface import fit_response_surface,
 from hpcclear.study.simulations import objective_of
 from hpcclear.study.surrogates import coordinate
 
-Array = NDArray[np.float64]
-
 SURROGATES = ("response surface", "Kriging")
 
 
@@ -29,7 +27,7 @@ SURROGATES = ("response surface", "Kriging")
 class Surrogates:
     """The panel; arrays (2 surrogates, sample sizes), NaN where a surrogate cannot be fitted to so few samples."""
 
-    training: NDArray[np.int64]
+    training: Integers
     r2: Array
     rmae: Array
     leave_one_out: Array  # RMS, over the standard deviation of the values

@@ -1,15 +1,13 @@
 """Scenes without clearance at prescribed speed: outcomes and time series in closed form."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Problem
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.lowering import parameters, problem_of
 from hpcclear.scene import Scene
-
-Array = NDArray[np.float64]
 
 _CONTACT = ("eccentricity_x", "eccentricity_y", "penetration", "contact_force", "friction_force")
 
@@ -19,7 +17,7 @@ class ClosedForm:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._labels: list[NDArray[np.int64]] = []
+        self._labels: list[Integers] = []
         self._par: list[Array] = []
 
     @property
@@ -27,7 +25,7 @@ class ClosedForm:
         """Samples queued and not collected."""
         return sum(map(len, self._labels))
 
-    def queue(self, par: Array, state: Array, labels: NDArray[np.int64]) -> None:
+    def queue(self, par: Array, state: Array, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), labels (m,); there is no start state to heed."""
         self._par.append(par)
         self._labels.append(labels)
@@ -35,7 +33,7 @@ class ClosedForm:
     def advance(self, seconds: float) -> None:
         """Nothing takes time."""
 
-    def collect(self) -> tuple[NDArray[np.int64], Array, Array]:
+    def collect(self) -> tuple[Integers, Array, Array]:
         """Labels (m,), outcome rows (m, OUT) and parameters (m, PARAMETERS) since the last call."""
         labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
         par = np.concatenate([np.zeros((0, at.PARAMETERS)), *self._par])

@@ -1,15 +1,13 @@
 """The mechanical energy of whole states, and how well a run closed its balance."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import baumgarte, geometry
 from hpcclear.dynamics.lowering import topology
 from hpcclear.dynamics.stepping.lifecycle import STATE
 from hpcclear.scene import Scene
-
-Array = NDArray[np.float64]
 
 _ACTIVE = 2 * at.MAX_COORDINATES
 

@@ -3,8 +3,8 @@
 import os
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.outcome import OUTCOME, RESPONSES, Flag, Status
@@ -16,8 +16,6 @@ from hpcclear.dynamics.lowering import parameters, problem_of, start_states
 from hpcclear.dynamics.stepping.lifecycle import STATE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-
-Array = NDArray[np.float64]
 
 VECTORS = 4
 """Vectors that the lanes of an ensemble fill: enough for the processor to work on one while another waits for a root or a
@@ -95,14 +93,14 @@ class Evaluator:
         self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
-        self._partial: dict[int, NDArray[np.void]] = {}
+        self._partial: dict[int, Records] = {}
 
     @property
     def pending(self) -> int:
         """Samples submitted and not finished (copies count for a share)."""
         return -(-self._lanes.pending // self._copies)
 
-    def submit(self, index: NDArray[np.int64], points: Array) -> None:
+    def submit(self, index: Integers, points: Array) -> None:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
         state = start_states(self.scene, par)
@@ -114,7 +112,7 @@ class Evaluator:
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
         self._lanes.queue(par, state, labels)
 
-    def advance(self, seconds: float) -> NDArray[np.void]:
+    def advance(self, seconds: float) -> Records:
         """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
         self._lanes.advance(seconds)
         labels, rows, par = self._lanes.collect()
@@ -126,7 +124,7 @@ class Evaluator:
             records["energy_error"] = np.where(valid, off, np.nan)
         return records if self._copies == 1 else self._join(records)
 
-    def _join(self, records: NDArray[np.void]) -> NDArray[np.void]:
+    def _join(self, records: Records) -> Records:
         """Records of samples whose copies are all in, with the uncertainty these state."""
         done = []
         for record in records:
@@ -142,9 +140,7 @@ class Evaluator:
 _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
 
 
-def with_copies(
-    par: Array, state: Array, labels: NDArray[np.int64]
-) -> tuple[Array, Array, NDArray[np.int64]]:
+def with_copies(par: Array, state: Array, labels: Integers) -> tuple[Array, Array, Integers]:
     """Each sample followed by its copies: kicked starts, and stricter tolerances."""
     kicks = np.array([0] + [sign for _, sign in COPIES])
     strict = np.array([1.0] + [factor for factor, _ in COPIES])
@@ -158,7 +154,7 @@ def with_copies(
     return par, state[:, :STATE], copies
 
 
-def joined(sample: int, group: NDArray[np.void]) -> NDArray[np.void]:
+def joined(sample: int, group: Records) -> Records:
     """One record from a sample (first) and its copies: its own numbers, and how far they can be trusted."""
     record = group[0].copy()
     record["sample"] = sample
@@ -170,9 +166,7 @@ def joined(sample: int, group: NDArray[np.void]) -> NDArray[np.void]:
     return record
 
 
-def outcome_records(
-    labels: NDArray[np.int64], rows: Array, par: Array, responses: bool = False
-) -> NDArray[np.void]:
+def outcome_records(labels: Integers, rows: Array, par: Array, responses: bool = False) -> Records:
     """Kernel outcome rows (m, OUT) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
@@ -206,7 +200,7 @@ def outcome_records(
     return records
 
 
-def beyond_hertz(rows: Array, par: Array) -> NDArray[np.bool_]:
+def beyond_hertz(rows: Array, par: Array) -> Booleans:
     """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
     beyond = np.zeros(len(rows), bool)
     for joint, deepest in ((at.JOINT_12, at.OUT_DEEPEST_12), (at.JOINT_23, at.OUT_DEEPEST_23)):
@@ -215,7 +209,7 @@ def beyond_hertz(rows: Array, par: Array) -> NDArray[np.bool_]:
     return beyond
 
 
-def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> NDArray[np.void]:
+def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> Records:
     """Simulate all points here and now; records in the points' order (n,)."""
     evaluator = Evaluator(scene, points, lanes)
     evaluator.submit(np.arange(len(points)), points.values)

@@ -4,8 +4,8 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
 from hpcclear.dynamics.collocation.lobatto import STAGES
@@ -36,8 +36,6 @@ from hpcclear.dynamics.stepping.lifecycle import (
     STATE,
     TRANSIENT,
 )
-
-Array = NDArray[np.float64]
 
 _NO_TABLE = np.zeros(4)
 
@@ -148,7 +146,7 @@ class Lanes:
             np.empty((0, at.PARAMETERS)), np.empty((0, STATE)), np.empty(0, np.int64)
         )
 
-    def _accept_queue(self, par: Array, state: Array, labels: NDArray[np.int64]) -> None:
+    def _accept_queue(self, par: Array, state: Array, labels: Integers) -> None:
         self._queue_par = np.ascontiguousarray(par)
         self._queue_state = np.ascontiguousarray(state)
         self._labels = labels
@@ -158,7 +156,7 @@ class Lanes:
         self.counters[SLOTS] = len(labels)
 
     @property
-    def running(self) -> NDArray[np.bool_]:
+    def running(self) -> Booleans:
         """Which lanes hold a sample, shape (width,)."""
         row = at.RUNNING * self.width
         return self._work[row : row + self.width] == 1.0
@@ -173,7 +171,7 @@ class Lanes:
         """Samples that have not finished."""
         return self.waiting + int(self.running.sum())
 
-    def queue(self, par: Array, state: Array, labels: NDArray[np.int64]) -> None:
+    def queue(self, par: Array, state: Array, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), start states (m, STATE), labels (m,).
 
         To be called when everything finished has been collected: lanes keep their own copy of what they
@@ -248,7 +246,7 @@ class Lanes:
             )
         )
 
-    def collect(self) -> tuple[NDArray[np.int64], Array, Array]:
+    def collect(self) -> tuple[Integers, Array, Array]:
         """Labels (m,), outcome rows (m, OUT) and parameters (m, PARAMETERS) of what finished since the last call."""
         count = int(self.counters[FINISHED])
         slots = self._finished[:count].copy()

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
@@ -14,8 +14,6 @@ from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.stepping.lifecycle import STATE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-
-Array = NDArray[np.float64]
 
 LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Records
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.evaluator import outcome_records
@@ -26,8 +27,6 @@ from hpcclear.dynamics.target import recorded, resolve
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
-Array = NDArray[np.float64]
-
 _CHUNK = 8192  # accepted steps kept before they are handed over
 
 
@@ -45,7 +44,7 @@ class Steps:
     a: Array
 
 
-def integrate(scene: Scene) -> tuple[Steps, NDArray[np.void], Array]:
+def integrate(scene: Scene) -> tuple[Steps, Records, Array]:
     """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
     problem = problem_of(scene, ledger=True, series=True, single=True)
     par = parameters(scene)
@@ -189,7 +188,7 @@ def simulate(scene: Scene) -> xr.Dataset:
     )
 
 
-def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
     lanes = ClosedForm(problem_of(scene))
     par = parameters(scene)
@@ -197,7 +196,7 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void
     return *ideal_series(scene), outcome_records(*lanes.collect())
 
 
-def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], NDArray[np.void]]:
+def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
     first, second, free = topology(scene)
     nine = scene.numerics.formulation == "baumgarte"

@@ -1,13 +1,11 @@
 """A run told revolution by revolution: mean gaps of each, every one started from the end of the last."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.stepping.lifecycle import STATE
-
-Array = NDArray[np.float64]
 
 
 def objective(gaps: Array) -> Array:

@@ -8,8 +8,8 @@ revolutions, against a run at `STRICT`.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes, Problem
@@ -17,8 +17,6 @@ from hpcclear.dynamics.lowering import parameters, problem_of, start_states
 from hpcclear.dynamics.revolutions import objective, turn_by_turn
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-
-Array = NDArray[np.float64]
 
 SHARE = 0.1
 """First guess of rtol over the target error.

@@ -9,8 +9,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.statistics.streams.accumulator import Accumulator
@@ -95,7 +95,7 @@ class Parts:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+    def __getitem__(self, index: Integers) -> Array:
         return self._rows[np.asarray(index, np.int64)].astype(float)
 
 
@@ -114,7 +114,7 @@ class Summariser:
 
     lanes = 1  # parts at once: one is worked on while the next fills lanes that it leaves
 
-    def __init__(self, worker: "Worker", points: "Points", edges: NDArray[np.float64]) -> None:
+    def __init__(self, worker: "Worker", points: "Points", edges: Array) -> None:
         self._worker, self._points, self._edges = worker, points, edges
         self._open: dict[int, np.ndarray] = {}  # records by part; sample -1: not here yet
         self._places: dict[int, tuple[int, int]] = {}  # first sample and length of each part
@@ -134,7 +134,7 @@ class Summariser:
             for k in np.flatnonzero(records["sample"] < 0).tolist()
         )
 
-    def submit(self, index: NDArray[np.int64], points: NDArray[np.float64]) -> None:
+    def submit(self, index: Integers, points: Array) -> None:
         """Queue parts: numbers (m,), rows of first sample and length (m, 2)."""
         for part, (first, length) in zip(
             index.tolist(), points.astype(np.int64).tolist(), strict=True

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from hpcclear import __version__
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
 from hpcclear.dynamics.target import recorded, resolve
@@ -40,7 +40,7 @@ class _Left:
     def __len__(self) -> int:
         return len(self._remaining)
 
-    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+    def __getitem__(self, index: Integers) -> Array:
         return self._points[self._remaining.samples(index)]
 
 
@@ -249,7 +249,7 @@ def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = No
     return dataset.dataset("statistics", coords, data, attributes)
 
 
-def _of_quantity(name: str, summary: Summary, edges: NDArray[np.float64]) -> dict[str, np.ndarray]:
+def _of_quantity(name: str, summary: Summary, edges: Array) -> dict[str, np.ndarray]:
     """Variables of one quantity; scalars lose the axis of joints."""
     rows = [k for k, (quantity, _) in enumerate(ROWS) if quantity == name]
     chosen = rows if len(rows) > 1 else rows[0]

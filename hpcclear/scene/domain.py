@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
 
 if TYPE_CHECKING:
     from hpcclear.scene.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

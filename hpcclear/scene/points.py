@@ -4,14 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import entries
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def check_points(
 
 
 def _refuse(
-    bad: NDArray[np.bool_], values: Array, name: str, reason: str, label: Callable[[int], str]
+    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
 ) -> None:
     if bad.any():
         row = int(np.argmax(bad))

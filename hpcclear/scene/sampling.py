@@ -9,8 +9,8 @@ from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, slender_inertias, study_of, to_physical
@@ -27,8 +27,6 @@ __all__ = [
     "read_points",
     "unit_lhs",
 ]
-
-Array = NDArray[np.float64]
 
 
 def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
@@ -254,7 +252,7 @@ class MonteCarloPoints:
         self._pages.move_to_end(number)
         return self._pages[number]
 
-    def __getitem__(self, index: NDArray[np.int64]) -> NDArray[np.float64]:
+    def __getitem__(self, index: Integers) -> Array:
         index = np.asarray(index, np.int64)
         values = np.empty((index.size, len(self.page(0).names)))
         numbers = index // _PAGE

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -22,7 +23,6 @@ from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
 from hpcclear.study.run import Result, Run
 from hpcclear.study.surrogates import coordinate
 
-Array = NDArray[np.float64]
 PROBES = 64
 """Designs, beside the corners, at which the rules of derived random inputs are chosen."""
 

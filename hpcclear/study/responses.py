@@ -4,16 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulate
 from hpcclear.results.dataset import variable_name
 from hpcclear.scene import Scene
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, Run
-
-Array = NDArray[np.float64]
 
 QUANTITIES = ("contact force 1", "contact force 2", "crank moment", "slider acceleration")
 """O12, O23, the reaction moment on the crank, and the slider."""

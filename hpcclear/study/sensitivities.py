@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box
 from hpcclear.statistics.sensitivity import (
@@ -24,7 +24,6 @@ from hpcclear.statistics.surrogate.response_surface import fit_response_surface,
 from hpcclear.statistics.surrogate.surface_search import fit_until_accepted
 from hpcclear.study.run import Result, Run
 
-Array = NDArray[np.float64]
 STAGE = "sensitivity"
 _NORMAL_95 = 1.959963984540054
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.simulate import sample_points
@@ -15,8 +15,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import study_of, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
-
-Array = NDArray[np.float64]
 
 OBJECTIVES: dict[str, tuple[str, Callable[[np.ndarray], Array]]] = {
     "mean-gap": ("m", lambda records: records["objective"]),

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene.domain import Box, box
@@ -20,7 +20,6 @@ from hpcclear.statistics.surrogate.subintervals import (
 )
 from hpcclear.study.run import Result, Run
 
-Array = NDArray[np.float64]
 STAGE = "kriging"
 _CHECKS = ("r2", "rmae", "r2_explained", "rmae_mean", "rmse")
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import to_coordinates
 from hpcclear.scene.points import Points
@@ -16,7 +16,6 @@ from hpcclear.study import surrogates
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, Run
 
-Array = NDArray[np.float64]
 _COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
 
 

@@ -16,14 +16,12 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import accelerations
-
-Array = NDArray[np.float64]
 
 STAGES = 8
 """Unknown stages of a step; the last stands at its end."""

@@ -14,8 +14,8 @@ evaluated together. `size` is a tuple whose length is the number n of coordinate
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
@@ -67,7 +67,7 @@ STEP_SAFETY = 0.9
 LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
 
-def new_memory(width: int) -> NDArray[np.float64]:
+def new_memory(width: int) -> Array:
     """Memory of `width` lanes, shape (width, mem.MEMORY), with the method's coefficients in it.
 
     Lanes of a bank that no stage needs repeat the last one: what they hold must be a state like any other.

@@ -10,8 +10,8 @@ by their mass centres. At prescribed speed the crank angle restarts every revolu
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.motion import (
@@ -378,9 +378,7 @@ def known_guide_friction(guide, par, free, slope, v3, i, W):
         return 0.0
 
 
-def constraint_violation(
-    crank_rod: bool, rod_slider: bool, par: NDArray[np.float64], q: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def constraint_violation(crank_rod: bool, rod_slider: bool, par: Array, q: Array) -> Array:
     """Largest position constraint that is not met, in m, at each instant.
 
     Parameters

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

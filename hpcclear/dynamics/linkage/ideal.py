@@ -7,8 +7,8 @@ derivatives from the loop's, and each body's balance gives one joint's reaction 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.motion import (
@@ -19,8 +19,6 @@ from hpcclear.dynamics.linkage.motion import (
     table_value,
 )
 from hpcclear.dynamics.physics.angles import sincos
-
-Array = NDArray[np.float64]
 
 (
     SLIDER_X,

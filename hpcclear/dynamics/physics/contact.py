@@ -15,12 +15,10 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, Array)
 """A float, or an array of them."""
 
 

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.report.figures import labels
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,9 @@
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-
-Array = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
 

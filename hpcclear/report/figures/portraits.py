@@ -4,15 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.report.figures import labels, motion, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
@@ -178,7 +177,7 @@ def poincare_figure(
     return figure
 
 
-def _only(x: Array, y: Array, shown: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _only(x: Array, y: Array, shown: Booleans) -> tuple[Array, Array]:
     """A line with gaps where it is not shown."""
     return np.where(shown, x, np.nan), np.where(shown, y, np.nan)
 
@@ -192,7 +191,7 @@ def _circle(axes: "Axes", radius: float) -> None:
         )
 
 
-def _arcs(axes: "Axes", radius: float, x: Array, y: Array, contact: NDArray[np.bool_]) -> None:
+def _arcs(axes: "Axes", radius: float, x: Array, y: Array, contact: Booleans) -> None:
     """Where on the circle there was contact."""
     angle = np.arctan2(y, x)
     shown = _only(radius * np.cos(angle), radius * np.sin(angle), contact)

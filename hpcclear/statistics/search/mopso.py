@@ -29,11 +29,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
 from hpcclear.statistics.search.pareto import (
     Archive,
-    Floats,
     Front,
     cut,
     hypervolume,
@@ -124,25 +124,25 @@ class Swarm:
             np.empty(0) if reference is None else np.atleast_1d(np.array(reference, dtype=float))
         )
         shape = (self.settings.particles, len(self._lower))
-        self._positions: Floats = rng.random(shape)
+        self._positions: Array = rng.random(shape)
         if start is not None:
             self._place(np.array(start, dtype=float))
-        self._velocities: Floats = np.zeros(shape)
-        self._personal_positions: Floats = self._positions.copy()
-        self._personal_values: Floats = np.empty((shape[0], 0))
-        self._personal_violations: Floats = np.full(shape[0], np.inf)
+        self._velocities: Array = np.zeros(shape)
+        self._personal_positions: Array = self._positions.copy()
+        self._personal_values: Array = np.empty((shape[0], 0))
+        self._personal_violations: Array = np.full(shape[0], np.inf)
         self._archive = Archive(
             self.settings.archive_capacity, np.empty((0, shape[1])), np.empty((0, 0))
         )
-        self._earlier_values: Floats = np.empty((0, 0))
-        self._history: Floats = np.empty(0)
+        self._earlier_values: Array = np.empty((0, 0))
+        self._history: Array = np.empty(0)
 
     @property
     def done(self) -> bool:
         """Whether all iterations have been told."""
         return self.iteration >= self.iterations
 
-    def ask(self) -> Floats:
+    def ask(self) -> Array:
         """Points to evaluate, shape (particles, d); the same ones until `tell` is called."""
         return self._points(self._positions)
 
@@ -238,7 +238,7 @@ class Swarm:
             raise InputError("swarm state", shape, "shapes differ", "Give what state() gave.")
         return swarm
 
-    def _place(self, start: Floats) -> None:
+    def _place(self, start: Array) -> None:
         """Put known designs in the place of the first particles."""
         known = np.atleast_2d(start)
         if known.shape[1] != len(self._lower) or len(known) > len(self._positions):
@@ -248,11 +248,11 @@ class Swarm:
             raise InputError("start", known.tolist(), "outside the bounds", "Widen the bounds.")
         self._positions[: len(known)] = (known - self._lower) / (self._upper - self._lower)
 
-    def _points(self, unit: Floats) -> Floats:
+    def _points(self, unit: Array) -> Array:
         # this form meets both bounds exactly; the clip removes the last rounding error inside
         return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
 
-    def _checked(self, values: ArrayLike, violations: ArrayLike | None) -> tuple[Floats, Floats]:
+    def _checked(self, values: ArrayLike, violations: ArrayLike | None) -> tuple[Array, Array]:
         """Objectives (n, m) and total violation (n,), infinite where the objectives failed."""
         told = np.array(values, dtype=float)
         told = told[:, None] if told.ndim == 1 else told
@@ -277,7 +277,7 @@ class Swarm:
         # a model that skips the objectives of an infeasible point still gives its violation
         return told, np.where(failed & (total == 0.0), np.inf, total)
 
-    def _remember(self, values: Floats, total: Floats) -> None:
+    def _remember(self, values: Array, total: Array) -> None:
         """Update the personal bests: the new point unless the old one is better or equal."""
         if self._personal_values.shape[1] == 0:
             self._personal_values = np.full_like(values, np.nan)
@@ -288,7 +288,7 @@ class Swarm:
         self._personal_values[taken] = values[taken]
         self._personal_violations[taken] = total[taken]
 
-    def _leaders(self) -> tuple[Floats, Floats]:
+    def _leaders(self) -> tuple[Array, Array]:
         """Positions that guide and how lonely each is; without an archive, the least violating."""
         if len(self._archive):
             return self._archive.positions, self._archive.loneliness()
@@ -345,7 +345,7 @@ class Swarm:
 
 
 def minimise(
-    function: Callable[[Floats], ArrayLike | tuple[ArrayLike, ArrayLike]],
+    function: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]],
     bounds: ArrayLike,
     *,
     iterations: int,
@@ -381,7 +381,7 @@ def _within(key: str, value: float, most: float) -> None:
         raise InputError(key, value, f"not between 0 and {most}", "See SwarmSettings.")
 
 
-def _checked_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
+def _checked_bounds(bounds: ArrayLike) -> tuple[Array, Array]:
     table = np.array(bounds, dtype=float)
     if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:
         raise InputError("bounds", table.shape, "wrong shape", "Give (lower, upper) per variable.")
@@ -393,7 +393,7 @@ def _checked_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     return table[:, 0].copy(), table[:, 1].copy()
 
 
-def _mutated(unit: Floats, index: float, rng: np.random.Generator) -> Floats:
+def _mutated(unit: Array, index: float, rng: np.random.Generator) -> Array:
     """Polynomial mutation (Deb & Goyal 1996) in the unit cube, on one coordinate on average."""
     hit = rng.random(unit.shape) < 1.0 / unit.shape[1]
     u = rng.random(unit.shape)[hit]

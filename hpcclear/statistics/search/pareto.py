@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from hpcclear.base.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,12 @@ class Front:
     `remark` says this in words.
     """
 
-    points: Floats
-    values: Floats
+    points: Array
+    values: Array
     evaluations: int
     failed: int
     infeasible: int
-    history: Floats
+    history: Array
     gain: float
     settled: bool
     remark: str
@@ -42,7 +42,7 @@ class Archive:
     one stays.
     """
 
-    def __init__(self, capacity: int, positions: Floats, values: Floats) -> None:
+    def __init__(self, capacity: int, positions: Array, values: Array) -> None:
         self.capacity = capacity
         self.positions = positions
         self.values = values
@@ -50,7 +50,7 @@ class Archive:
     def __len__(self) -> int:
         return len(self.values)
 
-    def add(self, positions: Floats, values: Floats) -> None:
+    def add(self, positions: Array, values: Array) -> None:
         """Merge feasible points with finite objectives."""
         if not len(values):
             return
@@ -61,15 +61,15 @@ class Archive:
         alive, _ = _thin(merged, max(self.capacity, values.shape[1]))
         self.positions, self.values = where[alive], merged[alive]
 
-    def loneliness(self) -> Floats:
+    def loneliness(self) -> Array:
         """Distance of each point to its nearest neighbour, objectives scaled to their extent."""
         return _thin(self.values, len(self.values))[1]
 
 
-def hypervolume(values: Floats, reference: Floats) -> float:
-    """Hypervolume dominated below `reference`: exact to five objectives, then approximate.
+def hypervolume(values: Array, reference: Array) -> float:
+    """Hypervolume dominated by `values (k, m)` below `reference (m,)`; exact to five objectives.
 
-    The approximation (moocore's Rphi-FWE+) is deterministic. An empty set has none.
+    Beyond, moocore's approximation Rphi-FWE+, which is deterministic. An empty set has none.
     """
     if values.size == 0:
         return 0.0
@@ -78,8 +78,8 @@ def hypervolume(values: Floats, reference: Floats) -> float:
     return float(moocore.hv_approx(values, reference, method="Rphi-FWE+"))
 
 
-def relative_gain(before: Floats, now: Floats) -> float:
-    """Share of the hypervolume of `now` that `before` lacks; NaN if either is empty.
+def relative_gain(before: Array, now: Array) -> float:
+    """Share of the hypervolume of `now (k, m)` that `before (j, m)` lacks; NaN if either is empty.
 
     Scaled to the extent of `now` (where it has none, to its size), reference point 1.1 times that.
     """
@@ -94,7 +94,7 @@ def relative_gain(before: Floats, now: Floats) -> float:
     return 1.0 - hypervolume((before - low) / extent, reference) / final
 
 
-def cut(values: Floats, size: int) -> NDArray[np.intp]:
+def cut(values: Array, size: int) -> NDArray[np.intp]:
     """Indices of at most `size` rows of a non-dominated set, well spread.
 
     With two and three objectives the smallest hypervolume contribution is dropped each time

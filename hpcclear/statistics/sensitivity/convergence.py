@@ -26,13 +26,12 @@ derivative that is 0; its standard error then says how large it could be.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.sensitivity.intervals import SensitivityHistory
 from hpcclear.statistics.surrogate.metrics import check_confidence
-from hpcclear.statistics.surrogate.response_surface import FloatArray
 
 
 @dataclass(frozen=True)
@@ -57,12 +56,12 @@ class ConvergenceIntervals:
         The rule's settings.
     """
 
-    found: NDArray[np.bool_]
-    interval: NDArray[np.int64]
-    plateau: NDArray[np.int64]
-    sensitivity: FloatArray
-    uncertainty: FloatArray
-    converged: NDArray[np.bool_]
+    found: Booleans
+    interval: Integers
+    plateau: Integers
+    sensitivity: Array
+    uncertainty: Array
+    converged: Booleans
     confidence: float
     tolerance: float
 
@@ -127,7 +126,7 @@ def convergence_intervals(
 
 def best_estimates(
     history: SensitivityHistory, intervals: ConvergenceIntervals
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Array, Array]:
     """One derivative and its uncertainty for each clearance and variable, to rank and select by.
 
     Taken in the convergence interval; where the derivative is not distinguishable from 0, at the
@@ -154,14 +153,12 @@ def best_estimates(
     )
 
 
-def _student(freedom: NDArray[np.int64], doubt: float) -> FloatArray:
+def _student(freedom: Integers, doubt: float) -> Array:
     """Two-sided Student quantiles that chance passes with probability `doubt`."""
     return np.asarray(stdtrit(freedom, 1.0 - doubt / 2.0))
 
 
-def _plateau_start(
-    slope: FloatArray, error: FloatArray, critical: FloatArray, tolerance: float
-) -> int:
+def _plateau_start(slope: Array, error: Array, critical: Array, tolerance: float) -> int:
     """The widest interval from which on all estimates agree: the last if none does."""
     start = len(slope) - 1
     while start > 0:
@@ -176,7 +173,7 @@ def _plateau_start(
     return start
 
 
-def _uncertainty(slope: FloatArray, error: FloatArray, truncation: FloatArray) -> FloatArray:
+def _uncertainty(slope: Array, error: Array, truncation: Array) -> Array:
     """Standard errors joined with the truncation left; NaN in the widest interval.
 
     All arrays run over the intervals, the widest first. `truncation` is what the truncation error
@@ -187,7 +184,7 @@ def _uncertainty(slope: FloatArray, error: FloatArray, truncation: FloatArray) -
 
 
 def _first_determined(
-    slope: FloatArray, error: FloatArray, uncertainty: FloatArray, critical: FloatArray, start: int
+    slope: Array, error: Array, uncertainty: Array, critical: Array, start: int
 ) -> int | None:
     """The widest interval after `start` in which, and before which, the slope is surely not 0."""
     sure = np.abs(slope) > critical * uncertainty

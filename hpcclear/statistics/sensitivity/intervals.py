@@ -8,13 +8,13 @@ midpoints. `hpcclear.statistics.sensitivity.convergence` says in which of them i
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.response_surface import (
     Evaluate,
-    FloatArray,
     ResponseSurface,
     Sampler,
     check_bounds,
@@ -79,9 +79,9 @@ class IntervalDesign:
     settings : IntervalSettings
     """
 
-    points: FloatArray
-    intervals: FloatArray
-    clearances: FloatArray
+    points: Array
+    intervals: Array
+    clearances: Array
     settings: IntervalSettings
 
 
@@ -105,15 +105,15 @@ class SensitivityHistory:
         Total order of the surfaces.
     """
 
-    intervals: FloatArray
-    clearances: FloatArray
-    sensitivity: FloatArray
-    standard_error: FloatArray
-    r2: FloatArray
-    rmae: FloatArray
-    leave_one_out_r2: FloatArray
-    degrees_of_freedom: NDArray[np.int64]
-    failed: NDArray[np.int64]
+    intervals: Array
+    clearances: Array
+    sensitivity: Array
+    standard_error: Array
+    r2: Array
+    rmae: Array
+    leave_one_out_r2: Array
+    degrees_of_freedom: Integers
+    failed: Integers
     order: int
 
 
@@ -253,7 +253,7 @@ def sensitivity_history(
 
 
 def _surface(
-    design: IntervalDesign, k: int, points: FloatArray, values: FloatArray
+    design: IntervalDesign, k: int, points: Array, values: Array
 ) -> ResponseSurface | None:
     """Surface over interval k on its training points; None if failures left too few of them."""
     limits, settings = design.intervals[k], design.settings
@@ -264,7 +264,7 @@ def _surface(
 
 
 def _tested(
-    design: IntervalDesign, surface: ResponseSurface, points: FloatArray, values: FloatArray
+    design: IntervalDesign, surface: ResponseSurface, points: Array, values: Array
 ) -> tuple[float, float]:
     """R2 and RMAE on the test points; NaN if fewer than two of them succeeded."""
     points, values = points[design.settings.n_points :], values[design.settings.n_points :]
@@ -274,7 +274,7 @@ def _tested(
     return reached.r2, reached.rmae
 
 
-def _check_design(clearances: FloatArray, settings: IntervalSettings, terms: int) -> None:
+def _check_design(clearances: Array, settings: IntervalSettings, terms: int) -> None:
     if clearances.ndim != 1 or clearances.size == 0 or not np.isfinite(clearances).all():
         raise InputError(
             "clearances", clearances.tolist(), "not a list of numbers", "give at least one"

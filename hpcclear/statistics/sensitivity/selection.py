@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import check_confidence
-from hpcclear.statistics.surrogate.response_surface import FloatArray
 
 
 class Influence(IntEnum):
@@ -67,11 +67,11 @@ class Selection:
     """
 
     names: tuple[str, ...]
-    effect: FloatArray
-    effect_error: FloatArray
+    effect: Array
+    effect_error: Array
     influence: NDArray[np.int8]
-    rank: NDArray[np.int64]
-    share: FloatArray
+    rank: Integers
+    share: Array
     selected: tuple[str, ...]
     order_stable: bool
 
@@ -143,20 +143,20 @@ def select_influential(
     )
 
 
-def _mean_known(quantity: NDArray[np.generic], known: NDArray[np.bool_]) -> FloatArray:
+def _mean_known(quantity: NDArray[np.generic], known: Booleans) -> Array:
     """Mean over the clearances with an estimate, shape (m,); NaN without any."""
     counts = np.count_nonzero(known, axis=0)
     usable = np.where(known & np.isfinite(quantity), quantity, 0.0)
     return np.asarray(usable.sum(axis=0) / np.where(counts > 0, counts, np.nan))
 
 
-def _ranks(effect: FloatArray) -> NDArray[np.int64]:
+def _ranks(effect: Array) -> Integers:
     """Place of each column at each clearance, 1 for the largest, NaN last."""
     order = np.argsort(-effect, axis=1, kind="stable")
     return np.argsort(order, axis=1, kind="stable") + 1
 
 
-def _order_stable(effect: FloatArray, margin: FloatArray) -> bool:
+def _order_stable(effect: Array, margin: Array) -> bool:
     lead = effect[:, :, np.newaxis] - effect[:, np.newaxis, :]
     allowed = np.hypot(margin[:, :, np.newaxis], margin[:, np.newaxis, :])
     ahead = (lead > allowed).any(axis=0)
@@ -165,7 +165,7 @@ def _order_stable(effect: FloatArray, margin: FloatArray) -> bool:
 
 def _checked(
     names: Sequence[str], sensitivity: ArrayLike, standard_error: ArrayLike, lengths: ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[Array, Array, Array]:
     slope, error = np.asarray(sensitivity, float), np.asarray(standard_error, float)
     length = np.asarray(lengths, float)
     if slope.ndim != 2 or slope.shape != error.shape or 0 in slope.shape:

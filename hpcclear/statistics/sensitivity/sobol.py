@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import ROUNDING, check_confidence
-from hpcclear.statistics.surrogate.response_surface import Evaluate, FloatArray, check_bounds
+from hpcclear.statistics.surrogate.response_surface import Evaluate, check_bounds
 
 
 @dataclass(frozen=True)
@@ -38,10 +39,10 @@ class SobolIndices:
     confidence : float
     """
 
-    first: FloatArray
-    total: FloatArray
-    first_limits: FloatArray
-    total_limits: FloatArray
+    first: Array
+    total: Array
+    first_limits: Array
+    total_limits: Array
     mean: float
     variance: float
     n_rows: int
@@ -49,7 +50,7 @@ class SobolIndices:
     confidence: float
 
 
-def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> FloatArray:
+def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Array:
     """Points to simulate: two samples A and B, then for each input A with that column of B.
 
     Parameters
@@ -189,7 +190,7 @@ def sobol_indices(
     )
 
 
-def _indices(y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _indices(y: Array) -> tuple[Array, Array]:
     """First-order and total indices from rows A, B, AB_1 ... AB_d, shape (d + 2, n)."""
     both = y[:2]
     if np.ptp(both) <= ROUNDING * np.abs(both).max():  # nothing to share out

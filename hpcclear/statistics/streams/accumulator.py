@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.statistics.streams.summary import (
     BINS,
     BLOCK,
-    Array,
     Summary,
     empty,
     histogram_edges,
@@ -134,7 +134,7 @@ class Accumulator:
         self._ready[number] = summary
         self._reduce()
 
-    def parts_left(self, length: int) -> NDArray[np.int64]:
+    def parts_left(self, length: int) -> Integers:
         """First sample and length (n, 2) of parts of at most `length` samples that make up all that was not taken.
 
         Blocks of which single samples were taken are left out: they are `remaining`.
@@ -215,7 +215,7 @@ class Accumulator:
         scattered = np.concatenate(loose) if loose else np.empty(0, np.int64)
         return Remaining(scattered, self._untouched(), self.block, self.total)
 
-    def _untouched(self) -> NDArray[np.int64]:
+    def _untouched(self) -> Integers:
         """Blocks of which nothing was taken."""
         done = np.zeros(self.blocks, bool)
         done[: self._next] = True
@@ -277,9 +277,7 @@ class Remaining:
     whole blocks in order.
     """
 
-    def __init__(
-        self, scattered: NDArray[np.int64], whole: NDArray[np.int64], block: int, total: int
-    ) -> None:
+    def __init__(self, scattered: Integers, whole: Integers, block: int, total: int) -> None:
         self._scattered, self._whole = scattered.astype(np.int64), whole.astype(np.int64)
         self._block, self._total = block, total
         size = self._whole.size * block
@@ -295,7 +293,7 @@ class Remaining:
         kept = self._whole[self._whole == 0] if first_block else self._whole[:0]
         return Remaining(self._scattered, kept, self._block, self._total)
 
-    def samples(self, position: NDArray[np.int64]) -> NDArray[np.int64]:
+    def samples(self, position: Integers) -> Integers:
         """Sample numbers at some positions, shape (m,)."""
         place = np.asarray(position, np.int64) - self._scattered.size
         found = np.empty(place.shape, np.int64)

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME, Flag, Status
-
-Array = NDArray[np.float64]
 
 BLOCK = 4096
 """Samples in a block. Part of what makes results reproducible: another length merges in another order."""
@@ -49,14 +48,14 @@ class Summary:
         Samples by `hpcclear.base.outcome.Flag`.
     """
 
-    count: NDArray[np.int64]
+    count: Integers
     mean: Array
     squares: Array
     minimum: Array
     maximum: Array
-    histogram: NDArray[np.int64]
-    status: NDArray[np.int64]
-    flags: NDArray[np.int64]
+    histogram: Integers
+    status: Integers
+    flags: Integers
 
     @property
     def deviation(self) -> Array:

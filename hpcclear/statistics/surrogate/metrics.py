@@ -18,8 +18,9 @@ The printed R2 can pass 1: it rewards predictions that scatter more than the tru
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 
 ROUNDING = 32.0 * np.finfo(np.float64).eps
@@ -120,7 +121,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     )
 
 
-def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> NDArray[np.float64]:
+def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> Array:
     """Errors at each point of the linear least-squares fit made without it.
 
     No refit is needed: the error is ``residual / (1 - leverage)``, the leverage being the diagonal
@@ -152,7 +153,7 @@ def check_confidence(confidence: float) -> None:
         raise InputError("confidence", confidence, "not a probability", "take 0.99, for example")
 
 
-def _pair(first: ArrayLike, second: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
     """Two equally long vectors; the second must be finite."""
     a, b = np.asarray(first, float), np.asarray(second, float)
     if a.ndim != 1 or a.shape != b.shape:

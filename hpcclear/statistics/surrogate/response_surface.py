@@ -11,15 +11,15 @@ from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import ROUNDING, leave_one_out
 
-FloatArray = NDArray[np.float64]
-Evaluate = Callable[[FloatArray], FloatArray]
+Evaluate = Callable[[Array], Array]
 """True function: points of shape (n, d) -> values of shape (n,), NaN where it failed."""
-Sampler = Callable[[int, FloatArray, np.random.Generator], FloatArray]
+Sampler = Callable[[int, Array, np.random.Generator], Array]
 """``sample(n, bounds, generator)`` -> points of shape (n, d) inside bounds of shape (d, 2)."""
 
 OUTSIDE = 1e-9  # in half-lengths: how far rounding may carry a point past a bound
@@ -56,20 +56,20 @@ class ResponseSurface:
         Points that counted, and those dropped because their value was not finite.
     """
 
-    bounds: FloatArray
+    bounds: Array
     order: int
-    exponents: NDArray[np.int64]
-    coefficients: FloatArray
-    unscaled_covariance: FloatArray
+    exponents: Integers
+    coefficients: Array
+    unscaled_covariance: Array
     residual_variance: float
     degrees_of_freedom: int
-    leave_one_out_errors: FloatArray
+    leave_one_out_errors: Array
     leave_one_out_r2: float
     condition: float
     n_points: int
     n_dropped: int
 
-    def predict(self, points: ArrayLike) -> FloatArray:
+    def predict(self, points: ArrayLike) -> Array:
         """Values at points of shape (n, d), in the unit of f, shape (n,).
 
         Raises
@@ -80,7 +80,7 @@ class ResponseSurface:
         z = scale_inputs(points, self.bounds)
         return np.asarray(_terms(z, self.exponents) @ self.coefficients)
 
-    def gradient(self, point: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def gradient(self, point: ArrayLike) -> tuple[Array, Array]:
         """First derivatives at one point and their standard errors (eq. 14).
 
         Parameters
@@ -112,7 +112,7 @@ def n_terms(n_inputs: int, order: int) -> int:
     return comb(n_inputs + order, order)
 
 
-def check_bounds(bounds: ArrayLike) -> FloatArray:
+def check_bounds(bounds: ArrayLike) -> Array:
     """Bounds as a finite array of shape (d, 2), each lower limit below its upper one.
 
     Raises
@@ -135,7 +135,7 @@ def check_bounds(bounds: ArrayLike) -> FloatArray:
     return limits
 
 
-def scale_inputs(points: ArrayLike, bounds: FloatArray) -> FloatArray:
+def scale_inputs(points: ArrayLike, bounds: Array) -> Array:
     """Points of shape (n, d) in physical units, scaled to [-1, 1] over the bounds.
 
     Raises
@@ -161,7 +161,7 @@ def scale_inputs(points: ArrayLike, bounds: FloatArray) -> FloatArray:
     return z
 
 
-def latin_hypercube(n: int, bounds: FloatArray, rng: np.random.Generator) -> FloatArray:
+def latin_hypercube(n: int, bounds: Array, rng: np.random.Generator) -> Array:
     """Latin hypercube of n points, shape (n, d): one point in each n-th of every input."""
     strata = np.stack([rng.permutation(n) for _ in bounds], axis=1)
     unit = (strata + rng.random(strata.shape)) / n
@@ -233,9 +233,7 @@ def fit_response_surface(
     )
 
 
-def _decomposed(
-    design: FloatArray, order: int, n_dropped: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _decomposed(design: Array, order: int, n_dropped: int) -> tuple[Array, Array, Array]:
     """Singular value decomposition of a design matrix that determines every term."""
     n_points, terms = design.shape
     if n_points < terms:
@@ -257,7 +255,7 @@ def _decomposed(
     return left, singular, right
 
 
-def _finite_rows(z: FloatArray, values: ArrayLike) -> tuple[FloatArray, FloatArray, int]:
+def _finite_rows(z: Array, values: ArrayLike) -> tuple[Array, Array, int]:
     y = np.asarray(values, float)
     if y.shape != (len(z),):
         raise InputError("values", y.shape, f"not one value for {len(z)} points", "pass shape (n,)")
@@ -265,7 +263,7 @@ def _finite_rows(z: FloatArray, values: ArrayLike) -> tuple[FloatArray, FloatArr
     return z[finite], y[finite], int(np.count_nonzero(~finite))
 
 
-def _exponents(n_inputs: int, order: int) -> NDArray[np.int64]:
+def _exponents(n_inputs: int, order: int) -> Integers:
     """Exponents of all terms up to a total order, shape (t, d), the constant first."""
     if order < 0:
         raise InputError("order", order, "a polynomial has no negative order", "take 0 or more")
@@ -275,7 +273,7 @@ def _exponents(n_inputs: int, order: int) -> NDArray[np.int64]:
     return np.array([[c.count(j) for j in range(n_inputs)] for c in chosen], dtype=np.int64)
 
 
-def _terms(z: FloatArray, exponents: NDArray[np.int64]) -> FloatArray:
+def _terms(z: Array, exponents: Integers) -> Array:
     """All terms at scaled points, shape (n, t)."""
     terms = np.ones((len(z), len(exponents)))
     for j in range(z.shape[1]):  # input by input: no array of n x t x d
@@ -283,7 +281,7 @@ def _terms(z: FloatArray, exponents: NDArray[np.int64]) -> FloatArray:
     return terms
 
 
-def _slopes(z: FloatArray, exponents: NDArray[np.int64], j: int) -> FloatArray:
+def _slopes(z: Array, exponents: Integers, j: int) -> Array:
     """Derivatives of all terms with respect to scaled input j, shape (n, t)."""
     lowered = exponents.copy()
     lowered[:, j] = np.maximum(exponents[:, j] - 1, 0)

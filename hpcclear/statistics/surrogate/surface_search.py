@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import (
     Evaluate,
-    FloatArray,
     ResponseSurface,
     Sampler,
     check_bounds,
@@ -136,7 +136,7 @@ def fit_until_accepted(
     return SurfaceSearch(*best, False, reason, tuple(attempts))
 
 
-def _test_values(values: FloatArray) -> FloatArray:
+def _test_values(values: Array) -> Array:
     """The test values, refused before anything is spent on training if most of them failed."""
     if np.count_nonzero(np.isfinite(values)) < 2:
         raise InputError(
@@ -151,11 +151,11 @@ def _test_values(values: FloatArray) -> FloatArray:
 def _growing_sample(
     evaluate: Evaluate,
     sample: Sampler,
-    bounds: FloatArray,
+    bounds: Array,
     rng: np.random.Generator,
     n_points: int,
     max_points: int,
-) -> Iterator[tuple[FloatArray, FloatArray]]:
+) -> Iterator[tuple[Array, Array]]:
     """The training sample, doubled each time by new points and never past `max_points`."""
     points = sample(n_points, bounds, rng)
     values = evaluate(points)

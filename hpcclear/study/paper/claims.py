@@ -8,16 +8,15 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.study.paper.printed import CLAIMS, case_names
 from hpcclear.study.responses import QUANTITIES, STATISTICS
 from hpcclear.study.run import Result, Run
 from hpcclear.study.sensitivities import surfaces
 
-Array = NDArray[np.float64]
 SURE = 2.5758293035489004
 """Standard errors that decide: 99 % two-sided."""
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import sample_points
@@ -26,7 +26,6 @@ from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.run import Result, Run
 from hpcclear.study.verification import moments, samples_of
 
-Array = NDArray[np.float64]
 STAGE = "readings"
 OTHER_RESTITUTION = 0.46
 STEP_SAMPLES = 16
