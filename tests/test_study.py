@@ -15,6 +15,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.study import optimisation, responses, run_study, simulations, surrogates
 from hpcclear.study.paper import claims
@@ -369,9 +370,7 @@ def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, m
     monkeypatch.setattr(formula, "FIELD", name.replace("-", "_"))
     scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
     run_study(scene, place, alone(MAKERS), progress_style="quiet")
-    units = {"peak-contact-force": "N", "peak-crank-moment": "N m"}
-    front, samples = dataset.read(place / "front.nc"), dataset.read(place / "samples.nc")
-    assert front["mean"].attrs["units"] == front["deviation"].attrs["units"] == units[name]
+    samples = dataset.read(place / "samples.nc")
     assert samples["objective"].attrs["units"] == samples["mean_gap"].attrs["units"] == "m"
     assert not (place / "claims.nc").exists()
     assert not (place / "readings.nc").exists()
@@ -379,6 +378,50 @@ def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, m
     told: list[str] = []
     run_study(scene, place, alone(MAKERS), progress_style="quiet", tell=told.append)
     assert told == [f"{place} holds the finished study."]
+
+
+OF_THE_OBJECTIVE = {
+    "sensitivity.nc": (
+        "sensitivity standard_error best_sensitivity uncertainty influence mean_objective "
+        "mean_objective_error"
+    ),
+    "kriging.nc": "training_output output_mean output_scale rmse",
+    "front.nc": "mean deviation",
+    "verification.nc": (
+        "mean_true mean_lower mean_upper mean_surrogate "
+        "deviation_true deviation_lower deviation_upper deviation_surrogate"
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "squared"),
+    [
+        ("mean-gap", "m", "m^2"),
+        ("peak-contact-force", "N", "N^2"),
+        ("peak-crank-moment", "N m", "(N m)^2"),
+    ],
+)
+def test_units_follow_the_objective_and_nothing_else_does(
+    tmp_path, monkeypatch, name, unit, squared
+):
+    """What depends on the objective has its unit; a position stays in metres."""
+    monkeypatch.setattr(formula, "FIELD", "" if name == "mean-gap" else name.replace("-", "_"))
+    place = tmp_path / "out"
+    run_study(scene_of(f"study.objective={name}"), place, alone(MAKERS), progress_style="quiet")
+    for path in sorted(place.rglob("*.nc")):
+        found = dataset.read(path)
+        table = KINDS[found.attrs["hpcclear_kind"]]
+        theirs = OF_THE_OBJECTIVE.get(path.name, "").split()
+        for variable, content in found.data_vars.items():
+            if variable in theirs:
+                assert content.attrs["units"] == unit, (path.name, variable)
+            elif variable == "hypervolume":
+                assert content.attrs["units"] == squared
+            elif variable in table.data and content.dtype.kind == "f":
+                assert content.attrs["units"] == table.data[variable].units, (path.name, variable)
+    response = dataset.read(place / "responses" / "original.nc")
+    assert response["eccentricity_x"].attrs["units"] == "m"
 
 
 def test_of_contact_forces_the_larger_is_the_objective():

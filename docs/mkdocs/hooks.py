@@ -110,7 +110,7 @@ def files() -> Iterator[str]:
             "| --- | --- | --- | --- |",
         )
         for name, row in {**table.coords, **table.data}.items():
-            unit = _cell(row.units or "")
+            unit = _cell(row.unit("that of the objective"))
             yield f"| `{name}` | {', '.join(row.dims)} | {unit} | {_cell(row.long_name)} |"
         yield ""
 

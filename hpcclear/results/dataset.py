@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, Status
 from hpcclear.results import files as storage
-from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Kind, Variable
+from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
@@ -41,6 +41,7 @@ def dataset(
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     units: Mapping[str, str] | None = None,
+    objective_unit: str = "m",
 ) -> xr.Dataset:
     """A dataset of one kind of result file, with every attribute the table knows.
 
@@ -57,6 +58,8 @@ def dataset(
         Further global attributes, text or numbers; see `provenance`.
     units : mapping of str to str, optional
         Units of design variables; those of the paper's (`DESIGN_VARIABLES`) are known.
+    objective_unit : str
+        Unit of the study's objective, of everything that the table says has it.
 
     Returns
     -------
@@ -77,21 +80,25 @@ def dataset(
         raise ValueError(f"{kind} lacks {sorted(missing)}")
     sizes = {name: np.shape(coords[name])[0] for name in table.coords}
     variables = {
-        name: _variable(name, row, coords[name], sizes) for name, row in table.coords.items()
+        name: _variable(name, row, coords[name], sizes, row.units)
+        for name, row in table.coords.items()
     }
     for name, values in data.items():
         if name in table.data:
-            variables[name] = _variable(name, table.data[name], values, sizes)
+            row = table.data[name]
+            variables[name] = _variable(name, row, values, sizes, row.unit(objective_unit))
         else:
             row, marks = _design_row(name, data, units or {}, table)
-            variable = _variable(name, row, values, sizes)
+            variable = _variable(name, row, values, sizes, row.units)
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 
 
-def _variable(name: str, row: Variable, values: ArrayLike, sizes: Mapping[str, int]) -> xr.Variable:
+def _variable(
+    name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int], unit: str
+) -> xr.Variable:
     array = np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
@@ -105,14 +112,14 @@ def _variable(name: str, row: Variable, values: ArrayLike, sizes: Mapping[str, i
             raise ValueError(f"{name} does not fit into {row.dtype}")
         array = exact
     attributes: dict[str, object] = {"long_name": row.long_name}
-    if row.units:
-        attributes["units"] = row.units
+    if unit:
+        attributes["units"] = unit
     return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
 
 
 def _design_row(
     name: str, data: Mapping[str, ArrayLike], units: Mapping[str, str], table: Kind
-) -> tuple[Variable, dict[str, str]]:
+) -> tuple[Column, dict[str, str]]:
     """Row and further attributes of a design variable, or of a limit of one."""
     dims, base, words, role = table.design_dims, name, "", _ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
@@ -121,7 +128,7 @@ def _design_row(
     unit = units.get(base, unit)
     if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    return Variable(dims, unit, words + long_name, "f8"), {"role": role, "scene_path": base}
+    return Column(dims, unit, words + long_name, "f8"), {"role": role, "scene_path": base}
 
 
 def variable_name(name: str, kind: str = "samples") -> str:
@@ -347,7 +354,7 @@ def _fault(content: xr.Dataset, kind: str | None) -> str | None:
                 return f"it holds {name}, which {found} has not"
             if not isinstance(variable.attrs.get("scene_path"), str):
                 return f"{name} does not say which scene path it is"
-            row = Variable(dims, "", "", "f8")
+            row = Column(dims, "", "", "f8")
         if variable.dims != row.dims:
             return f"{name} has dimensions {variable.dims}, not {row.dims}"
         kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}

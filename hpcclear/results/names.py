@@ -2,8 +2,9 @@
 
 Each line reads: name, dimensions, unit, long name. A star marks what may not be missing. A row
 named as its only dimension is a coordinate. In the place of the unit, ``count`` stands for a whole
-number, ``flag`` for a small code whose meanings are attributes, ``text`` for text; everything else
-is a number of double precision in that unit. Units are written so that UDUNITS (CF), pint and
+number, ``flag`` for a small code whose meanings are attributes, ``text`` for text, ``objective`` (and
+``objective^2``) for what has the unit of the study's objective (`Column.unit`); everything else is a
+number of double precision in that unit. Units are written so that UDUNITS (CF), pint and
 cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
@@ -14,21 +15,29 @@ import numpy as np
 from hpcclear.base.outcome import ON_REQUEST, Flag, Status
 
 
-class Variable(NamedTuple):
-    """A row of the table."""
+class Column(NamedTuple):
+    """A row of the table: what one variable of a file is."""
 
     dims: tuple[str, ...]
-    units: str  # "" for text and flags, which have none
+    units: str  # "" for text and flags, which have none; see `unit`
     long_name: str
     dtype: str  # "f8", "i8", "i1" or "text"
+
+    def unit(self, objective: str) -> str:
+        """The unit in a study whose objective has the unit `objective`."""
+        if self.units == "objective":
+            return objective
+        if self.units == "objective^2":
+            return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
+        return self.units
 
 
 class Kind(NamedTuple):
     """A file of the table."""
 
     title: str
-    coords: dict[str, Variable]
-    data: dict[str, Variable]
+    coords: dict[str, Column]
+    data: dict[str, Column]
     required: frozenset[str]  # data variables; coordinates always are
     design_dims: tuple[str, ...] | None  # dimensions of its design variables; None: it has none
     limit_dims: tuple[str, ...] | None  # dimensions of their limits, NAME_lower and NAME_upper
@@ -133,7 +142,7 @@ r2*          | {dims} | 1     | 1 - SSE/SST on test points
 rmae*        | {dims} | 1     | largest test error over their standard deviation
 r2_explained | {dims} | 1     | explained variance ratio, eq. 26 as printed
 rmae_mean    | {dims} | 1     | largest test error over their mean, eq. 27 as printed
-rmse         | {dims} | m     | root mean square error on test points
+rmse         | {dims} | objective | root mean square error on test points
 points       | {dims} | count | number of points fitted
 """
 
@@ -142,16 +151,16 @@ surface              | surface | text | inputs of the response surface
 interval             | interval | 1 | interval, fraction of the range
 clearance            | clearance | m | radial clearance
 parameter            | parameter | text | design variable
-sensitivity*         | surface interval clearance parameter | m | slope at midpoint, times range
-standard_error*      | surface interval clearance parameter | m | standard error of it
+sensitivity*         | surface interval clearance parameter | objective | slope at midpoint, times range
+standard_error*      | surface interval clearance parameter | objective | standard error of it
 r2*                  | surface interval clearance | 1 | 1 - SSE/SST on test points
 rmae*                | surface interval clearance | 1 | largest test error over their standard deviation
 leave_one_out_r2     | surface interval clearance | 1 | 1 - SSE/SST of leave-one-out errors
 converged*           | surface clearance parameter | flag | whether it is determined
 convergence_interval | surface clearance parameter | 1 | interval where it is determined
 plateau_interval     | surface clearance parameter | 1 | widest interval from which on it agrees
-best_sensitivity     | surface clearance parameter | m | slope where determined, times range
-uncertainty          | surface clearance parameter | m | standard error of it, truncation included
+best_sensitivity     | surface clearance parameter | objective | slope where determined, times range
+uncertainty          | surface clearance parameter | objective | standard error of it, truncation included
 surface_r2           | surface clearance | 1 | 1 - SSE/SST on test points, global surface
 surface_rmae         | surface clearance | 1 | largest test error over their deviation
 surface_r2_explained | surface clearance | 1 | explained variance ratio, eq. 26 as printed
@@ -159,13 +168,13 @@ surface_rmae_mean    | surface clearance | 1 | largest test error over their mea
 surface_order        | surface clearance | count | order of the global surface
 surface_points       | surface clearance | count | points it was fitted to
 surface_accepted     | surface clearance | flag | whether it passed on its test points
-mean_objective       | clearance | m | mean of the objective over the box
-mean_objective_error | clearance | m | standard error of it
+mean_objective       | clearance | objective | mean of the objective over the box
+mean_objective_error | clearance | objective | standard error of it
 sobol_first          | parameter | 1 | first-order Sobol index
 sobol_first_error    | parameter | 1 | its standard error
 sobol_total          | parameter | 1 | total Sobol index
 sobol_total_error    | parameter | 1 | its standard error
-influence            | parameter | m | mean effect, what parameters are ranked by
+influence            | parameter | objective | mean effect, what parameters are ranked by
 selected             | parameter | flag | whether its influence is great
 """
 
@@ -174,14 +183,14 @@ model           | model           | text  | name of the model, one for each subi
 point           | point           | count | number of the training point
 parameter       | parameter       | text  | design variable
 family          | model           | text  | what the subintervals make up together
-training_output | model point     | m     | objective at the training point
+training_output | model point     | objective | objective at the training point
 weight*         | model point     | 1     | weight of the training point in a prediction
 length_scale*   | model parameter | 1     | correlation length, in the unit cube
 used            | model parameter | flag  | whether the parameter is an input of the model
 signal_variance | model           | 1     | variance of the process, in output_scale^2
 noise_variance  | model           | 1     | variance of the noise, in output_scale^2
-output_mean     | model           | m     | mean taken off before the fit
-output_scale    | model           | m     | deviation divided by before the fit
+output_mean     | model           | objective | mean taken off before the fit
+output_scale    | model           | objective | deviation divided by before the fit
 dropped         | model           | count | number of failed samples left out of the fit
 accepted        | model           | flag  | whether the model passed on its test points
 """ + _FIT.format(dims="model")
@@ -190,25 +199,25 @@ _FRONT = """
 case        | case              | text  | case of the robust design
 run         | run               | count | number of the run of the optimiser
 solution    | solution          | count | number of the solution in its run
-mean*       | case run solution | m     | mean of the objective, by the surrogate
-deviation*  | case run solution | m     | standard deviation of the objective, by the surrogate
+mean*       | case run solution | objective | mean of the objective, by the surrogate
+deviation*  | case run solution | objective | standard deviation of the objective, by the surrogate
 verified    | case run solution | flag  | whether the solution was simulated directly
-hypervolume | case run          | m^2   | area that the front dominates
+hypervolume | case run          | objective^2 | area that the front dominates
 """
 
 _VERIFICATION = """
 design              | design | text  | name of the design
 case                | design | text  | case of the robust design
-mean_true*          | design | m     | mean of the objective, by direct simulation
-mean_lower          | design | m     | lower confidence limit of the mean
-mean_upper          | design | m     | upper confidence limit of the mean
-mean_surrogate      | design | m     | mean of the objective, by the surrogate
+mean_true*          | design | objective | mean of the objective, by direct simulation
+mean_lower          | design | objective | lower confidence limit of the mean
+mean_upper          | design | objective | upper confidence limit of the mean
+mean_surrogate      | design | objective | mean of the objective, by the surrogate
 mean_error          | design | 1     | error of the surrogate mean, relative to the true one
 mean_paper          | design | m     | mean as printed in the paper, its Table 4
-deviation_true*     | design | m     | standard deviation, by direct simulation
-deviation_lower     | design | m     | lower confidence limit of the deviation
-deviation_upper     | design | m     | upper confidence limit of the deviation
-deviation_surrogate | design | m     | standard deviation, by the surrogate
+deviation_true*     | design | objective | standard deviation, by direct simulation
+deviation_lower     | design | objective | lower confidence limit of the deviation
+deviation_upper     | design | objective | upper confidence limit of the deviation
+deviation_surrogate | design | objective | standard deviation, by the surrogate
 deviation_error     | design | 1     | error of the surrogate deviation, relative
 deviation_paper     | design | m     | deviation as printed in the paper, its Table 4
 samples             | design | count | number of simulations
@@ -328,14 +337,14 @@ def _kind(
     limit_dims: tuple[str, ...] | None = None,
     whole: bool = False,
 ) -> Kind:
-    coords: dict[str, Variable] = {}
-    data: dict[str, Variable] = {}
+    coords: dict[str, Column] = {}
+    data: dict[str, Column] = {}
     required = set()
     for line in filter(None, table.splitlines()):
         starred, dims, units, long_name = (cell.strip() for cell in line.split("|"))
         name = starred.rstrip("*")
         units, dtype = _DTYPES.get(units, (units, "f8"))
-        row = Variable(tuple(dims.split()), units, long_name, dtype)
+        row = Column(tuple(dims.split()), units, long_name, dtype)
         (coords if row.dims == (name,) else data)[name] = row
         if starred != name:
             required.add(name)

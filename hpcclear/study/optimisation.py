@@ -290,4 +290,5 @@ def write(run: Run, fronts: Result, verified: Sequence[Choice]) -> None:
         "solution": np.arange(solutions),
     }
     units = {name: run.study.variable(name).unit or "1" for name in used}
-    run.write(dataset.dataset("front", coords, data, units=units), "front.nc")
+    content = dataset.dataset("front", coords, data, units=units, objective_unit=run.objective_unit)
+    run.write(content, "front.nc")

@@ -49,6 +49,11 @@ class Run:
         """The study of the scene."""
         return study_of(self.scene)
 
+    @property
+    def objective_unit(self) -> str:
+        """SI unit of what the study makes small."""
+        return objective_of(self.scene)[0]
+
     def rng(self, *labels: str) -> np.random.Generator:
         """A stream of random numbers for one purpose."""
         return generator(self.study.seed, *labels)
@@ -97,11 +102,5 @@ class Run:
     def write(self, content: xr.Dataset, name: str) -> None:
         """Write a result file, with what made it."""
         content.attrs.update(self.checkpoint.attributes)
-        unit = objective_of(self.scene)[0]
-        # of a sample all responses are recorded, each in its own unit
-        if unit != "m" and content.attrs["hpcclear_kind"] != "samples":
-            for variable in content.data_vars.values():
-                if variable.attrs.get("units") == "m" and "scene_path" not in variable.attrs:
-                    variable.attrs["units"] = unit
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)

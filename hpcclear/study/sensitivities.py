@@ -73,7 +73,9 @@ def write(run: Run, result: Result) -> None:
         "clearance": result["clearance"],
         "parameter": np.array(run.study.names),
     }
-    content: xr.Dataset = dataset.dataset("sensitivity", coords, data)
+    content: xr.Dataset = dataset.dataset(
+        "sensitivity", coords, data, objective_unit=run.objective_unit
+    )
     content.attrs["failed_simulations"] = int(result["failed"])
     content.attrs["inertias"] = "varied as the ratio to m L^2/12 where the study gives a ratio"
     run.write(content, "sensitivity.nc")

@@ -167,7 +167,10 @@ def write(run: Run, result: Result) -> None:
         "point": np.arange(points),
         "parameter": np.array(parameters),
     }
-    run.write(dataset.dataset("kriging", coords, data, units=_units(run)), "kriging.nc")
+    content = dataset.dataset(
+        "kriging", coords, data, units=_units(run), objective_unit=run.objective_unit
+    )
+    run.write(content, "kriging.nc")
 
 
 _SCALARS = {

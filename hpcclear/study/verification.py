@@ -149,7 +149,9 @@ def write(
     data["samples"] = np.full(len(choices), study.verification.samples)
     units = {name: study.variable(name).unit or "1" for name in used}
     coords = {"design": np.array([choice.name for choice in choices])}
-    content = dataset.dataset("verification", coords, data, units=units)
+    content = dataset.dataset(
+        "verification", coords, data, units=units, objective_unit=run.objective_unit
+    )
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["remarks"] = " ".join(remarks) if remarks else "none"
     run.write(content, "verification.nc")
