@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from hpcclear.accuracy.plan import RESERVE, Plan, Row, describe, measure, simulations_of, slurm
+from hpcclear.accuracy.plan import Plan, Row, measure, simulations_of
 from hpcclear.accuracy.resting import MAKERS
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
+from hpcclear.cli.plan import RESERVE, describe, slurm
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone

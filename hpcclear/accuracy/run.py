@@ -145,14 +145,17 @@ def _parallel(found: parallel.Parallel) -> tuple[dict[str, Any], dict[str, Any]]
     return coords, data
 
 
-def run_accuracy(scene: Scene, directory: Path, ranks: Ranks, profile: Profile) -> int:
-    """Measure, write ``accuracy.nc`` and the figures, print the tables; exit code 0.
+def run_accuracy(
+    scene: Scene, directory: Path, ranks: Ranks, profile: Profile, tell: Callable[[str], object]
+) -> tuple[xr.Dataset, dict[str, Path]]:
+    """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
+
+    `tell` gets what is going on, a line at a time.
 
     Raises
     ------
     InputError, StorageError, Stopped, RankFailed
     """
-    from hpcclear.cli.accuracy import describe
     from hpcclear.report.figures import accuracy as accuracy_figures
     from hpcclear.report.figures import style
 
@@ -164,14 +167,9 @@ def run_accuracy(scene: Scene, directory: Path, ranks: Ranks, profile: Profile) 
         raise storage.refused(directory, error) from error
     storage.probe(place)
 
-    def tell(text: str) -> None:
-        sys.stderr.write(f"accuracy: {text}\n")
-        sys.stderr.flush()
-
     found = measure(scene, ranks, profile, tell)
     dataset.write(found, place)
     files = {"accuracy": place}
     for name, draw in accuracy_figures.FIGURES.items():
         files[name] = style.save(draw(found), directory / f"{name}.png")
-    describe(found, files)
-    return 0
+    return found, files

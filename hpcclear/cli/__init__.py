@@ -192,14 +192,16 @@ def sample(
     Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
 
-    def program(ranks: "Ranks") -> int | None:
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample, run_summary
 
         scene, place = _scene(file, overrides), _place(output)
         how: dict[str, Any] = {"fresh": fresh, "interval": interval, "style": progress}
         if statistics:
-            return run_summary(scene, place, ranks, raw=raw and _place(raw), **how)
-        return run_sample(scene, place, ranks, table=points, **how)
+            describe_statistics(run_summary(scene, place, ranks, raw=raw and _place(raw), **how))
+        else:
+            describe_samples(run_sample(scene, place, ranks, table=points, **how))
 
     _check_kind(points, statistics, raw)
     return _on_ranks(program, time_limit)
@@ -265,12 +267,16 @@ def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) 
     Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
     """
 
-    def program(ranks: "Ranks") -> int | None:
+    def program(ranks: "Ranks") -> None:
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
+        from hpcclear.cli.accuracy import describe
+
+        def tell(text: str) -> None:
+            click.echo(f"accuracy: {text}", err=True)
 
         profile = PROFILES["quick" if quick else "full"]
-        return run_accuracy(_scene(file, overrides), _place(output), ranks, profile)
+        describe(*run_accuracy(_scene(file, overrides), _place(output), ranks, profile, tell))
 
     return _on_ranks(program)
 
@@ -297,11 +303,13 @@ def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: i
     Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
     """
 
-    def program(ranks: "Ranks") -> int | None:
-        from hpcclear.accuracy.plan import run_plan
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.accuracy.plan import ladder, measure
+        from hpcclear.cli.plan import describe
 
         planned = ranks.size if workers is None else workers
-        return run_plan(_scene(file, overrides), str(file), ranks, error, planned)
+        made = measure(_scene(file, overrides), ranks, ladder(error), planned)
+        describe(made, str(file), error, planned)
 
     return _on_ranks(program)
 

@@ -2,7 +2,6 @@
 
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,6 +11,7 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.ensemble.session import Finished
 from hpcclear.scene import Scene
 
 WIDTH = 80
@@ -170,16 +170,16 @@ def flag_remarks(flags: int) -> list[str]:
     return [text for flag, text in REMARKS.items() if flags & flag]
 
 
-def _load(spent: Any, wall: float) -> list[tuple[str, str]]:
+def _load(found: Finished) -> list[tuple[str, str]]:
     """Wall time, and how every rank spent it."""
     words = "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s"
-    ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(spent)]
-    return [("wall time", f"{wall:.1f} s"), *ranks]
+    ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(found.spent)]
+    return [("wall time", f"{found.seconds:.1f} s"), *ranks]
 
 
-def describe_statistics(content: xr.Dataset, ranks: Any, wall: float, path: Path) -> None:
+def describe_statistics(found: Finished) -> None:
     """Print mean and deviation of f with the error of the mean, failures and load of a streamed Monte Carlo."""
-    out = console()
+    out, content = console(), found.content
     by_status = content["samples_by_status"]
     total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
     rows = [("simulated", f"{good} of {total} without failure")]
@@ -188,14 +188,13 @@ def describe_statistics(content: xr.Dataset, ranks: Any, wall: float, path: Path
         error = deviation / int(content["objective_count"]) ** 0.5
         rows.append(("mean of f", f"{mean:.6g} mm, standard error {error:.1e} mm"))
         rows.append(("deviation of f", f"{deviation:.4g} mm"))
-    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
-    out.print(table("Statistics", rows + _load(spent, wall)))
-    out.print(f"statistics {path}")
+    out.print(table("Statistics", rows + _load(found)))
+    out.print(f"statistics {found.output}")
 
 
-def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[str, Path]) -> None:
+def describe_samples(found: Finished) -> None:
     """Print throughput, range of f, failures and load of a batch of samples."""
-    out = console()
+    out, samples = console(), found.content
     f = samples["objective"].to_numpy()
     status = samples["status"].to_numpy()
     good = f[status == Status.OK]
@@ -221,8 +220,7 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
         )
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
     rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
-    spent = sum(ranks.stage_seconds.values(), np.zeros((ranks.size, 4)))
-    busy = spent[:, 0]
+    busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
         rows.append(
@@ -232,7 +230,6 @@ def describe_samples(samples: xr.Dataset, ranks: Any, wall: float, files: dict[s
                 f"{busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
             )
         )
-    rows += _load(spent, wall)
-    out.print(table("Samples", rows))
-    for what, path in files.items():
+    out.print(table("Samples", rows + _load(found)))
+    for what, path in (("samples", found.output), ("timing", found.timing)):
         out.print(f"{what:8} {path}")

@@ -13,6 +13,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.ensemble.session import Finished
 from hpcclear.ensemble.simulate import run_key, sample_points
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.team import COLUMNS, Ranks
@@ -70,7 +71,7 @@ def run_sample(
     fresh: bool = False,
     interval: float = INTERVAL,
     style: Style = "auto",
-) -> int:
+) -> Finished:
     """Simulate a design on all ranks and write it; on root.
 
     Parameters
@@ -90,15 +91,13 @@ def run_sample(
 
     Returns
     -------
-    int
-        Exit code 0.
+    Finished
+        The samples.
 
     Raises
     ------
     InputError, StorageError, Stopped, RankFailed
     """
-    from hpcclear.cli.printing import describe_samples
-
     start = time.perf_counter()
     storage.probe(output)
     if fresh and (os.path.lexists(output) or os.path.lexists(parts_of(output))):
@@ -114,10 +113,7 @@ def run_sample(
     timing = output.parent / "timing.nc"
     if ranks.stage_seconds or not timing.exists():  # who finds all done keeps what was measured
         dataset.write(timing_of(ranks), timing)
-    describe_samples(
-        samples, ranks, time.perf_counter() - start, {"samples": output, "timing": timing}
-    )
-    return 0
+    return Finished(samples, output, timing, time.perf_counter() - start, spent_by(ranks))
 
 
 def run_summary(
@@ -129,16 +125,15 @@ def run_summary(
     fresh: bool = False,
     interval: float = INTERVAL,
     style: Style = "auto",
-) -> int:
+) -> Finished:
     """Simulate the study's Monte Carlo points and keep their statistics only; on root.
 
-    Parameters as for `run_sample`; `raw`: directory for the samples themselves, if they are wanted. Returns exit code 0.
+    Parameters as for `run_sample`; `raw`: directory for the samples themselves, if they are wanted. Returns the statistics.
 
     Raises
     ------
     InputError, StorageError, Stopped, RankFailed
     """
-    from hpcclear.cli.printing import describe_statistics
     from hpcclear.ensemble.statistics import run_statistics
 
     start = time.perf_counter()
@@ -148,8 +143,7 @@ def run_summary(
     timing = output.parent / "timing.nc"
     if ranks.stage_seconds or not timing.exists():
         dataset.write(timing_of(ranks), timing)
-    describe_statistics(content, ranks, time.perf_counter() - start, output)
-    return 0
+    return Finished(content, output, timing, time.perf_counter() - start, spent_by(ranks))
 
 
 def _simulate(
@@ -187,6 +181,11 @@ def _simulate(
     with ranks.stage("files"), ranks.writing():
         dataset.write(samples, output)
     return samples
+
+
+def spent_by(ranks: Ranks) -> np.ndarray:
+    """Seconds of every rank in all stages of this job, shape (ranks, 4)."""
+    return sum(ranks.stage_seconds.values(), np.zeros((ranks.size, len(COLUMNS))))
 
 
 def timing_of(ranks: Ranks) -> xr.Dataset:

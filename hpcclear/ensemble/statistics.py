@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hpcclear import __version__
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
@@ -93,7 +92,8 @@ def run_statistics(
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     entries = {name: repr(value) for name, value in flatten(scene.resolved())}
     layout = f"{len(points)} in blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
-    key = {**entries, "hpcclear version": __version__, "statistics": layout}
+    version = dataset.provenance(scene.text, scene.hash)["hpcclear_version"]
+    key = {**entries, "hpcclear version": version, "statistics": layout}
     with Lock(output.parent, f".{output.name}.lock"):
         storage.remove_leftovers(output.parent)
         if output.exists():

@@ -1,0 +1,80 @@
+"""What the `plan` command prints: the ladder of errors, and the job to ask for."""
+
+import math
+
+from rich import box
+from rich.table import Table
+
+from hpcclear.accuracy.plan import Plan, Row
+from hpcclear.cli.printing import console, table
+from hpcclear.ranks.progress import duration
+
+RESERVE = 1.5
+"""Wall time asked for over wall time expected."""
+
+
+def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
+    """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
+    out = console()
+    simulations = plan.samples if plan.study is None else plan.study
+    command = "sample" if plan.study is None else "run"
+    made = Table(
+        title=f"{command}: {simulations} simulations on {ranks} ranks", title_justify="left",
+        box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
+    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+        made.add_column(name, no_wrap=True, justify="right" if name != "settings" else "left")
+    for row in plan.rows:
+        total = plan.core_seconds(row, simulations, ranks)
+        made.add_row(
+            "file" if row.error is None else f"{row.error:.0e}",
+            row.settings(),
+            f"{1e3 * row.seconds:.3g}",
+            f"{total:.4g}",
+            f"{total / 3600:.2g}",
+            duration(plan.wall_seconds(row, simulations, ranks)),
+        )
+    out.print(made)
+    row = next((row for row in plan.rows if row.error == error), plan.rows[0])
+    out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
+    overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
+    for line in slurm(plan, row, simulations, ranks):
+        out.print(line, markup=False, soft_wrap=True)
+    place = "results/samples.nc" if command == "sample" else "results"
+    out.print(f"srun hpcclear {command} {file} -o {place}{overrides}", markup=False, soft_wrap=True)
+
+
+def _needs(
+    plan: Plan, row: Row, simulations: int, command: str, ranks: int
+) -> list[tuple[str, str]]:
+    rows = [
+        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.4g}"),
+        ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
+        ("start-up", f"{plan.startup:.1f} s a rank, and once a node up to a minute to compile"),
+        (
+            "memory",
+            f"{plan.memory / 2**20:.0f} MB a rank, {simulations * 1e-6:.2g} GB more on rank 0",
+        ),
+        ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
+    ]
+    if row.reason:
+        rows.append(("settings", row.reason))
+    if command == "run":
+        text = "at least: refused surrogates and misses take more; fits and swarm run on one core"
+        rows.append(("simulations", f"{simulations}, {text}"))
+        rows.append(("sample alone", f"{plan.samples} simulations"))
+    return rows
+
+
+def slurm(plan: Plan, row: Row, simulations: int, ranks: int) -> list[str]:
+    """The head of a batch script for this job."""
+    minutes = math.ceil((RESERVE * plan.wall_seconds(row, simulations, ranks) + 120.0) / 60.0)
+    memory = 256 * math.ceil(1.5 * plan.memory / 2**20 / 256)
+    return [
+        "#!/bin/bash",
+        f"#SBATCH --ntasks={ranks}",
+        "#SBATCH --cpus-per-task=1",
+        f"#SBATCH --mem-per-cpu={memory}M",
+        f"#SBATCH --time={minutes // 60:02d}:{minutes % 60:02d}:00",
+        "#SBATCH --signal=USR1@60  # saves in time; the same command goes on",
+    ]
