@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from margins import bootstrap, fewest, ratio_of_medians
 
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.evaluator import evaluate_records
@@ -14,9 +15,9 @@ SCENE = "jobs/quickstart.toml"
 
 @pytest.fixture(scope="module")
 def box():
-    """200 random scenes of Table 3's box, C from 0.3 to 1 mm, each with its uncertainty at two tolerances."""
+    """600 random scenes of Table 3's box, C from 0.3 to 1 mm, each with its uncertainty at two tolerances."""
     scene = load_scene(SCENE, ["numerics.uncertainty=true", "study.seed=2"])
-    points = latin_hypercube(scene, 200)
+    points = latin_hypercube(scene, 600)
     return [evaluate_records(scene.with_({"numerics.rtol": rtol}), points) for rtol in (1e-6, 3e-7)]
 
 
@@ -24,19 +25,25 @@ def test_runs_at_two_tolerances_overlap_within_their_stated_uncertainties(box):
     one, other = box
     apart = np.abs(one["objective"] - other["objective"])
     stated = one["objective_uncertainty"] + other["objective_uncertainty"]
-    assert np.mean(apart <= stated) >= 0.95
+    assert np.count_nonzero(apart <= stated) >= fewest(len(apart), 0.95)
 
 
 def test_the_stated_uncertainty_is_no_excuse(box):
+    """Its median is at most three times the median difference: 2.7 and 2.0 times over 6000 scenes.
+
+    The ratio scatters by an eighth over 600 chaotic scenes, so it is its lower limit that must not pass 3. Twice the
+    stated uncertainty does pass: 3.2 to 5.2.
+    """
     one, other = box
-    apart = np.median(np.abs(one["objective"] - other["objective"]))
+    apart = np.abs(one["objective"] - other["objective"])
     for records in box:
-        assert np.median(records["objective_uncertainty"]) <= 3.0 * apart
+        stated = records["objective_uncertainty"]
+        assert bootstrap(ratio_of_medians, stated, apart, side="lower") <= 3.0
 
 
 def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box):
     scene = load_scene(SCENE, ["study.seed=2"])
-    points = latin_hypercube(scene, 200).take(slice(0, 40))
+    points = latin_hypercube(scene, 600).take(slice(0, 40))
     plain = evaluate_records(scene, points)
     np.testing.assert_array_equal(plain["objective"], box[0]["objective"][:40])
     assert np.isnan(plain["objective_uncertainty"]).all()
@@ -60,18 +67,19 @@ def test_automatic_average_meets_its_target_or_says_that_it_did_not():
             "numerics.max_steps=10000000",
         ],
     )
-    points = latin_hypercube(scene, 32)
+    points = latin_hypercube(scene, 96)
     loose = evaluate_records(scene, points)
     assert set(loose["status"]) <= {Status.OK, Status.AVERAGE_CAP}
     assert np.isfinite(loose["objective"]).all()
     tight = {"numerics.objective_tolerance": 1e-9, "numerics.max_averaged_revolutions": 12}
     capped = evaluate_records(scene.with_(tight), points)
-    assert (capped["status"] == Status.AVERAGE_CAP).sum() > 24
+    assert (capped["status"] == Status.AVERAGE_CAP).sum() > 72
     assert np.isfinite(capped["objective"]).all()
     # against a long average, few leave four times the standard error that was asked for
     long = evaluate_records(scene.with_({"numerics.averaged_revolutions": 400}), points)
     error = np.abs(loose["objective"] / long["objective"] - 1.0)
-    assert np.mean(error[loose["status"] == Status.OK] < 4 * 2e-3) > 0.9
+    met = error[loose["status"] == Status.OK] < 4 * 2e-3
+    assert np.count_nonzero(met) >= fewest(len(met), 0.9)
 
 
 def test_penetration_beyond_hertz_is_flagged():
