@@ -136,6 +136,36 @@ def test_every_axis_has_a_label_with_its_unit(figure: Figure) -> None:
     assert checked >= 2
 
 
+CUT_ON_PURPOSE = {
+    "spectrum": "what is a millionth of the highest line is the window's own",
+    "energy": "a residual of a hundred-thousandth of the largest is round-off, on an axis of decades",
+    "fit": "an R2 far below 0 or an error of twice the scatter says no more than that the fit failed",
+}
+
+
+def test_no_axis_cuts_its_data(request: pytest.FixtureRequest, figure: Figure) -> None:
+    for axes in figure.axes:
+        for line in axes.lines:
+            if line.get_transform() != axes.transData:
+                continue  # stands at a place of the panel, not of its data
+            points = np.array([np.asarray(values, float) for values in line.get_data()])
+            drawn = points[:, np.isfinite(points).all(axis=0)]
+            for values, limits in zip(drawn, (axes.get_xlim(), axes.get_ylim()), strict=True):
+                low, high = sorted(limits)
+                slack = 1e-9 * (high - low)
+                inside = (values >= low - slack) & (values <= high + slack)
+                assert inside.all() or request.node.callspec.params["figure"] in CUT_ON_PURPOSE
+
+
+def test_a_deeper_second_joint_is_not_cut_off() -> None:
+    response = data.response()
+    depth = response["penetration"]
+    response["penetration"] = depth * xr.DataArray([1.0, 3.0], dims="joint")
+    response["penetration"].attrs = depth.attrs
+    for panel in report.penetration_figure(response).axes:
+        assert panel.get_ylim()[1] >= max(np.max(line.get_ydata()) for line in panel.lines)
+
+
 def test_no_panel_is_empty(figure: Figure) -> None:
     for axes in figure.axes:
         assert not axes.axison or axes.has_data() or axes.get_label() == "<colorbar>"

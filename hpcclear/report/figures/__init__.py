@@ -1,1 +1,1 @@
-"""Figures, each a function of a dataset."""
+"""Figures, each a function of a dataset that returns a matplotlib Figure."""

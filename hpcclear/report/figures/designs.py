@@ -39,10 +39,6 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
         Kind ``front``.
     verification : xarray.Dataset, optional
         Kind ``verification``: its designs are drawn with confidence limits, joined to what the surrogate said.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     cases = [str(case) for case in front["case"].to_numpy()]
     columns = 1 if verification is None else 2
@@ -147,10 +143,6 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
         drawn in both as what to compare with.
     revolutions : int
         The last ones are drawn.
-
-    Returns
-    -------
-    matplotlib Figure
 
     Raises
     ------

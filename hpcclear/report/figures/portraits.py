@@ -26,10 +26,6 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
         Kind ``response``.
     revolutions : int, optional
         The last ones are drawn; half of all by default.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     shown = motion.steady(response, revolutions)
     figure, axes = style.grid(2, 1, 170.0)
@@ -83,16 +79,7 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
 def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
     """Phase portraits of the slider: velocity over position, acceleration over velocity.
 
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int, optional
-        The last ones are drawn; half of all by default.
-
-    Returns
-    -------
-    matplotlib Figure
+    Parameters as for `orbit_figure`.
     """
     from matplotlib.collections import LineCollection
 
@@ -134,10 +121,6 @@ def poincare_figure(
         Crank angle of the section, rad.
     revolutions : int, optional
         The last ones are used; half of all by default.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     shown = motion.steady(response, revolutions)
     figure = style.page(118.0)

@@ -36,10 +36,6 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
         Kind ``response``.
     revolutions : int
         How many; fewer if the response has fewer.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     shown = motion.latest(response, revolutions)
     names = (
@@ -89,7 +85,9 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
         share = float((depth > 0.0).mean())
         panel.set_title(f"{style.JOINT_NAMES[joint]}: in contact {share:.0%} of the time")
         panel.set_ylabel(unit.label("penetration"))
-        panel.set_ylim(bottom=0.0)
+    axes[0, 0].set_ylim(
+        bottom=0.0
+    )  # after both are drawn: a limit ends the automatic scale of the axis they share
     axes[-1, 0].set_xlabel("crank angle (revolutions)")
     style.settle(axes)
     return figure
@@ -109,10 +107,6 @@ def spectrum_figure(
         The last ones are used; half of all by default.
     orders : float
         Right end of the axis, multiples of the crank frequency.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     shown = motion.steady(response, revolutions)
     figure, axes = style.grid(2, 1, 90.0, sharex=True)
@@ -145,14 +139,7 @@ def spectrum_figure(
 def energy_figure(response: xr.Dataset) -> "Figure":
     """Energy ledger: what the drive puts in, what is stored, what is lost, and what is left unexplained.
 
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-
-    Returns
-    -------
-    matplotlib Figure
+    Of a dataset of kind ``response``.
     """
     figure, axes = style.grid(3, 1, 120.0, sharex=True, height_ratios=[1.2, 1.2, 0.8])
     turn = motion.turns(response)
@@ -197,10 +184,6 @@ def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None 
         Kind ``response``, each of another clearance and with many revolutions.
     revolutions : int, optional
         The last ones of each are drawn; half of all by default.
-
-    Returns
-    -------
-    matplotlib Figure
 
     Raises
     ------

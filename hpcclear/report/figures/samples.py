@@ -30,14 +30,7 @@ _MEANINGS = {
 def samples_figure(samples: xr.Dataset) -> "Figure":
     """Objective against every design variable, coloured by clearance; its spread, histogram and failures.
 
-    Parameters
-    ----------
-    samples : xarray.Dataset
-        Kind ``samples``.
-
-    Returns
-    -------
-    matplotlib Figure
+    Of a dataset of kind ``samples``.
 
     Raises
     ------

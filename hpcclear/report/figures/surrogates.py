@@ -20,14 +20,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
     changing and is determined, with its uncertainty.
 
-    Parameters
-    ----------
-    sensitivity : xarray.Dataset
-        Kind ``sensitivity``.
-
-    Returns
-    -------
-    matplotlib Figure
+    Of a dataset of kind ``sensitivity``.
     """
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     rows = (len(surfaces) + 1) // 2
@@ -79,14 +72,7 @@ def _sensitivity_panel(
 def fit_figure(sensitivity: xr.Dataset) -> "Figure":
     """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
 
-    Parameters
-    ----------
-    sensitivity : xarray.Dataset
-        Kind ``sensitivity``.
-
-    Returns
-    -------
-    matplotlib Figure
+    Of a dataset of kind ``sensitivity``.
     """
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
@@ -126,10 +112,6 @@ def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
     ----------
     sensitivity : xarray.Dataset
         Kind ``sensitivity``, with Sobol indices.
-
-    Returns
-    -------
-    matplotlib Figure
 
     Raises
     ------
@@ -176,10 +158,6 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
         Kind ``kriging``; its models of two variables and the clearance are drawn.
     levels : int
         Steps of the colour scale.
-
-    Returns
-    -------
-    matplotlib Figure
 
     Raises
     ------
@@ -249,10 +227,6 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     ----------
     kriging : xarray.Dataset
         Kind ``kriging``.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     found = models.families(kriging)
     rows = (len(found) + 1) // 2

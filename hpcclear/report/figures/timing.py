@@ -15,14 +15,7 @@ if TYPE_CHECKING:
 def timing_figure(timing: xr.Dataset) -> "Figure":
     """How every rank spent its time, and how much of it each stage took.
 
-    Parameters
-    ----------
-    timing : xarray.Dataset
-        Kind ``timing``.
-
-    Returns
-    -------
-    matplotlib Figure
+    Of a dataset of kind ``timing``.
     """
     shown = min(timing.sizes["rank"], 64), timing.sizes["stage"]
     sizes = [max(3, size) for size in shown]
