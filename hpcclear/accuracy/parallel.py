@@ -13,7 +13,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of, to_physical
+from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator
 
@@ -59,10 +59,10 @@ def _stage(number: int, samples: int) -> str:
 def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> float:
     """Wall seconds of a batch on the first `number` ranks, making of the workers left out."""
     region = region_of(scene, case)
-    rng = generator(study_of(scene).seed, "accuracy", "parallel")
+    rng = generator(scene.required_study.seed, "accuracy", "parallel")
     unit = rng.random((samples, len(region.names)))
     coordinates = region.lower + unit * (region.upper - region.lower)
-    paths = tuple(study_of(scene).variable(name).paths for name in region.names)
+    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
     payload = {**payload_of(scene, points), "ranks": number}
     stage = _stage(number, samples)

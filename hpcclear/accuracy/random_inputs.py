@@ -12,7 +12,6 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of
 from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -70,7 +69,7 @@ def measure(
     error = np.full((len(ESTIMATES), len(MOMENTS), len(sizes)), np.nan)
     lower, upper = error.copy(), error.copy()
     seconds = np.full((len(ESTIMATES), len(sizes)), np.nan)
-    rng = generator(study_of(scene).seed, "accuracy", "draws")
+    rng = generator(scene.required_study.seed, "accuracy", "draws")
     for k, size in enumerate(sizes):
         started = time.perf_counter()
         found = [
@@ -80,7 +79,7 @@ def measure(
         table = np.array([[one.mean[0], one.deviation[0]] for one in found])
         error[0, :, k], lower[0, :, k], upper[0, :, k] = root_mean_square(table / exact - 1.0, 0)
     chosen = dict(zip(problem.names, design[0], strict=True))
-    random = study_of(scene).case(case).random
+    random = scene.required_study.case(case).random
     points = monte_carlo(
         scene, profile.simulations, random=random, design=chosen, purpose="accuracy"
     )

@@ -11,7 +11,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import Box, box, study_of, to_physical
+from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator, unit_lhs
 from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
@@ -39,7 +39,7 @@ class Surrogates:
 
 def region_of(scene: Scene, case: str) -> Box:
     """Where the surrogates hold: the design space, widened so that no random input of the case leaves it."""
-    study = study_of(scene)
+    study = scene.required_study
     return box(scene, study.optimisation, study.case(case).random)
 
 
@@ -47,13 +47,13 @@ def measure(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> Surrogat
     """Fit both surrogates to samples of each size and compare them with fresh simulations."""
     region = region_of(scene, case)
     sizes = [*profile.training, profile.tests]
-    rng = generator(study_of(scene).seed, "accuracy", "surrogate")
+    rng = generator(scene.required_study.seed, "accuracy", "surrogate")
     unit = [unit_lhs(size, len(region.names), rng) for size in sizes]
     coordinates = [region.lower + u * (region.upper - region.lower) for u in unit]
     values, sample_seconds = simulated(scene, region, np.concatenate(coordinates), ranks)
     parts = np.split(values, np.cumsum(sizes)[:-1])
     bounds = np.column_stack([region.lower, region.upper])
-    names = [coordinate(study_of(scene).variable(name)) for name in region.names]
+    names = [coordinate(scene.required_study.variable(name)) for name in region.names]
     shape = (len(SURROGATES), len(profile.training))
     r2, rmae, loo, seconds = (np.full(shape, np.nan) for _ in range(4))
     for k, (points, f) in enumerate(zip(coordinates[:-1], parts[:-1], strict=True)):
@@ -85,7 +85,7 @@ def simulated(scene: Scene, region: Box, coordinates: Array, ranks: Ranks) -> tu
 
     With the core-seconds of one of them.
     """
-    paths = tuple(study_of(scene).variable(name).paths for name in region.names)
+    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
     return objectives(scene, points, ranks, "surrogate: simulations")
 

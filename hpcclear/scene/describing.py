@@ -1,13 +1,10 @@
 """A scene in words: the effects that are on, what deserves a look, and how two scenes differ."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from hpcclear.scene.content import Content
 from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
 from hpcclear.scene.paths import flatten
-
-if TYPE_CHECKING:
-    from hpcclear.scene.scene import Scene
 
 NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
 
@@ -18,7 +15,7 @@ def slender_inertia(mass: float, length: float) -> float:
     return mass * length**2 / 12
 
 
-def effects_on(scene: "Scene") -> Iterator[str]:
+def effects_on(scene: Content) -> Iterator[str]:
     """What is on, in words."""
     for name, label in NAMES.items():
         joint = getattr(scene.joints, name)
@@ -48,7 +45,7 @@ def effects_on(scene: "Scene") -> Iterator[str]:
         yield "uncertainty of each sample"
 
 
-def warnings(scene: "Scene") -> Iterator[str]:
+def warnings(scene: Content) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     for name in ("crank", "rod"):
         link = getattr(scene.mechanism, name)
@@ -82,7 +79,7 @@ def warnings(scene: "Scene") -> Iterator[str]:
             )
 
 
-def differences(first: "Scene", second: "Scene") -> list[str]:
+def differences(first: Content, second: Content) -> list[str]:
     """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
     equal."""
     ours, theirs = dict(flatten(first.resolved())), dict(flatten(second.resolved()))

@@ -7,17 +7,14 @@ as r = I / (m L^2/12), because its bounds depend on the mass.
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.content import Content
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
-
-if TYPE_CHECKING:
-    from hpcclear.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -29,19 +26,7 @@ class Box:
     upper: Array
 
 
-def study_of(scene: "Scene") -> Study:
-    """The study of a scene; InputError if it has none."""
-    if scene.study is None:
-        raise InputError(
-            "study",
-            None,
-            "the scene has no study",
-            "Add [study] and [study.variables], as in jobs/quickstart.toml",
-        )
-    return scene.study
-
-
-def box(scene: "Scene", names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
+def box(scene: Content, names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
     """Bounds of some study variables.
 
     Parameters
@@ -59,7 +44,7 @@ def box(scene: "Scene", names: Sequence[str] | None = None, widen: Iterable[str]
     InputError
         If a name is unknown, or the widened box would hold inertias of 0 or below.
     """
-    study = study_of(scene)
+    study = scene.required_study
     chosen = study.names if names is None else tuple(names)
     for name in chosen:
         if name not in study.names:
@@ -80,7 +65,7 @@ def _reaches(study: Study, widen: Iterable[str]) -> dict[str, float]:
 
 
 def _bounds(
-    scene: "Scene", variable: Variable, names: tuple[str, ...], reach: dict[str, float]
+    scene: Content, variable: Variable, names: tuple[str, ...], reach: dict[str, float]
 ) -> tuple[float, float]:
     lower, upper = variable.bounds
     width = reach.get(variable.paths[0], 0.0)
@@ -106,18 +91,18 @@ def _bounds(
     return min(ratios), max(ratios)
 
 
-def _span(scene: "Scene", path: str, names: tuple[str, ...]) -> tuple[float, float]:
+def _span(scene: Content, path: str, names: tuple[str, ...]) -> tuple[float, float]:
     """Range of the design values at a path: its variable's, if that is among `names`, else the
     scene's."""
     for name in names:
-        variable = study_of(scene).variable(name)
+        variable = scene.required_study.variable(name)
         if path in variable.paths and variable.range is not None:
             return variable.range
     value = scene.number(path)
     return value, value
 
 
-def to_physical(scene: "Scene", names: Sequence[str], coordinates: Array) -> Array:
+def to_physical(scene: Content, names: Sequence[str], coordinates: Array) -> Array:
     """Sampling coordinates to SI values: ratios become inertias by mass and length of the same row.
 
     Both arrays have shape ``(n, d)``, a column a name.
@@ -125,13 +110,13 @@ def to_physical(scene: "Scene", names: Sequence[str], coordinates: Array) -> Arr
     return _scaled(scene, names, coordinates, inverse=False)
 
 
-def to_coordinates(scene: "Scene", names: Sequence[str], values: Array) -> Array:
+def to_coordinates(scene: Content, names: Sequence[str], values: Array) -> Array:
     """SI values to sampling coordinates, the inverse of `to_physical`; shapes ``(n, d)``."""
     return _scaled(scene, names, values, inverse=True)
 
 
-def _scaled(scene: "Scene", names: Sequence[str], columns: Array, inverse: bool) -> Array:
-    variables = [study_of(scene).variable(name) for name in names]
+def _scaled(scene: Content, names: Sequence[str], columns: Array, inverse: bool) -> Array:
+    variables = [scene.required_study.variable(name) for name in names]
     result = np.array(columns, dtype=np.float64)
     paths = [variable.paths for variable in variables]
     for column, variable in enumerate(variables):
@@ -142,7 +127,7 @@ def _scaled(scene: "Scene", names: Sequence[str], columns: Array, inverse: bool)
 
 
 def slender_inertias(
-    scene: "Scene", paths: Sequence[Sequence[str]], values: Array, inertia: str
+    scene: Content, paths: Sequence[Sequence[str]], values: Array, inertia: str
 ) -> Array | float:
     """m L^2/12 of the link whose inertia stands at the path `inertia`, of each row (kg m2).
 
@@ -155,7 +140,7 @@ def slender_inertias(
 
 
 def entries(
-    scene: "Scene", paths: Sequence[Sequence[str]], values: Array, path: str
+    scene: Content, paths: Sequence[Sequence[str]], values: Array, path: str
 ) -> Array | float:
     """What stands at `path` in each row: the column that drives it, shape (n,), or the scene's
     number."""

@@ -13,7 +13,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import box, slender_inertias, study_of, to_physical
+from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.table import read_points
 from hpcclear.scene.variables import TAIL, RandomInput
@@ -85,7 +85,7 @@ def latin_hypercube(
     InputError
         If the scene has no study, a name is unknown, or a point makes no mechanism.
     """
-    study = study_of(scene)
+    study = scene.required_study
     count = study.samples if samples is None else samples
     if count < 1:
         raise InputError("samples", count, "a design needs at least one point", "Ask for 1 or more")
@@ -133,7 +133,7 @@ def monte_carlo(
 
     Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
     """
-    study = study_of(scene)
+    study = scene.required_study
     count = study.samples if samples is None else samples
     if count < 1 or first < 0:
         reason = "at least one sample, from index 0 on, is needed"

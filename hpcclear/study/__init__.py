@@ -34,7 +34,6 @@ from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attr
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of
 from hpcclear.scene.points import Points
 from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
 from hpcclear.study import optimisation, responses, sensitivities, surrogates, verification
@@ -87,7 +86,7 @@ def run_study(
     Stopped
         If asked to end early; everything finished is on disk.
     """
-    study = study_of(scene)
+    study = scene.required_study
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
     place = _made(Path(directory), fresh, tell)
@@ -219,7 +218,7 @@ def _made(directory: Path, fresh: bool, tell: Callable[[str], object]) -> Path:
 
 def _finished(place: Path, key: dict[str, str], scene: Scene) -> bool:
     """Whether all results of this run are there; results of another run are refused."""
-    study = study_of(scene)
+    study = scene.required_study
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
     names += ["claims.nc"] if paper.is_comparable(scene) else []
     names += ["sensitivity.nc"] if study.groups else []

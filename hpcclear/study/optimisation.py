@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
-from hpcclear.scene.domain import Box, box, study_of, to_physical
+from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, unit_lhs
 from hpcclear.statistics.random.distributions import Distribution, Normal, TruncatedNormal, Uniform
 from hpcclear.statistics.random.inputs import Derived, RandomInput
@@ -68,7 +68,7 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
     the model knows its ratio; such a case is averaged by Monte Carlo.
     """
-    study = study_of(scene)
+    study = scene.required_study
     names = study.design_variables(case)
     region = box(scene, names)
     derived = [
@@ -111,7 +111,7 @@ def _random_input(row: scene_variables.RandomInput) -> RandomInput:
 
 def _ratio(scene: Scene, inertia: str) -> Derived:
     """The ratio I / (m L^2 / 12) of a link from the inertia, and from its mass and length."""
-    study, link = study_of(scene), inertia.rpartition(".")[0]
+    study, link = scene.required_study, inertia.rpartition(".")[0]
     variable = {path: name for name in study.optimisation for path in study.variable(name).paths}
     of = [variable[inertia]]
     places: dict[str, int] = {}

@@ -13,7 +13,6 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of
 from hpcclear.scene.sampling import generator
 from hpcclear.scene.study import Study
 from hpcclear.study.simulations import Simulations, objective_of
@@ -47,7 +46,7 @@ class Run:
     @property
     def study(self) -> Study:
         """The study of the scene."""
-        return study_of(self.scene)
+        return self.scene.required_study
 
     @property
     def objective_unit(self) -> str:

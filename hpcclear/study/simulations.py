@@ -12,7 +12,7 @@ from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of, to_physical
+from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
 
@@ -37,7 +37,7 @@ def objective_of(scene: Scene) -> tuple[str, Callable[[np.ndarray], Array]]:
     InputError
         The scene has no study.
     """
-    return OBJECTIVES[study_of(scene).objective]
+    return OBJECTIVES[scene.required_study.objective]
 
 
 class Simulations:
@@ -70,7 +70,7 @@ class Simulations:
         self._checkpoint = checkpoint
         self._style = style
         self._unit, self._objective = objective_of(scene)
-        self._variables = study_of(scene).variables
+        self._variables = scene.required_study.variables
 
     def designs(self, names: Sequence[str], coordinates: Array) -> Points:
         """Designs in all study variables; those not named stay as in the scene.

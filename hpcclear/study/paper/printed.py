@@ -1,7 +1,6 @@
 """What the paper prints: its Table 4 and the claims that are tested (its sections 5 and 6)."""
 
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of
 from hpcclear.study.optimisation import Choice
 
 TABLE_4 = {
@@ -35,7 +34,7 @@ def case_names(scene: Scene) -> tuple[str | None, str | None]:
 
     Both have the paper's four design variables.
     """
-    study = study_of(scene)
+    study = scene.required_study
     found: list[str | None] = [None, None]
     for case in study.cases:
         if set(study.design_variables(case.name)) != set(DESIGN):
@@ -47,7 +46,7 @@ def case_names(scene: Scene) -> tuple[str | None, str | None]:
 
 def is_comparable(scene: Scene) -> bool:
     """Whether the study's objective is the paper's: what it prints and claims says nothing of another one."""
-    return study_of(scene).objective == "mean-gap"
+    return scene.required_study.objective == "mean-gap"
 
 
 def printed_designs(scene: Scene) -> list[Choice]:

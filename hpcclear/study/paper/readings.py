@@ -19,7 +19,6 @@ from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import study_of
 from hpcclear.scene.points import Points
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper.printed import printed_designs
@@ -60,7 +59,7 @@ def applies(scene: Scene) -> bool:
     """Whether the scene is near enough to the paper's for the comparison to mean something."""
     contact = scene.effects.contact
     return (
-        study_of(scene).verification.audit_samples > 0
+        scene.required_study.verification.audit_samples > 0
         and contact is not None
         and contact.law == "lankarani-nikravesh"
         and scene.clearance_joints() == JOINTS

@@ -1,0 +1,196 @@
+"""What a scene file says, table by table: the numbers, and what follows from them alone."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import PrivateAttr, field_validator, model_validator
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import RESPONSES
+from hpcclear.scene.effects import Effects
+from hpcclear.scene.fields import NamedRows, Table, nearest, problem
+from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.numerics import Numerics, Output
+from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.study import Study
+from hpcclear.scene.variables import PAPER_PATHS
+
+
+class Content(Table):
+    """The tables of a scene file, each valid and fitting the others; SI numbers, frozen."""
+
+    format_version: Literal[1] = 1
+    mechanism: Mechanism
+    drive: Drive
+    joints: Joints
+    effects: Effects = Effects()
+    numerics: Numerics = Numerics()
+    output: Output = Output()
+    study: Study | None = None
+
+    elsewhere: ClassVar = {
+        key: (f"belongs to [{part}]", f"Write {part}.{key}")
+        for part, table in (("numerics", Numerics), ("effects", Effects), ("study", Study))
+        for key in table.model_fields
+    }
+
+    _known_numbers: dict[str, float] | None = PrivateAttr(None)
+
+    @field_validator("format_version", mode="before")
+    @classmethod
+    def _version_is_a_number(cls, value: Any) -> Any:
+        if isinstance(value, bool):  # equal to 1 in Python
+            raise problem("true or false is no version", "Write format_version = 1")
+        return value
+
+    @model_validator(mode="before")
+    @classmethod
+    def _clearance_of_open_joints(cls, data: Any) -> Any:
+        """Without a path of its own, C drives the clearances there are."""
+        try:
+            ideal = [
+                name
+                for name in ("crank_rod", "rod_slider")
+                if data["joints"][name]["kind"] == "ideal"
+            ]
+            tables = {
+                key: data["study"][key] for key in ("variables", "random") if key in data["study"]
+            }
+        except (KeyError, TypeError):
+            return data  # the models below say what is wrong with it
+        if len(ideal) != 1:
+            return data
+        paths = [path for path in PAPER_PATHS["C"] if f".{ideal[0]}." not in path]
+        for key, table in tables.items():
+            row = table.get("C") if isinstance(table, Mapping) else None
+            if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
+                data = replace(data, f"study.{key}.C", {**row, "paths": paths})
+        return data
+
+    @model_validator(mode="after")
+    def _effects_fit_joints(self) -> Self:
+        clearance = self.clearance_joints()
+        if clearance and self.effects.contact is None:
+            raise problem(
+                "a clearance joint needs a contact law",
+                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
+                "or make both joints ideal",
+                key="effects.contact",
+                value=None,
+            )
+        if not clearance and self.effects.friction.law != "none":
+            raise problem(
+                "friction acts in joints with clearance, and both joints are ideal",
+                'Set effects.friction.law = "none", or give a joint kind = "clearance"',
+                key="effects.friction.law",
+                value=self.effects.friction.law,
+            )
+        return self
+
+    @property
+    def required_study(self) -> Study:
+        """The study of a scene that needs one.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        if self.study is None:
+            raise InputError(
+                "study",
+                None,
+                "the scene has no study",
+                "Add [study] and [study.variables], as in jobs/quickstart.toml",
+            )
+        return self.study
+
+    def responses_asked(self) -> bool:
+        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
+        asked = {name.replace("_", "-") for name in RESPONSES}
+        by_study = self.study is not None and self.study.objective in asked
+        return self.numerics.responses or by_study
+
+    def clearance_joints(self) -> tuple[str, ...]:
+        """Labels of the joints with clearance, O12 before O23."""
+        return tuple(
+            name
+            for name in ("crank_rod", "rod_slider")
+            if isinstance(getattr(self.joints, name), ClearanceJoint)
+        )
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the resolved content: spelling, comments and units of the file do not
+        matter."""
+        # The order of keys stays as it is: tables have the model's order, and the order of study
+        # variables is the order of the columns of their design, so it has to count.
+        content = json.dumps(self.resolved(), ensure_ascii=True, allow_nan=False)
+        return hashlib.sha256(content.encode()).hexdigest()
+
+    def resolved(self) -> dict[str, Any]:
+        """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled
+        in."""
+        content: dict[str, Any] = plain(self)
+        # A name's own paths are left out, so that C follows when a joint is made ideal.
+        open_paths = [f"joints.{name}.clearance" for name in self.clearance_joints()]
+        for table in ("variables", "random"):
+            for name, row in content.get("study", {}).get(table, {}).items():
+                paths = PAPER_PATHS.get(name, ())
+                own = [p for p in paths if p in open_paths or not p.startswith("joints.")]
+                if row["paths"] == own:
+                    del row["paths"]
+        return content
+
+    def numeric_paths(self) -> tuple[str, ...]:
+        """Dotted paths of every physical number of this scene: what a study may vary."""
+        return tuple(self._numbers())
+
+    def number(self, path: str) -> float:
+        """The physical number at a dotted path, SI.
+
+        Raises
+        ------
+        InputError
+            If the scene has no number there.
+        """
+        numbers = self._numbers()
+        if path not in numbers:
+            raise InputError(
+                "path", path, "is not a number of this scene", nearest(path, tuple(numbers))
+            )
+        return numbers[path]
+
+    def unit(self, path: str) -> str:
+        """The SI unit of the physical number at a dotted path, "" for none; errors as `number`."""
+        self.number(path)
+        return quantities()[path].unit
+
+    def _numbers(self) -> Mapping[str, float]:
+        if self._known_numbers is None:  # a scene never changes, and a swarm asks often
+            tables = {name: plain(getattr(self, name)) for name in PHYSICAL}
+            known = quantities()
+            self._known_numbers = {
+                path: value
+                for path, value in flatten(tables)
+                if path in known and isinstance(value, float)
+            }
+        return self._known_numbers
+
+
+def plain(value: Any) -> Any:
+    """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
+    if isinstance(value, tuple):
+        return [plain(item) for item in value]
+    if not isinstance(value, Table):
+        return value
+    content = {}
+    for name, field in type(value).model_fields.items():
+        entry = plain(getattr(value, name))
+        if any(isinstance(part, NamedRows) for part in field.metadata):
+            entry = {row.pop("name"): row for row in entry}
+        if entry is not None:
+            content[name] = entry
+    return content
