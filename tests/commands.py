@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hpcclear.base.errors import InputError
-from hpcclear.results import files as storage
+from hpcclear.results import netcdf
 
 ROOT = Path(__file__).parent.parent
 MPIEXEC = Path(sys.executable).parent / "mpiexec"
@@ -120,7 +120,7 @@ def check_readable(folder: Path) -> int:
     count = 0
     for path in result_files(folder):
         try:
-            storage.load(path)
+            netcdf.load(path)
         except InputError:
             assert not path.exists(), f"{path} cannot be read"
         else:

@@ -21,8 +21,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import OUTCOME, Status, failed
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
 from hpcclear.results.lock import Holder, Lock
 from hpcclear.results.places import fresh_sibling
@@ -233,11 +232,11 @@ def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp
     def rename_after_a_clean_up(source: str, target: str, **options: int) -> None:
         if not removed:
             removed.append(source)
-            storage.remove_leftovers(tmp_path)
+            files.remove_leftovers(tmp_path)
         rename(source, target, **options)
 
     monkeypatch.setattr(os, "rename", rename_after_a_clean_up)
-    storage.write_bytes(tmp_path / "x", b"content")
+    files.write_bytes(tmp_path / "x", b"content")
     assert len(removed) == 1
     assert (tmp_path / "x").read_bytes() == b"content"
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "x"])
@@ -386,7 +385,7 @@ def test_kills_at_random_moments_lose_nothing_that_was_safe(tmp_path, kills):
     for _ in range(kills):
         safe = kill_once(tmp_path, moments.randint(1, 3), moments.uniform(0.0, 0.06), context)
         for path in tmp_path.rglob("*.nc"):
-            storage.load(path)
+            netcdf.load(path)
             with xr.open_dataset(path, engine="h5netcdf") as opened:
                 opened.load()
         checkpoint = Checkpoint(tmp_path / "c", KEY, names=("m2",))

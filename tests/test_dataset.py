@@ -20,8 +20,7 @@ from hypothesis import strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status, failed
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.names import KINDS
 
 SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
@@ -263,8 +262,8 @@ def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
 def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
-    storage.save(original, tmp_path / "x.nc")
-    found = storage.load(tmp_path / "x.nc")
+    netcdf.save(original, tmp_path / "x.nc")
+    found = netcdf.load(tmp_path / "x.nc")
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
 
@@ -282,7 +281,7 @@ WRITE_IN_ANOTHER_PROCESS = """
 import sys
 sys.path.insert(0, {tests!r})
 from test_dataset import example
-from hpcclear import dataset
+from hpcclear.results import dataset
 for kind in dataset.KINDS:
     dataset.write(example(kind), f"{folder}/{{kind}}.nc")
 """
@@ -302,7 +301,7 @@ def test_equal_content_gives_equal_bytes_in_another_process_at_another_time(tmp_
 def test_a_design_that_differs_by_one_bit_gives_other_bytes(tmp_path):
     original, other = samples(), samples()
     other["C"].values[0] = np.nextafter(other["C"].values[0], 1)
-    assert storage.encode(original) != storage.encode(other)
+    assert netcdf.encode(original) != netcdf.encode(other)
 
 
 def test_a_written_file_has_the_permissions_of_an_ordinary_one(tmp_path):
@@ -359,11 +358,11 @@ def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
 @pytest.mark.parametrize("case", PLACES)
 def test_a_probe_refuses_them_beforehand(tmp_path, case):
     with pytest.raises(InputError, match="output"):
-        storage.probe(places(tmp_path)[case])
+        files.probe(places(tmp_path)[case])
 
 
 def test_a_probe_leaves_nothing_behind(tmp_path):
-    storage.probe(tmp_path / "x.nc")
+    files.probe(tmp_path / "x.nc")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -411,7 +410,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from test_dataset import samples
-from hpcclear import dataset
+from hpcclear.results import dataset
 from hpcclear.errors import StorageError
 import resource
 dataset.write(samples(5), {path!r})
@@ -438,13 +437,13 @@ def test_a_file_size_limit_ends_in_a_message_and_keeps_the_last_good_file(tmp_pa
 def test_no_permission_is_bad_input(tmp_path):
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o555)
-    code = "import os, sys\nfrom pathlib import Path\nfrom hpcclear import storage\n"
+    code = "import os, sys\nfrom pathlib import Path\nfrom hpcclear.results import files, netcdf\n"
     if os.geteuid() == 0:  # root may write everywhere, so become nobody once all is imported
         code += "os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
         tmp_path.chmod(0o755)
         for parent in tmp_path.parents[:3]:  # one more under pytest-xdist
             parent.chmod(0o755)
-    code += f"try:\n    storage.probe(Path({str(locked)!r}) / 'x.nc')\n"
+    code += f"try:\n    files.probe(Path({str(locked)!r}) / 'x.nc')\n"
     code += "except Exception as error:\n    print(type(error).__name__, error)\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("InputError output"), done
@@ -456,8 +455,8 @@ def test_no_permission_is_bad_input(tmp_path):
 
 @functools.cache
 def sealed() -> bytes:
-    image = storage.encode(samples())
-    return image + storage._seal(image)
+    image = netcdf.encode(samples())
+    return image + netcdf.seal(image)
 
 
 def refuses(folder: Path, content: bytes) -> str:
@@ -495,7 +494,7 @@ def test_changed_bytes_are_refused(tmp_path, data):
 @given(content=st.binary(max_size=2000))
 def test_foreign_bytes_are_refused(tmp_path, content):
     refuses(tmp_path, content)
-    refuses(tmp_path, content + storage._seal(content))
+    refuses(tmp_path, content + netcdf.seal(content))
 
 
 def test_files_that_are_not_there_or_no_files_are_refused(tmp_path):
@@ -567,7 +566,7 @@ def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
 def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
     with xr.set_options(keep_attrs=True):
         spoilt = spoil(samples(), what)
-    storage.save(spoilt, tmp_path / "x.nc")
+    netcdf.save(spoilt, tmp_path / "x.nc")
     with pytest.raises(InputError):
         dataset.read(tmp_path / "x.nc", "samples")
 
@@ -621,16 +620,16 @@ def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
     dataset.write(samples(), path)
     hostile(path, what, secret)
     image = path.read_bytes()
-    path.write_bytes(image + storage._seal(image))
+    path.write_bytes(image + netcdf.seal(image))
     with pytest.raises(InputError, match="structure"):
         dataset.read(path, "samples")
 
 
 def test_what_a_file_cannot_hold_is_refused_when_writing():
     with pytest.raises(ValueError, match="type"):
-        storage.encode(xr.Dataset({"x": ("k", np.array([object()]))}))
+        netcdf.encode(xr.Dataset({"x": ("k", np.array([object()]))}))
     with pytest.raises(ValueError, match="type"):
-        storage.encode(xr.Dataset({"x": ("k", np.zeros(2, complex))}))
+        netcdf.encode(xr.Dataset({"x": ("k", np.zeros(2, complex))}))
 
 
 # -- conventions --------------------------------------------------------------------------------

@@ -15,8 +15,7 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files
 from hpcclear.scene import Scene
 
 
@@ -164,12 +163,12 @@ def run_accuracy(
     try:
         directory.mkdir(exist_ok=True)
     except OSError as error:
-        raise storage.refused(directory, error) from error
-    storage.probe(place)
+        raise files.refused(directory, error) from error
+    files.probe(place)
 
     found = measure(scene, ranks, profile, tell)
     dataset.write(found, place)
-    files = {"accuracy": place}
+    written = {"accuracy": place}
     for name, draw in accuracy_figures.FIGURES.items():
-        files[name] = style.save(draw(found), directory / f"{name}.png")
-    return found, files
+        written[name] = style.save(draw(found), directory / f"{name}.png")
+    return found, written

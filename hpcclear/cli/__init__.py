@@ -129,11 +129,10 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
         return Exit.DONE
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.results import dataset
-    from hpcclear.results import files as storage
+    from hpcclear.results import dataset, files
 
     scene = _scene(file, overrides)
-    storage.probe(_place(output))
+    files.probe(_place(output))
     response = simulate_scene(scene)
     dataset.write(response, output)
     describe_response(response, output)

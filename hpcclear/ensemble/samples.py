@@ -17,8 +17,7 @@ from hpcclear.ensemble.session import Finished
 from hpcclear.ensemble.simulate import run_key, sample_points
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.team import COLUMNS, Ranks
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard, key_attribute
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
@@ -99,13 +98,13 @@ def run_sample(
     InputError, StorageError, Stopped, RankFailed
     """
     start = time.perf_counter()
-    storage.probe(output)
+    files.probe(output)
     if fresh and (os.path.lexists(output) or os.path.lexists(parts_of(output))):
         output = fresh_sibling(output)
     points = design(scene, table)
     key = sample_key(scene, points)
     with Lock(output.parent, f".{output.name}.lock"):
-        storage.remove_leftovers(output.parent)
+        files.remove_leftovers(output.parent)
         samples = finished(output, key)
         if samples is None:
             samples = _simulate(scene, points, output, key, ranks, interval, style)

@@ -16,8 +16,7 @@ from hpcclear.ensemble.parts import PARTIAL, Parts, PartsProgress, part_length, 
 from hpcclear.ensemble.simulate import KIND, PARTS, payload_of, saving
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.team import COLUMNS, Ranks
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, key_attribute
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
@@ -87,7 +86,7 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
-    storage.probe(output)
+    files.probe(output)
     output = fresh_sibling(output) if fresh else output
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     entries = {name: repr(value) for name, value in flatten(scene.resolved())}
@@ -95,7 +94,7 @@ def run_statistics(
     version = dataset.provenance(scene.text, scene.hash)["hpcclear_version"]
     key = {**entries, "hpcclear version": version, "statistics": layout}
     with Lock(output.parent, f".{output.name}.lock"):
-        storage.remove_leftovers(output.parent)
+        files.remove_leftovers(output.parent)
         if output.exists():
             content = dataset.read(output, "statistics")
             check_key(content, key, output)
@@ -125,7 +124,7 @@ def _accumulate(
     }
     checkpoint = Checkpoint(parts_of(output), key, interval=interval, attributes=attributes)
     if raw is not None:
-        storage.make_directory(raw)
+        files.make_directory(raw)
 
     def keep_raw(number: int, records: np.ndarray) -> None:
         if raw is not None:

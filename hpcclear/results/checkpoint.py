@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files, netcdf
 
 INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
@@ -107,13 +106,13 @@ def discard(directory: Path) -> None:
         if directory.is_symlink() or not directory.is_dir():
             return
         for path in sorted(directory.iterdir()):
-            if any(form.fullmatch(path.name) for form in (_PART, _STAGE, storage.TEMPORARY)):
+            if any(form.fullmatch(path.name) for form in (_PART, _STAGE, files.TEMPORARY)):
                 path.unlink(missing_ok=True)
         (directory / _DONE).unlink(missing_ok=True)
         if not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:
-        raise storage.refused(directory, error) from None
+        raise files.refused(directory, error) from None
 
 
 @dataclass
@@ -271,7 +270,7 @@ class Checkpoint:
         with self._timed():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}
             content = xr.Dataset(variables, attrs={**self.attributes, "stage": name})
-            storage.save(content, self._stage_path(name))
+            netcdf.save(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
         """What `save_stage` wrote, bit for bit; None if not there or damaged (see `problems`).
@@ -286,7 +285,7 @@ class Checkpoint:
             if not path.exists():
                 return None
             try:
-                content = storage.load(path)
+                content = netcdf.load(path)
             except InputError as error:
                 self.problems.append(f"{path.name} is done again: {error.reason}")
                 return None
@@ -308,7 +307,7 @@ class Checkpoint:
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
         with self._timed():
-            storage.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
+            netcdf.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
@@ -328,7 +327,7 @@ class Checkpoint:
             if match is not None:
                 number = max(number, int(match[2]) + 1)
                 self._read_part(path, int(match[1]))
-            elif storage.TEMPORARY.fullmatch(path.name):
+            elif files.TEMPORARY.fullmatch(path.name):
                 self.problems.append(f"{path.name} was never finished and is removed")
                 path.unlink(missing_ok=True)
         return number
@@ -354,7 +353,7 @@ class Checkpoint:
         try:
             yield
         except OSError as error:
-            raise storage.refused(self.directory, error) from None
+            raise files.refused(self.directory, error) from None
 
     @contextmanager
     def _timed(self) -> Iterator[None]:

@@ -1,7 +1,7 @@
 """Result files as xarray datasets: built from plain arrays and records, written whole, checked.
 
 The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
-`hpcclear.results.files`.
+`hpcclear.results.netcdf` and `hpcclear.results.files`.
 """
 
 import functools
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, Status
-from hpcclear.results import files as storage
+from hpcclear.results import netcdf
 from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
 
 CONVENTIONS = "CF-1.11"
@@ -288,7 +288,7 @@ def write(content: xr.Dataset, path: str | os.PathLike[str]) -> None:
     StorageError
         The disk is full or fails; what stood at `path` before still does.
     """
-    storage.save(content, _path(path))
+    netcdf.save(content, _path(path))
 
 
 def read(
@@ -315,7 +315,7 @@ def read(
         cannot be.
     """
     place = _path(path)
-    content = storage.load(place)
+    content = netcdf.load(place)
     fault = _fault(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

@@ -28,8 +28,7 @@ from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.simulate import run_key
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import COLUMNS, Ranks
-from hpcclear.results import dataset
-from hpcclear.results import files as storage
+from hpcclear.results import dataset, files
 from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling
@@ -93,7 +92,7 @@ def run_study(
     key = run_key(scene, "run")
     with Lock(place):
         for folder in (place, place / "responses"):
-            storage.remove_leftovers(folder)
+            files.remove_leftovers(folder)
         if _finished(place, key, scene):
             discard(place / "checkpoint")  # the run that finished may have been killed over it
             tell(f"{place} holds the finished study.")
@@ -212,7 +211,7 @@ def _made(directory: Path, fresh: bool, tell: Callable[[str], object]) -> Path:
             tell(f"Results go to {directory}.")
         directory.mkdir(exist_ok=True)
     except OSError as error:
-        raise storage.refused(directory, error) from None
+        raise files.refused(directory, error) from None
     return directory
 
 

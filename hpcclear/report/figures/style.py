@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.results import files as storage
+from hpcclear.results import files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -179,5 +179,5 @@ def save(figure: "Figure", path: str | Path) -> Path:
             "figures are png, svg or pdf",
             "End the name in .png, .svg or .pdf",
         )
-    storage.write_bytes(place, render(figure, kind))
+    files.write_bytes(place, render(figure, kind))
     return place

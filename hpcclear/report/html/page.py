@@ -9,7 +9,7 @@ from pathlib import Path
 from hpcclear.report.html import costs, gallery, origin, picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.markup import Html, data, join, tag
-from hpcclear.results import files as storage
+from hpcclear.results import files
 
 NAME = "report.html"
 
@@ -47,7 +47,7 @@ def write_report(directory: str | Path) -> Path:
     """
     content = read(directory)
     path = Path(directory) / NAME
-    storage.write_bytes(path, _page(content).encode())
+    files.write_bytes(path, _page(content).encode())
     return path
 
 
