@@ -411,7 +411,7 @@ from pathlib import Path
 sys.path.insert(0, {tests!r})
 from test_dataset import samples
 from hpcclear.results import dataset
-from hpcclear.errors import StorageError
+from hpcclear.base.errors import StorageError
 import resource
 dataset.write(samples(5), {path!r})
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))

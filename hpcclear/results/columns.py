@@ -1,0 +1,326 @@
+"""The tables of `hpcclear.results.names`: what stands in every result file, a row each.
+
+A row named as its only dimension is a coordinate. ``objective`` in the place of a unit, and
+``objective^2``, stand for the unit of the study's objective (`Column.unit`). Units are written so
+that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
+"""
+
+from typing import NamedTuple
+
+Dims = tuple[str, ...]
+
+
+class Column(NamedTuple):
+    """A row of the table: what one variable of a file is."""
+
+    dims: Dims
+    units: str  # "" for text and flags, which have none; see `unit`
+    long_name: str
+    dtype: str  # "f8", "i8", "i1" or "text"
+    required: bool = False
+
+    def unit(self, objective: str) -> str:
+        """The unit in a study whose objective has the unit `objective`."""
+        if self.units == "objective":
+            return objective
+        if self.units == "objective^2":
+            return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
+        return self.units
+
+
+Columns = dict[str, Column]
+
+
+def number(dims: Dims, units: str, long_name: str, *, required: bool = False) -> Column:
+    """A number of double precision."""
+    return Column(dims, units, long_name, "f8", required)
+
+
+def count(dims: Dims, long_name: str, *, required: bool = False) -> Column:
+    """A whole number."""
+    return Column(dims, "1", long_name, "i8", required)
+
+
+def flag(dims: Dims, long_name: str, *, required: bool = False) -> Column:
+    """A small code, whose meanings are attributes."""
+    return Column(dims, "", long_name, "i1", required)
+
+
+def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
+    """Words."""
+    return Column(dims, "", long_name, "text", required)
+
+
+def _outcome(*per_sample: str) -> Columns:
+    """What one simulation comes to, in a file with these dimensions."""
+    per_joint = (*per_sample, "joint")
+    # fmt: off
+    return {
+        "objective": number(per_sample, "m", "objective f, mean distance from the clearance circle", required=True),
+        "objective_spread": number(per_sample, "m",
+        "standard deviation of f between averaged revolutions", required=True),
+        "objective_uncertainty": number(per_sample, "m", "scatter of f over kicked copies"),
+        "mean_gap": number(per_joint, "m", "time mean of the distance from the clearance circle"),
+        "peak_contact_force": number(per_joint, "N", "largest contact force over the averaged revolutions"),
+        "mean_contact_force": number(per_joint, "N", "mean contact force over the averaged revolutions"),
+        "peak_crank_moment": number(per_sample, "N m", "largest size of the moment of the drive on the crank"),
+        "slider_acceleration_deviation": number(per_sample, "m/s^2",
+        "standard deviation of the slider acceleration in time"),
+        "energy_error": number(per_sample, "1", "what the energy balance leaves unexplained, relative"),
+        "latched": flag(per_joint, "whole revolutions in contact, impact speed frozen"),
+        "rhs_evaluations": count(per_sample, "number of evaluations of the equations of motion", required=True),
+        "status": flag(per_sample, "how the simulation ended", required=True),
+        "flags": flag(per_sample, "what to mind when reading the result"),
+    }
+    # fmt: on
+
+
+def _fit(*dims: str) -> Columns:
+    """How well a model does."""
+    return {
+        "r2": number(dims, "1", "1 - SSE/SST on test points", required=True),
+        "rmae": number(
+            dims, "1", "largest test error over their standard deviation", required=True
+        ),
+        "r2_explained": number(dims, "1", "explained variance ratio, eq. 26 as printed"),
+        "rmae_mean": number(dims, "1", "largest test error over their mean, eq. 27 as printed"),
+        "rmse": number(dims, "objective", "root mean square error on test points"),
+        "points": count(dims, "number of points fitted"),
+    }
+
+
+def _statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
+    """Statistics of one result."""
+    return {
+        f"{name}_count": count(dims, f"number of finite values of the {words}", required=True),
+        f"{name}_mean": number(dims, units, f"mean of the {words}", required=True),
+        f"{name}_deviation": number(
+            dims, units, f"sample standard deviation of the {words}", required=True
+        ),
+        f"{name}_minimum": number(dims, units, f"least {words}", required=True),
+        f"{name}_maximum": number(dims, units, f"greatest {words}", required=True),
+        f"{name}_histogram": count((*dims, "bin"), f"number of samples by {words}", required=True),
+        f"{name}_edges": number(
+            (*dims, "edge"), units, f"edges of the bins of the {words}", required=True
+        ),
+    }
+
+
+# fmt: off
+RESPONSE: Columns = {
+    "time": number(("time",), "s", "time since the start"),
+    "joint": text(("joint",), "joint with clearance, O12 and O23"),
+    "crank_angle": number(("time",), "rad", "crank angle"),
+    "slider_position": number(("time",), "m", "slider position"),
+    "slider_velocity": number(("time",), "m/s", "slider velocity"),
+    "slider_acceleration": number(("time",), "m/s^2", "slider acceleration"),
+    "rod_x": number(("time",), "m", "x position of the mass centre of the rod"),
+    "rod_y": number(("time",), "m", "y position of the mass centre of the rod"),
+    "rod_angle": number(("time",), "rad", "rod angle"),
+    "eccentricity_x": number(("time", "joint"), "m", "x distance of the journal centre from the bearing centre"),
+    "eccentricity_y": number(("time", "joint"), "m", "y distance of the journal centre from the bearing centre"),
+    "penetration": number(("time", "joint"), "m", "overlap of journal and bearing"),
+    "contact_force": number(("time", "joint"), "N", "normal contact force"),
+    "friction_force": number(("time", "joint"), "N", "tangential contact force"),
+    "reaction_x": number(("time", "joint"), "N", "x force on the rod in an ideal joint"),
+    "reaction_y": number(("time", "joint"), "N", "y force on the rod in an ideal joint"),
+    "bearing_x": number(("time",), "N", "x force of the frame on the crank"),
+    "bearing_y": number(("time",), "N", "y force of the frame on the crank"),
+    "guide_force": number(("time",), "N", "y force of the guide on the slider"),
+    "constraint_violation": number(("time",), "m", "largest position constraint that is not met"),
+    "crank_moment": number(("time",), "N m", "reaction moment on the crank"),
+    "kinetic_energy": number(("time",), "J", "kinetic energy"),
+    "elastic_energy": number(("time",), "J", "energy stored in the contacts"),
+    "potential_energy": number(("time",), "J", "potential energy against y = 0"),
+    "driving_work": number(("time",), "J", "work done by the drive since the start"),
+    "load_work": number(("time",), "J", "work done by the slider load since the start"),
+    "dissipated_energy": number(("time",), "J", "energy dissipated since the start"),
+    "energy_residual": number(("time",), "J", "what the energy balance leaves unexplained"),
+    **_outcome(),
+}
+
+SAMPLES: Columns = {
+    "sample": count(("sample",), "number of the sample in the design"),
+    "joint": text(("joint",), "joint with clearance, O12 and O23"),
+    **_outcome("sample"),
+}
+
+SENSITIVITY: Columns = {
+    "surface": text(("surface",), "inputs of the response surface"),
+    "interval": number(("interval",), "1", "interval, fraction of the range"),
+    "clearance": number(("clearance",), "m", "radial clearance"),
+    "parameter": text(("parameter",), "design variable"),
+    "sensitivity": number(("surface", "interval", "clearance", "parameter"), "objective",
+        "slope at midpoint, times range", required=True),
+    "standard_error": number(("surface", "interval", "clearance", "parameter"), "objective",
+        "standard error of it", required=True),
+    "r2": number(("surface", "interval", "clearance"), "1", "1 - SSE/SST on test points", required=True),
+    "rmae": number(("surface", "interval", "clearance"), "1",
+        "largest test error over their standard deviation", required=True),
+    "leave_one_out_r2": number(("surface", "interval", "clearance"), "1", "1 - SSE/SST of leave-one-out errors"),
+    "converged": flag(("surface", "clearance", "parameter"), "whether it is determined", required=True),
+    "convergence_interval": number(("surface", "clearance", "parameter"), "1", "interval where it is determined"),
+    "plateau_interval": number(("surface", "clearance", "parameter"), "1", "widest interval from which on it agrees"),
+    "best_sensitivity": number(("surface", "clearance", "parameter"), "objective",
+        "slope where determined, times range"),
+    "uncertainty": number(("surface", "clearance", "parameter"), "objective",
+        "standard error of it, truncation included"),
+    "surface_r2": number(("surface", "clearance"), "1", "1 - SSE/SST on test points, global surface"),
+    "surface_rmae": number(("surface", "clearance"), "1", "largest test error over their deviation"),
+    "surface_r2_explained": number(("surface", "clearance"), "1", "explained variance ratio, eq. 26 as printed"),
+    "surface_rmae_mean": number(("surface", "clearance"), "1", "largest test error over their mean, eq. 27"),
+    "surface_order": count(("surface", "clearance"), "order of the global surface"),
+    "surface_points": count(("surface", "clearance"), "points it was fitted to"),
+    "surface_accepted": flag(("surface", "clearance"), "whether it passed on its test points"),
+    "mean_objective": number(("clearance",), "objective", "mean of the objective over the box"),
+    "mean_objective_error": number(("clearance",), "objective", "standard error of it"),
+    "sobol_first": number(("parameter",), "1", "first-order Sobol index"),
+    "sobol_first_error": number(("parameter",), "1", "its standard error"),
+    "sobol_total": number(("parameter",), "1", "total Sobol index"),
+    "sobol_total_error": number(("parameter",), "1", "its standard error"),
+    "influence": number(("parameter",), "objective", "mean effect, what parameters are ranked by"),
+    "selected": flag(("parameter",), "whether its influence is great"),
+}
+
+KRIGING: Columns = {
+    "model": text(("model",), "name of the model, one for each subinterval"),
+    "point": count(("point",), "number of the training point"),
+    "parameter": text(("parameter",), "design variable"),
+    "family": text(("model",), "what the subintervals make up together"),
+    "training_output": number(("model", "point"), "objective", "objective at the training point"),
+    "weight": number(("model", "point"), "1", "weight of the training point in a prediction", required=True),
+    "length_scale": number(("model", "parameter"), "1", "correlation length, in the unit cube", required=True),
+    "used": flag(("model", "parameter"), "whether the parameter is an input of the model"),
+    "signal_variance": number(("model",), "1", "variance of the process, in output_scale^2"),
+    "noise_variance": number(("model",), "1", "variance of the noise, in output_scale^2"),
+    "output_mean": number(("model",), "objective", "mean taken off before the fit"),
+    "output_scale": number(("model",), "objective", "deviation divided by before the fit"),
+    "dropped": count(("model",), "number of failed samples left out of the fit"),
+    "accepted": flag(("model",), "whether the model passed on its test points"),
+    **_fit("model"),
+}
+
+FRONT: Columns = {
+    "case": text(("case",), "case of the robust design"),
+    "run": count(("run",), "number of the run of the optimiser"),
+    "solution": count(("solution",), "number of the solution in its run"),
+    "mean": number(("case", "run", "solution"), "objective",
+        "mean of the objective, by the surrogate", required=True),
+    "deviation": number(("case", "run", "solution"), "objective",
+        "standard deviation of the objective, by the surrogate", required=True),
+    "verified": flag(("case", "run", "solution"), "whether the solution was simulated directly"),
+    "hypervolume": number(("case", "run"), "objective^2", "area that the front dominates"),
+}
+
+VERIFICATION: Columns = {
+    "design": text(("design",), "name of the design"),
+    "case": text(("design",), "case of the robust design"),
+    "mean_true": number(("design",), "objective", "mean of the objective, by direct simulation", required=True),
+    "mean_lower": number(("design",), "objective", "lower confidence limit of the mean"),
+    "mean_upper": number(("design",), "objective", "upper confidence limit of the mean"),
+    "mean_surrogate": number(("design",), "objective", "mean of the objective, by the surrogate"),
+    "mean_error": number(("design",), "1", "error of the surrogate mean, relative to the true one"),
+    "mean_paper": number(("design",), "m", "mean as printed in the paper, its Table 4"),
+    "deviation_true": number(("design",), "objective", "standard deviation, by direct simulation", required=True),
+    "deviation_lower": number(("design",), "objective", "lower confidence limit of the deviation"),
+    "deviation_upper": number(("design",), "objective", "upper confidence limit of the deviation"),
+    "deviation_surrogate": number(("design",), "objective", "standard deviation, by the surrogate"),
+    "deviation_error": number(("design",), "1", "error of the surrogate deviation, relative"),
+    "deviation_paper": number(("design",), "m", "deviation as printed in the paper, its Table 4"),
+    "samples": count(("design",), "number of simulations"),
+    "failed": count(("design",), "number of simulations that failed"),
+}
+
+CLAIMS: Columns = {
+    "claim": count(("claim",), "number of the claim"),
+    "text": text(("claim",), "what is claimed", required=True),
+    "verdict": text(("claim",), "holds, does not hold, or cannot be told", required=True),
+    "figure": text(("claim",), "the number that decides", required=True),
+}
+
+READINGS: Columns = {
+    "reading": text(("reading",), "how the text of the paper is read"),
+    "design": text(("design",), "design of the paper, its Table 4"),
+    "case": text(("design",), "case of the robust design"),
+    "objective_smallest": number(("reading", "design"), "m", "objective at the smallest clearance", required=True),
+    "mean": number(("reading", "design"), "m", "mean of the objective, by direct simulation", required=True),
+    "mean_error": number(("reading", "design"), "m", "standard error of it"),
+    "deviation": number(("reading", "design"), "m", "standard deviation of the objective", required=True),
+    "deviation_error": number(("reading", "design"), "m", "standard error of it"),
+    "failed": count(("reading", "design"), "number of simulations that failed"),
+    "mean_paper": number(("design",), "m", "mean as printed"),
+    "deviation_paper": number(("design",), "m", "deviation as printed"),
+    "distance": number(("reading",), "1", "root mean square of ln(mean / printed mean)"),
+}
+
+TIMING: Columns = {
+    "rank": count(("rank",), "MPI rank"),
+    "stage": text(("stage",), "stage of the run"),
+    "busy": number(("rank", "stage"), "s", "time spent computing", required=True),
+    "idle": number(("rank", "stage"), "s", "time spent waiting for other ranks", required=True),
+    "compile": number(("rank", "stage"), "s", "time spent compiling", required=True),
+    "write": number(("rank", "stage"), "s", "time spent writing checkpoints and results", required=True),
+    "samples": count(("rank", "stage"), "number of samples simulated"),
+    "command": text((), "the command that was run", required=True),
+}
+
+STATISTICS: Columns = {
+    "joint": text(("joint",), "joint"),
+    "bin": count(("bin",), "number of the bin; the first lies below the edges, the last at or above"),
+    "edge": count(("edge",), "number of the edge between two bins"),
+    "outcome": flag(("outcome",), "how a simulation ended"),
+    "flags": flag(("flags",), "with which care a result is to be read"),
+    "samples_by_status": count(("outcome",), "number of samples that ended so", required=True),
+    "samples_by_flag": count(("flags",), "number of samples with this flag", required=True),
+    **_statistics_of("objective", (), "m", "objective"),
+    **_statistics_of("objective_spread", (), "m", "deviation between revolutions"),
+    **_statistics_of("mean_gap", ("joint",), "m", "mean gap"),
+    **_statistics_of("peak_contact_force", ("joint",), "N", "peak contact force"),
+    **_statistics_of("rhs_evaluations", (), "1", "number of force evaluations"),
+}
+
+ACCURACY: Columns = {
+    "integrator": text(("integrator",), "way of integrating"),
+    "rung": count(("rung",), "rung of the ladder of tolerances"),
+    "quantity": text(("quantity",), "what the error is of"),
+    "setting": number(("integrator", "rung"), "1",
+        "relative tolerance, or step over period for fixed steps", required=True),
+    "error": number(("integrator", "rung", "quantity"), "1",
+        "relative error after one revolution, RMS over designs", required=True),
+    "seconds": number(("integrator", "rung"), "s", "wall time of one design over one revolution", required=True),
+    "evaluations": number(("integrator", "rung"), "1",
+        "force evaluations of one design over one revolution", required=True),
+    "order": number(("integrator", "quantity"), "1",
+        "slope of error against evaluations, both logarithmic", required=True),
+    "reference_error": number(("quantity",), "1", "difference of two ways to the reference, relative", required=True),
+    "transient": count(("transient",), "revolutions waited for"),
+    "averaged": count(("averaged",), "revolutions averaged"),
+    "averaging_error": number(("transient", "averaged"), "1", "relative error of f, RMS over copies", required=True),
+    "averaging_floor": number((), "1", "scatter of long averages between copies, relative", required=True),
+    "turn_seconds": number((), "s", "wall time of one revolution of one copy", required=True),
+    "surrogate": text(("surrogate",), "kind of surrogate"),
+    "training": count(("training",), "sample size of the surrogates"),
+    "r2": number(("surrogate", "training"), "1", "1 - SSE/SST on test points", required=True),
+    "rmae": number(("surrogate", "training"), "1", "largest test error over their standard deviation", required=True),
+    "leave_one_out": number(("surrogate", "training"), "1",
+        "RMS leave-one-out error over the standard deviation", required=True),
+    "fit_seconds": number(("surrogate", "training"), "s", "wall time of the fit", required=True),
+    "sample_seconds": number((), "s", "core-seconds of one simulation", required=True),
+    "estimate": text(("estimate",), "what is drawn from: a surrogate or simulations"),
+    "moment": text(("moment",), "mean or deviation"),
+    "draws": count(("draws",), "Monte Carlo sample size"),
+    "moment_error": number(("estimate", "moment", "draws"), "1", "RMS error of Monte Carlo, relative", required=True),
+    "moment_lower": number(("estimate", "moment", "draws"), "1", "its lower 95 % confidence limit", required=True),
+    "moment_upper": number(("estimate", "moment", "draws"), "1", "its upper 95 % confidence limit", required=True),
+    "moment_seconds": number(("estimate", "draws"), "s", "core-seconds of one Monte Carlo estimate", required=True),
+    "moment_bias": number(("moment",), "1", "surrogate by quadrature against simulations, relative", required=True),
+    "bias_error": number(("moment",), "1", "standard error of that", required=True),
+    "quadrature_seconds": number((), "s", "core-seconds of the quadrature", required=True),
+    "closed_form": number(("moment",), "1", "quadrature against closed form, relative", required=True),
+    "ranks": count(("ranks",), "number of ranks at work"),
+    "strong_seconds": number(("ranks",), "s", "wall time of a fixed batch", required=True),
+    "weak_seconds": number(("ranks",), "s", "wall time of a batch that grows with the ranks", required=True),
+    "loss": text(("loss",), "what time is lost to"),
+    "lost_seconds": number(("loss",), "s", "core-seconds lost, over all ranks", required=True),
+}
+# fmt: on
