@@ -7,7 +7,7 @@ import xarray as xr
 
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.results import dataset
-from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 NAMES = ("m2", "m3", "u2", "I2", "C")
 LOWER = np.array([0.105, 0.07, 0.0, 1.3e-4, 0.3e-3])
@@ -91,6 +91,8 @@ def kriging(points: int = 40) -> xr.Dataset:
             data[name][row] = model.inputs[:, k]
             data[f"{name}_lower"][row], data[f"{name}_upper"][row] = bounds[k]
     words = np.array([" ".join(names) for names in inputs])
+    data |= {"points": np.full(len(inputs), points), "dropped": np.zeros(len(inputs), int)}
+    data["accepted"] = np.ones(len(inputs), np.int8)
     data |= {"family": words, "r2": np.full(len(inputs), 0.997), "rmae": np.full(len(inputs), 0.2)}
     coords = {"model": words, "point": np.arange(points), "parameter": np.array(NAMES)}
     return dataset.dataset("kriging", coords, data, ATTRIBUTES)

@@ -19,7 +19,7 @@ from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 JOBS = Path(__file__).parent.parent / "jobs"
 PAPER = load_scene(JOBS / "slider_crank.toml")

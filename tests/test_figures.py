@@ -19,8 +19,9 @@ from matplotlib.transforms import Bbox
 from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import accuracy as accuracy_figures
-from hpcclear.report.figures import labels, models, motion, style
-from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.report.figures import labels, motion, style
+from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.stored import models_in
 
 DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
 
@@ -269,20 +270,20 @@ def test_spectrum_finds_amplitude_and_order() -> None:
 def test_models_of_a_file_predict_as_the_surrogate_does() -> None:
     points, bounds = data.design(40, 2), np.column_stack([data.LOWER, data.UPPER])
     oracle = fit_kriging(points, data.noisy(points, 2), bounds, rng=np.random.default_rng(2))
-    model = models.families(data.kriging())["m2 m3 u2 I2 C"][0]
+    model = models_in(data.kriging())["m2 m3 u2 I2 C"]
     fresh = data.design(20, 9)
-    np.testing.assert_allclose(models.predict([model], fresh), oracle.predict(fresh), rtol=1e-7)
-    assert np.isnan(models.predict([model], fresh * 10.0)).all()
+    np.testing.assert_array_equal(model.predict(fresh), oracle.predict(fresh))
+    with pytest.raises(InputError, match="does not extrapolate"):
+        model.predict(fresh * 10.0)
 
 
 def test_leave_one_out_is_what_a_model_without_the_point_predicts() -> None:
-    model = models.families(data.kriging())["u2 I2 C"][0]
-    keep = np.arange(len(model.values)) != 7
-    matrix = model._covariance(model.points[keep], model.points[keep]) + model.noise * np.eye(
-        keep.sum()
-    )
-    weights = np.linalg.solve(matrix, (model.values[keep] - model.mean) / model.scale)
-    across = model._covariance(model.points[7:8], model.points[keep])
-    expected = model.mean + model.scale * float((across @ weights)[0])
+    model = models_in(data.kriging())["u2 I2 C"].leaves[0]
+    inputs, others = model.to_unit(model.inputs), np.arange(len(model.values)) != 7
+    squares = np.square((inputs[:, None] - inputs) / model.length_scales).sum(axis=-1)
+    smooth = model.signal_variance * np.exp(-squares / 2)
+    matrix = smooth[others][:, others] + model.noise_variance * np.eye(others.sum())
+    weights = np.linalg.solve(matrix, (model.values[others] - model.mean) / model.scale)
+    expected = model.mean + model.scale * float(smooth[7, others] @ weights)
     error = abs(expected - model.values[7])
     assert model.leave_one_out()[7] == pytest.approx(expected, abs=1e-6 * error)

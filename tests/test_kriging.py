@@ -7,14 +7,12 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
 from hpcclear.statistics.surrogate.predictor import gaussian
-from hpcclear.statistics.surrogate.subintervals import (
-    PIECEWISE_FIELDS,
-    PiecewiseKriging,
-    fit_subintervals,
-)
+from hpcclear.statistics.surrogate.subintervals import fit_subintervals
 
 BOUNDS = np.array([[1.0, 3.0], [-2e-4, 5e-4], [10.0, 11.0]])
 

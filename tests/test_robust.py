@@ -16,7 +16,7 @@ from hpcclear.statistics.random.distributions import (
 from hpcclear.statistics.random.inputs import Derived, RandomInput
 from hpcclear.statistics.random.moments import RobustObjective, sample_moments
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 
 LOWER, UPPER = np.array([1.0, -0.2, 5e-5, 3e-4]), np.array([2.0, 0.3, 8e-4, 1e-3])
 NAMES = ("m", "u", "I", "C")

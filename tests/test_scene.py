@@ -21,6 +21,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
 from hpcclear.scene import units as scene_units
 from hpcclear.scene.domain import box
+from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
 
 ROOT = Path(__file__).parent.parent
@@ -121,7 +122,7 @@ def test_nothing_can_be_changed_in_place(scene: Scene) -> None:
             setattr(table, name, 1.0)
 
     def containers(value: object) -> list[object]:
-        fields = type(value).model_fields if isinstance(value, type(scene).__mro__[1]) else ()
+        fields = type(value).model_fields if isinstance(value, Table) else ()
         found = [getattr(value, name) for name in fields]
         found += list(value) if isinstance(value, tuple) else []
         return found + [inner for item in found for inner in containers(item)]

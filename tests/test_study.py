@@ -453,8 +453,8 @@ def test_the_swarm_sees_the_exact_moments():
     names = scene.study.optimisation
     from hpcclear.scene.domain import box, to_coordinates
     from hpcclear.scene.sampling import latin_hypercube
-    from hpcclear.statistics.surrogate.kriging import fit_kriging
-    from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+    from hpcclear.statistics.surrogate.fitting import fit_kriging
+    from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 
     widen = ("m2", "m3", "u2", "I2", "C")
     points = latin_hypercube(scene, 250, names=names, widen=widen)

@@ -13,7 +13,7 @@ from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.sampling import generator, latin_hypercube
-from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 
 ROOT = pathlib.Path(__file__).parent.parent

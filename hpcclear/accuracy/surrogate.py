@@ -14,7 +14,8 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator, unit_lhs
-from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
 from hpcclear.study.simulations import objective_of

@@ -22,7 +22,7 @@ from hpcclear.statistics.random.distributions import Uniform
 from hpcclear.statistics.random.inputs import RandomInput
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import minimise
-from hpcclear.statistics.surrogate.kriging import fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 
 def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":

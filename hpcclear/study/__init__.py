@@ -34,7 +34,7 @@ from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.study import optimisation, responses, sensitivities, surrogates, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper import claims

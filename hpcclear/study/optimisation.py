@@ -19,7 +19,7 @@ from hpcclear.statistics.random.inputs import Derived, RandomInput
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
-from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.study.run import Result, Run
 from hpcclear.study.surrogates import coordinate
 

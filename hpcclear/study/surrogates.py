@@ -6,18 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.variables import Variable
-from hpcclear.statistics.surrogate.kriging import Kriging, fit_kriging
+from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.subintervals import (
-    PIECEWISE_FIELDS,
-    PiecewiseKriging,
-    fit_subintervals,
-)
+from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
+from hpcclear.statistics.surrogate.stored import SCALARS, models_in
+from hpcclear.statistics.surrogate.subintervals import fit_subintervals
 from hpcclear.study.run import Result, Run
 
 STAGE = "kriging"
@@ -154,7 +152,7 @@ def write(run: Run, result: Result) -> None:
             data[name][row, : len(leaf.values)] = leaf.inputs[:, column]
             data[f"{name}_lower"][row] = leaf.lower[column]
             data[f"{name}_upper"][row] = leaf.upper[column]
-    for name, field in _SCALARS.items():
+    for name, field in SCALARS.items():
         data[name] = np.array([getattr(leaf, field) for _, leaf in leaves])
     data["points"] = np.array([len(leaf.values) for _, leaf in leaves])
     data["accepted"] = np.concatenate([model.accepted for model in models]).astype(np.int8)
@@ -171,16 +169,6 @@ def write(run: Run, result: Result) -> None:
         "kriging", coords, data, units=_units(run), objective_unit=run.objective_unit
     )
     run.write(content, "kriging.nc")
-
-
-_SCALARS = {
-    "signal_variance": "signal_variance",
-    "noise_variance": "noise_variance",
-    "output_mean": "mean",
-    "output_scale": "scale",
-    "dropped": "dropped",
-}
-"""Variables of kriging.nc and the attributes of `Kriging` they hold."""
 
 
 def _label(model: PiecewiseKriging, family: str, leaf: Kriging) -> str:
@@ -205,36 +193,4 @@ def read_kriging(path: str | Path) -> dict[str, PiecewiseKriging]:
     InputError
         The file is not one, or is damaged.
     """
-    content = dataset.read(path, "kriging")
-    found: dict[str, list[int]] = {}
-    for row, family in enumerate(content["family"].to_numpy()):
-        found.setdefault(str(family), []).append(row)
-    return {family: _read_family(content, family, rows) for family, rows in found.items()}
-
-
-def _read_family(content, family: str, rows: Sequence[int]) -> PiecewiseKriging:  # type: ignore[no-untyped-def]
-    names = family.split(" ")
-    leaves = []
-    for row in rows:
-        one = content.isel(model=row)
-        size = int(one["points"])
-        if not set(names) <= set(one["parameter"].to_numpy().tolist()):
-            raise InputError("file", family, "the models do not fit together", "Use it as written")
-        arrays = {
-            "names": np.array(names),
-            "lower": np.array([float(one[f"{name}_lower"]) for name in names]),
-            "upper": np.array([float(one[f"{name}_upper"]) for name in names]),
-            "length_scales": one["length_scale"].sel(parameter=names).to_numpy(),
-            "inputs": np.column_stack([one[name].to_numpy()[:size] for name in names]),
-            "values": one["training_output"].to_numpy()[:size],
-            "alpha": one["weight"].to_numpy()[:size],
-        }
-        arrays |= {field: one[name].to_numpy() for name, field in _SCALARS.items()}
-        leaves.append(Kriging.from_arrays(arrays))
-    part = content.isel(model=list(rows))
-    return PiecewiseKriging(
-        tuple(leaves),
-        part["r2"].to_numpy(),
-        part["rmae"].to_numpy(),
-        part["accepted"].to_numpy().astype(bool),
-    )
+    return models_in(dataset.read(path, "kriging"))

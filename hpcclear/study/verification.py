@@ -11,7 +11,7 @@ from hpcclear.scene.domain import to_coordinates
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
-from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.study import surrogates
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, Run

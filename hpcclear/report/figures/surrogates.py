@@ -6,11 +6,13 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.report.figures import labels, models, style
+from hpcclear.report.figures import labels, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 
 
 @style.drawn
@@ -164,27 +166,24 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     InputError
         No model has three inputs, the clearance among them.
     """
+    from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
+
     main = labels.clearance(kriging)
     name = "" if main is None else str(main.attrs["scene_path"])
-    shown = {
-        k: m
-        for k, m in models.families(kriging).items()
-        if len(m[0].inputs) == 3 and name in m[0].inputs
-    }
+    found = models_in(kriging)
+    shown = {k: m for k, m in found.items() if len(m.names) == 3 and name in m.names}
     if not shown:
         reason = "no model is one of two design variables and the clearance"
-        raise InputError(
-            "study.surrogate.models", list(models.families(kriging)), reason, "Fit one, [x, y, C]"
-        )
+        raise InputError("study.surrogate.models", list(found), reason, "Fit one, [x, y, C]")
     figure, axes = style.grid(len(shown), 2, 24.0 + 40.0 * len(shown))
-    fields = [_fields(parts, parts[0].inputs.index(name)) for parts in shown.values()]
+    fields = [_fields(model, model.names.index(name)) for model in shown.values()]
     unit = labels.scale("m", np.concatenate([np.ravel(z) for _, _, z, _ in fields]))
     finite = [z[np.isfinite(z)] * unit.factor for _, _, z, _ in fields]
     limits = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
     across = labels.of(by_path[name])
-    for line, parts, (x, y, z, clearances) in zip(axes, shown.values(), fields, strict=True):
-        first, second = (by_path[i] for i in parts[0].inputs if i != name)
+    for line, model, (x, y, z, clearances) in zip(axes, shown.values(), fields, strict=True):
+        first, second = (by_path[i] for i in model.names if i != name)
         scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
         for k, panel in enumerate(line):
             grid = (x * scales[0].factor, y * scales[1].factor, z[k].T * unit.factor)
@@ -202,15 +201,14 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     return figure
 
 
-def _fields(parts: list[models.Model], main: int) -> tuple[Any, Any, Any, Any]:
+def _fields(model: "PiecewiseKriging", main: int) -> tuple[Any, Any, Any, Any]:
     """Predictions over the two inputs that are not the clearance: grids (n,), values (2, n, n), clearances (2,)."""
-    lower = np.min([model.lower for model in parts], axis=0)
-    upper = np.max([model.upper for model in parts], axis=0)
+    lower, upper = model.lower, model.upper
     x, y = (np.linspace(lower[i], upper[i], 41) for i in range(3) if i != main)
     clearances = np.array([lower[main], upper[main]])
     mesh = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     values = [
-        models.predict(parts, np.insert(mesh, main, clearance, axis=1)).reshape(len(x), len(y))
+        model.predict(np.insert(mesh, main, clearance, axis=1)).reshape(len(x), len(y))
         for clearance in clearances
     ]
     return x, y, np.array(values), clearances
@@ -228,18 +226,20 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     kriging : xarray.Dataset
         Kind ``kriging``.
     """
-    found = models.families(kriging)
+    from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
+
+    found = models_in(kriging)
     rows = (len(found) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
     unit = labels.of(kriging["training_output"])
-    family = kriging["family"].to_numpy() if "family" in kriging else kriging["model"].to_numpy()
-    for panel, (name, parts) in zip(axes.flat, found.items(), strict=False):
-        for k, model in enumerate(parts):
-            true, guess = model.values * unit.factor, model.leave_one_out() * unit.factor
+    family = kriging["family"].to_numpy()
+    for panel, (name, model) in zip(axes.flat, found.items(), strict=False):
+        for k, leaf in enumerate(model.leaves):
+            true, guess = leaf.values * unit.factor, leaf.leave_one_out() * unit.factor
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
         worst = float(kriging["r2"].to_numpy()[family == name].min())
-        panel.set_title(f"{', '.join(map(symbol, parts[0].inputs))}\n$R^2$ = {worst:.3f}")
+        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {worst:.3f}")
     limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(limits)[0], max(high for _, high in limits))
     for panel in axes.flat:

@@ -10,8 +10,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.distributions import nodes_needed, piece_rule
 from hpcclear.statistics.random.inputs import Group, Wiring, tensor
 from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.statistics.surrogate.predictor import tensor_moments
-from hpcclear.statistics.surrogate.subintervals import PiecewiseKriging
 
 Surrogate = Kriging | PiecewiseKriging
 MOST_NODES = 48

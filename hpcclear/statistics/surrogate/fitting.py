@@ -1,0 +1,156 @@
+"""Kriging models fitted by maximum likelihood, with scikit-learn; sources: `kriging`."""
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.kriging import Kriging, inside
+
+LENGTH_BOUNDS = (1e-2, 1e2)
+"""Length scales in the unit cube; over scikit-learn's own (1e-5 to 1e5) noisy fits can collapse."""
+SIGNAL_BOUNDS = (1e-3, 1e3)
+"""Signal variance, in units of the variance of the values."""
+NOISE_BOUNDS = (1e-8, 1e1)
+"""Noise variance, in the same units; the lower end keeps the covariance matrix invertible."""
+
+
+def fit_kriging(
+    points: np.ndarray,
+    values: np.ndarray,
+    bounds: np.ndarray,
+    *,
+    rng: np.random.Generator,
+    names: Sequence[str] | None = None,
+    restarts: int = 3,
+) -> Kriging:
+    """Fit a Kriging model by maximum likelihood.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        Inputs, all inside `bounds`.
+    values : (n,) array
+        Outcomes; NaN marks a failed sample, which is left out and counted.
+    bounds : (d, 2) array
+        Lower and upper limit of each input: where the model will answer.
+    rng : numpy Generator
+        Draws the optimiser's further starting points.
+    names : sequence of str, optional
+        Names of the inputs, for messages and files (default x1, x2, ...).
+    restarts : int
+        Starting points of the likelihood's maximisation besides the first.
+
+    Returns
+    -------
+    Kriging
+
+    Raises
+    ------
+    InputError
+        Crossed bounds, points that are not finite or outside the bounds, infinite values, or fewer
+        valid samples than parameters to fit (d + 3).
+    """
+    points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
+    labels = _check_shapes(points, values, bounds, names)
+    valid = _check_samples(points, values, labels, bounds)
+    inputs, outcomes = points[valid], values[valid]
+    mean, scale = float(outcomes.mean()), float(outcomes.std())
+    if scale <= 10 * np.finfo(float).eps * abs(mean):  # all equal but for round-off
+        scale = 1.0
+        outcomes = np.full_like(outcomes, mean)
+    lower, upper = bounds.T
+    unit = (inputs - lower) / (upper - lower)
+    lengths, signal, noise, alpha = _maximise_likelihood(
+        unit, (outcomes - mean) / scale, rng, restarts
+    )
+    return Kriging(
+        names=labels,
+        lower=lower,
+        upper=upper,
+        length_scales=lengths,
+        signal_variance=signal,
+        noise_variance=noise,
+        mean=mean,
+        scale=scale,
+        inputs=inputs,
+        values=values[valid],
+        alpha=alpha,
+        dropped=int((~valid).sum()),
+    )
+
+
+def _maximise_likelihood(
+    unit: np.ndarray, normalised: np.ndarray, rng: np.random.Generator, restarts: int
+) -> tuple[np.ndarray, float, float, np.ndarray]:
+    """Length scales, signal and noise variance, and alpha, of normalised data in the unit cube."""
+    # Imported here: only fitting needs scikit-learn, and loading it takes a second.
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    dims = unit.shape[1]
+    signal = ConstantKernel(1.0, SIGNAL_BOUNDS)
+    kernel = signal * RBF(np.full(dims, 0.5), LENGTH_BOUNDS) + WhiteKernel(1e-3, NOISE_BOUNDS)
+    seed = int(rng.integers(2**31))
+    regressor = GaussianProcessRegressor(
+        kernel, alpha=0.0, n_restarts_optimizer=restarts, random_state=seed
+    )
+    # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
+    with warnings.catch_warnings(), threadpool_limits(limits=1, user_api="blas"):
+        # An input without influence rightly takes its length scale to the upper bound.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        regressor.fit(unit, normalised)
+    product, white = regressor.kernel_.k1, regressor.kernel_.k2
+    return (
+        np.atleast_1d(product.k2.length_scale),
+        float(product.k1.constant_value),
+        float(white.noise_level),
+        regressor.alpha_,
+    )
+
+
+def _check_shapes(
+    points: np.ndarray, values: np.ndarray, bounds: np.ndarray, names: Sequence[str] | None
+) -> tuple[str, ...]:
+    """The inputs' names, after checking that the arrays fit together."""
+    if points.ndim != 2 or points.shape[1] == 0:
+        raise InputError("points", points.shape, "not a table of points", "give shape (n, d)")
+    dims = points.shape[1]
+    if values.shape != points.shape[:1]:
+        raise InputError("values", values.shape, "not one per point", f"give {points.shape[0]}")
+    if bounds.shape != (dims, 2):
+        raise InputError("bounds", bounds.shape, "wrong shape", f"give shape ({dims}, 2)")
+    labels = tuple(f"x{k + 1}" for k in range(dims)) if names is None else tuple(names)
+    if len(labels) != dims or len(set(labels)) != dims:
+        raise InputError("names", labels, "not one distinct name per input", f"give {dims} names")
+    for name, (low, high) in zip(labels, bounds, strict=True):
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise InputError(
+                name, (low, high), "bounds are crossed or not finite", "give lower < upper"
+            )
+    return labels
+
+
+def _check_samples(
+    points: np.ndarray, values: np.ndarray, names: Sequence[str], bounds: np.ndarray
+) -> np.ndarray:
+    """Which samples count, ``(n,)`` bool; NaN values are failed samples."""
+    inside(points, names, *bounds.T)
+    if np.isinf(values).any():
+        index = int(np.isinf(values).argmax())
+        raise InputError(
+            f"values[{index}]", values[index], "infinite", "mark failed samples with NaN"
+        )
+    valid = np.isfinite(values)
+    needed = points.shape[1] + 3  # length scales, signal, noise, mean
+    if valid.sum() < needed:
+        raise InputError(
+            "values",
+            int(valid.sum()),
+            f"too few valid samples for {points.shape[1]} inputs ({values.size} given)",
+            f"give at least {needed}, better ten times the number of inputs",
+        )
+    return valid
