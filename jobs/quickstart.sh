@@ -7,7 +7,7 @@
 # report.html. Interrupted? The same command goes on.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-. jobs/environment.sh mpich,analysis
+. jobs/environment.sh mpich,analysis "$@"
 mkdir -p results
 mpiexec -n "${RANKS:-2}" hpcclear run jobs/quickstart.toml -o results/quickstart
 python analysis/plot_samples.py results/quickstart/samples.nc -o results/quickstart/samples.png

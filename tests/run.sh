@@ -4,7 +4,7 @@
 #   bash tests/run.sh --full   everything, and the job scripts on a real Slurm where it is installed
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-. jobs/environment.sh test
+. jobs/environment.sh test "$@"
 marks=("-m" "not full")
 if [ "${1:-}" = "--full" ]; then
     marks=()
