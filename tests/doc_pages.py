@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tomli_w
 from markdown_it import MarkdownIt
 
 from hpcclear.scene import load_scene
-from hpcclear.scene.toml import to_toml
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -109,7 +109,7 @@ class Reader:
         elif file is not None and file.exists():
             part = replaced(tomllib.loads(file.read_text(encoding="utf-8")), part)
         target = file or self.place / "block.toml"
-        target.write_text(to_toml(part), encoding="utf-8")
+        target.write_text(tomli_w.dumps(part), encoding="utf-8")
         load_scene(target)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Self
 
+import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError
@@ -10,7 +11,6 @@ from hpcclear.scene import describing, domain
 from hpcclear.scene.content import Content, plain
 from hpcclear.scene.fields import problem
 from hpcclear.scene.paths import PHYSICAL, replace
-from hpcclear.scene.toml import to_toml
 from hpcclear.scene.validation import check_path, validated
 
 
@@ -94,7 +94,7 @@ class Scene(Content):
 
     def to_toml(self) -> str:
         """TOML text of the resolved content; loading it gives an equal scene."""
-        return to_toml(self.resolved())
+        return tomli_w.dumps(self.resolved())
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> "Scene":
         """A new, validated scene with some entries replaced.
