@@ -12,11 +12,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
+from hpcclear.base.normal import TAIL, truncated_quantile
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.table import read_points
-from hpcclear.scene.variables import TAIL, RandomInput
+from hpcclear.scene.variables import RandomInput
 
 __all__ = [
     "Points",
@@ -205,18 +206,14 @@ def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
     middle = centre if row.centre is None else row.centre
     if row.distribution == "uniform":
         return middle + row.reach * (2 * uniform - 1)
-    from scipy.special import (
-        ndtr,
-        ndtri,
-    )  # a quarter of a second to import, which "lhs" does not need
-
     deviation = row.deviation
     assert deviation is not None  # by validation
     if row.distribution == "normal":
+        from scipy.special import ndtri  # a quarter of a second, which "lhs" does not need
+
         return middle + deviation * np.clip(ndtri(uniform), -TAIL, TAIL)
     cut = row.reach / deviation
-    below = ndtr(-cut)
-    return middle + deviation * np.clip(ndtri(below + uniform * (1 - 2 * below)), -cut, cut)
+    return middle + deviation * truncated_quantile(uniform, -cut, cut)
 
 
 _PAGE = 4096  # points made at a time

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.normal import TAIL
 from hpcclear.base.outcome import ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, nearest, problem
 from hpcclear.scene.paths import quantities
@@ -24,10 +25,6 @@ PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
     "C23": ("joints.rod_slider.clearance",),
 }
 """The paper's names (Table 3), and one name for each clearance."""
-
-TAIL = 6.0
-"""A normal input counts up to this many standard deviations: 2e-9 of it lies beyond, and is
-clipped."""
 
 RESERVED = frozenset(
     (

@@ -11,12 +11,11 @@ from math import inf, isfinite, pi, sqrt
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
-from scipy.special import ndtr, ndtri, roots_legendre
+from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.normal import TAIL, truncated_quantile
 
-TAIL = 6.0
-"""A normal input is taken to reach this many deviations: 2e-9 of it lies beyond, and is clipped."""
 FINE = 400
 """Legendre nodes of the inner products that define the rule of a truncated normal."""
 
@@ -131,13 +130,8 @@ class TruncatedNormal:
 
     def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
         """Independent draws, ``(size,)``, by inversion."""
-        low, high = self._limits
-        side = (
-            1.0 if low < 0 else -1.0
-        )  # an upper tail is inverted as a lower one, to keep its digits
-        low, high = min(side * low, side * high), max(side * low, side * high)
-        chance = ndtr(low) + (ndtr(high) - ndtr(low)) * rng.random(size)
-        return np.clip(self.mean + self.deviation * side * ndtri(chance), self.lower, self.upper)
+        places = truncated_quantile(rng.random(size), *self._limits)
+        return np.clip(self.mean + self.deviation * places, self.lower, self.upper)
 
     def density(self, x: np.ndarray) -> np.ndarray:
         """Probability density at `x`, inside the support."""
