@@ -9,6 +9,8 @@ import urllib.request
 from pathlib import Path
 from typing import Any
 
+from patience import crowded
+
 _ARGUMENTS = (
     "--headless=new",
     "--no-sandbox",
@@ -67,7 +69,7 @@ class Browser:
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self._base + path, data, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=120) as answer:
+            with urllib.request.urlopen(request, timeout=crowded(120)) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
             raise RuntimeError(json.load(error)["value"]["message"]) from None
@@ -132,7 +134,7 @@ class Browser:
 
     def wait(self, condition: str, seconds: float = 20.0) -> None:
         """Until a script's condition is true."""
-        end = time.monotonic() + seconds
+        end = time.monotonic() + crowded(seconds)
         while not self.run(f"return Boolean({condition});"):
             if time.monotonic() > end:
                 raise AssertionError(f"never true: {condition}")
@@ -144,6 +146,6 @@ class Browser:
             self._ask("DELETE", "")
         finally:
             self._driver.terminate()
-            self._driver.wait(20)
+            self._driver.wait(crowded(20))
             assert self._driver.stdout is not None
             self._driver.stdout.close()

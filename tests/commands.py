@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import netcdf
@@ -54,7 +55,7 @@ def start(
 def finish(job: subprocess.Popen, seconds: float = 400.0) -> tuple[int, str]:
     """Exit code and output; a job that does not end in time is killed and fails the test."""
     try:
-        output, _ = job.communicate(timeout=seconds)
+        output, _ = job.communicate(timeout=crowded(seconds))
     except subprocess.TimeoutExpired:
         for process in ranks_of(job).values():
             kill(process)
@@ -170,4 +171,4 @@ class Commands:
         """End the process."""
         assert self._process.stdin is not None
         self._process.stdin.close()
-        self._process.wait(60.0)
+        self._process.wait(crowded(60.0))

@@ -12,6 +12,7 @@ from typing import Any
 
 import tomli_w
 from markdown_it import MarkdownIt
+from patience import crowded
 
 from hpcclear.scene import load_scene
 
@@ -92,7 +93,7 @@ class Reader:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=1800 if block.slow else 300,
+            timeout=crowded(1800 if block.slow else 300),
             check=False,
         )
         assert done.returncode == 0, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"

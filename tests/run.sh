@@ -1,26 +1,80 @@
 #!/usr/bin/env bash
-# Set-up and all checks: lint, format, types, layer rules, serial tests, tests under mpiexec.
-#   bash tests/run.sh          short profile, under 15 minutes on two cores
-#   bash tests/run.sh --full   everything, and the job scripts on a real Slurm where it is installed
-set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
-. jobs/environment.sh test "$@"
-marks=("-m" "not full")
-if [ "${1:-}" = "--full" ]; then
-    marks=()
+# Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if any is red.
+#   bash tests/run.sh           short profile, under 15 minutes on two cores
+#   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
+#   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
+# --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:
+#   bash tests/run.sh tests/test_kriging.py -k nugget
+set -u
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
+
+profile=short
+versions=()
+words=()
+for word in "$@"; do
+    case $word in
+    --quick | --full) profile=${word#--} ;;
+    --latest | --lowest) versions+=("$word") ;;
+    *) words+=("$word") ;;
+    esac
+done
+
+# Left out of --quick: they start mpiexec, other programs or a browser by the dozen, compile kernels of their own, or
+# simulate for long. A file that is new is in.
+long=(
+    api checkpoint cli collocation comm dataset docs effects figures fuzz hard_cases jacobian limits llvm motion notebook
+    oracle plan progress random_scenes release report robust sensitivity statistics stiff study survival target trust
+    vectorised
+)
+
+rows=()
+red=0
+table() {
+    printf '\n%-32s %-8s %s\n' step result time
+    printf '%s\n' "${rows[@]}"
+    if [ "$profile" = quick ]; then
+        echo "left out by --quick: the long profile, ${#long[@]} of $(ls tests/test_*.py | wc -l) test files:"
+        printf '%s\n' "${long[*]}" | fold -s -w 100 | sed 's/^/    /'
+    fi
+}
+row() { # name, code, seconds
+    local result=ok
+    if [ "$2" -ne 0 ]; then
+        result=RED
+        red=1
+    fi
+    rows+=("$(printf '%-32s %-8s %d:%02d' "$1" "$result" $(($3 / 60)) $(($3 % 60)))")
+}
+step() { # name, command...
+    local name=$1 start=$SECONDS code=0
+    shift
+    printf '\n== %s\n' "$name"
+    "$@" || code=$?
+    row "$name" "$code" $((SECONDS - start))
+}
+
+# Sourced, as it changes PATH: whether it returns, exits or breaks off, the table says so.
+trap 'row set-up 1 $SECONDS; table; echo "set-up failed: nothing was tested" >&2; exit 1' EXIT
+set -e
+. jobs/environment.sh test ${versions[@]+"${versions[@]}"}
+set +e
+trap - EXIT
+row set-up 0 $SECONDS
+
+choice=(-m "not full")
+case $profile in
+full) choice=() ;;
+quick) for name in "${long[@]}"; do choice+=("--ignore=tests/test_$name.py"); done ;;
+esac
+# Two at a time: many tests wait for a compiler or for mpiexec. The limit is for what hangs, on a busy machine too.
+step "tests, serial and under mpiexec" python -m pytest -q --timeout 3600 -n 2 --dist loadfile --durations=20 \
+    ${choice[@]+"${choice[@]}"} ${words[@]+"${words[@]}"}
+if [ "$profile" = full ]; then
+    step "job scripts on Slurm" bash tests/slurm/run.sh
 fi
-step() { printf '\n== %s\n' "$1"; }
-step "lint and format"
-ruff check .
-ruff format --check .
-step "types"
-mypy
-step "layers"
-lint-imports
-step "tests, serial and under mpiexec"
-# Two files at a time: many tests wait for a compiler or for mpiexec.
-python -m pytest -q --timeout 900 -n 2 --dist loadfile "${marks[@]}"
-if [ "${1:-}" = "--full" ]; then
-    step "job scripts on Slurm"
-    bash tests/slurm/run.sh
-fi
+step lint ruff check .
+step format ruff format --check .
+step types mypy
+step layers lint-imports
+table
+exit "$red"

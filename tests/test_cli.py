@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from patience import crowded
 
 from hpcclear.cli import cli
 from hpcclear.results import dataset
@@ -26,7 +27,7 @@ def hpcclear(*words, timeout=300, module=False, **more):
         [*program, *map(str, words)],
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=crowded(timeout),
         cwd=ROOT,
         check=False,
         **more,
@@ -155,7 +156,7 @@ def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
             [*command, "--set", "study.samples=150"],
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=crowded(300),
             cwd=ROOT,
             check=False,
         )

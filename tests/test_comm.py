@@ -13,6 +13,7 @@ import time
 
 import numpy as np
 import pytest
+from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks import boundary as comm
@@ -48,17 +49,17 @@ def start(ranks: int, program: str, *arguments: object, **settings: str) -> subp
 def finish(job: subprocess.Popen, seconds: float = 30.0) -> tuple[int, str]:
     """Exit code and output; kills a job that does not end (its ranks die with mpiexec)."""
     try:
-        output, _ = job.communicate(timeout=seconds)
+        output, _ = job.communicate(timeout=crowded(seconds))
     except subprocess.TimeoutExpired:
         os.killpg(job.pid, signal.SIGKILL)
         output, _ = job.communicate()
-        pytest.fail(f"the job did not end within {seconds} s:\n{output}")
+        pytest.fail(f"the job did not end within {crowded(seconds):.0f} s:\n{output}")
     return job.returncode, output
 
 
 def wait_for(path: pathlib.Path, job: subprocess.Popen) -> None:
     """Wait until a job has made a file."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + crowded(20.0)
     while not path.exists():
         if time.monotonic() > deadline or job.poll() is not None:
             os.killpg(job.pid, signal.SIGKILL)
@@ -130,7 +131,7 @@ def test_a_program_error_is_reported_once_and_ends_every_rank(how, tmp_path):
     assert code == 1, output
     assert output.count("Traceback") == 1, output
     assert output.count("hpcclear failed on rank") == 1, output
-    assert elapsed < 5.0
+    assert elapsed < crowded(5.0)
 
 
 def test_a_report_names_rank_stage_and_sample(tmp_path):
@@ -154,7 +155,7 @@ def test_bad_input_on_any_rank_is_a_message_and_exit_code_2(how, tmp_path):
     assert code == 2, output
     assert "Traceback" not in output
     assert output.count("crank.length = -1.0: must be positive. Give a length in metres.") == 1
-    assert time.time() - (tmp_path / "mark").stat().st_mtime < 5.0
+    assert time.time() - (tmp_path / "mark").stat().st_mtime < crowded(5.0)
 
 
 @pytest.mark.parametrize("how", ["exit code", "system exit"])
@@ -177,7 +178,7 @@ def stop_and_resume(folder: pathlib.Path, where: str, number: int, ranks: int) -
     os.kill(job.pid, number)
     code, output = finish(job)
     assert code == 3, output
-    assert time.time() - told < 5.0
+    assert time.time() - told < crowded(5.0)
     assert "Traceback" not in output
     return output
 
@@ -226,7 +227,7 @@ def test_a_time_limit_stops_the_run(ranks, tmp_path):
     began = time.time()
     code, output = finish(start(ranks, "stopping.py", "limited", tmp_path, limit))
     assert code == 3, output
-    assert limit < time.time() - began < limit + 6.0
+    assert limit < time.time() - began < limit + crowded(6.0)
     assert "the time limit was reached" in output
     assert (tmp_path / "records").stat().st_size > 0
 
@@ -240,7 +241,7 @@ def test_a_second_interrupt_ends_a_deaf_process_at_once(tmp_path):
     told = time.monotonic()
     os.kill(job.pid, signal.SIGINT)
     assert finish(job)[0] == 3
-    assert time.monotonic() - told < 1.5
+    assert time.monotonic() - told < crowded(1.5)
 
 
 def test_a_switch_leaves_a_process_that_goes_on_as_it_was():
@@ -248,7 +249,7 @@ def test_a_switch_leaves_a_process_that_goes_on_as_it_was():
     with StopSwitch() as stop:
         assert not stop.is_set()
         os.kill(os.getpid(), signal.SIGUSR1)
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + crowded(10.0)
         while not stop.is_set() and time.monotonic() < deadline:
             time.sleep(0.01)
         assert stop.reason == "SIGUSR1 was received"

@@ -11,6 +11,7 @@ import click
 import matplotlib.pyplot as plt
 import pytest
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
+from patience import crowded
 
 from hpcclear.cli import cli
 from hpcclear.results.names import KINDS
@@ -166,7 +167,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=crowded(300),
         check=False,
     )
     assert done.returncode == 0, done.stderr

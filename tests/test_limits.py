@@ -26,6 +26,7 @@ from commands import (
     sample,
     start,
 )
+from patience import crowded
 
 from hpcclear.ranks.team import COLUMNS
 from hpcclear.results import dataset
@@ -44,7 +45,7 @@ def compiled(tmp_path_factory) -> Path:
 
 
 def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
-    deadline = time.time() + 60.0
+    deadline = time.time() + crowded(60.0)
     while not result_files(folder):
         assert job.poll() is None, finish(job)[1]
         assert time.time() < deadline
@@ -99,7 +100,7 @@ def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[i
         stderr=subprocess.STDOUT,
         text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=120,
+        timeout=crowded(120),
         check=False,
     )
     return done.returncode, done.stdout

@@ -5,6 +5,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
+from patience import crowded
 
 ROOT = Path(__file__).resolve().parent.parent
 NOTEBOOKS = sorted((ROOT / "analysis").glob("*.ipynb"))
@@ -22,7 +23,7 @@ def test_notebooks_are_kept_without_outputs(path):
 def test_notebooks_run_from_top_to_bottom(path):
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(
-        notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}
+        notebook, timeout=round(crowded(300)), resources={"metadata": {"path": str(path.parent)}}
     ).execute()
     outputs = [out for cell in notebook.cells if cell.cell_type == "code" for out in cell.outputs]
     kinds = [kind for out in outputs if "data" in out for kind in out["data"]]

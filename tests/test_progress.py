@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.progress import Progress, duration, launching_terminal, log_interval
@@ -138,7 +139,7 @@ def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
         pass
     finally:
         os.close(screen)
-    assert job.wait(timeout=30) == 0
+    assert job.wait(timeout=crowded(30)) == 0
     return seen.decode()
 
 

@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from patience import crowded
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
@@ -25,7 +26,7 @@ def run(*words: object, place: Path, patience: float = 600.0) -> str:
         env=clean,
         capture_output=True,
         text=True,
-        timeout=patience,
+        timeout=crowded(patience),
         check=False,
     )
     assert done.returncode == 0, f"{words}\n{done.stdout}\n{done.stderr}"

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import report_data as data
 from browser import Browser
+from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.html import markup, picture
@@ -233,7 +234,9 @@ def test_drawing_needs_neither_kernel_nor_mpi() -> None:
         "bad = {'numba', 'mpi4py', 'sklearn', 'matplotlib', 'scipy'} & set(sys.modules)\n"
         "sys.exit(f'imported: {bad}' if bad else 0)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=crowded(120)
+    )
     assert done.returncode == 0, done.stderr
 
 

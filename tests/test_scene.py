@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
+from patience import crowded
 from pydantic import ValidationError
 
 from hpcclear.base.errors import InputError
@@ -474,7 +475,9 @@ def test_hostile_files_end_quickly(tmp_path: Path) -> None:
         "    except InputError as error:\n        print(index, flush=True)"
     )
     command = [sys.executable, "-c", code]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    result = subprocess.run(
+        command, capture_output=True, text=True, timeout=crowded(60), check=True
+    )
     assert result.stdout.split() == [str(index) for index in range(len(HOSTILE))]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
@@ -229,7 +230,7 @@ def launch(ranks: int, *arguments: object) -> subprocess.CompletedProcess:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=crowded(120),
         env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[2])},
         check=False,
     )

@@ -9,6 +9,7 @@ import tomllib
 import moocore
 import numpy as np
 import pytest
+from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
@@ -267,7 +268,7 @@ def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=crowded(120),
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from patience import crowded
 
 from hpcclear.dynamics.evaluator import evaluate_records
 from hpcclear.results import dataset
@@ -63,7 +64,7 @@ def test_the_quickstart_on_two_ranks_is_the_quickstart_on_one(tmp_path):
             env=os.environ,
             capture_output=True,
             text=True,
-            timeout=900,
+            timeout=crowded(900),
             check=False,
         )
         assert done.returncode == 0, done.stderr

@@ -31,6 +31,7 @@ from commands import (
     wait_until,
 )
 from losses import Loss
+from patience import crowded
 
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
@@ -155,7 +156,7 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
 
 @pytest.mark.parametrize("moments", [2, pytest.param(10, marks=pytest.mark.full)])
 @pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "SIGUSR1", "time limit"])
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(3600)
 def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed, how, moments):
     dice, slowest, late = random.Random(how), 0.0, 0
     for moment in range(moments):
@@ -177,7 +178,7 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
             code, output = finish(job)
         elapsed = time.time() - told
         assert "Traceback" not in output
-        assert elapsed < 5.0 or (code == 0 and how == "time limit"), output
+        assert elapsed < crowded(5.0) or (code == 0 and how == "time limit"), output
         slowest = max(slowest, elapsed)
         check_readable(folder)
         if code == 0:  # it came too late
@@ -218,7 +219,7 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
     told = time.time()
     kill(job.pid, signal.SIGINT)
     code, output = finish(job, 10.0)
-    assert time.time() - told < 2.0
+    assert time.time() - told < crowded(2.0)
     assert code == 3 or ranks, output  # mpiexec aborts the job by itself, with a code of its own
     assert "Traceback" not in output
     assert check_readable(tmp_path) > 0
@@ -226,7 +227,7 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
 
 def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
     """Wait until the first finished samples are on disk."""
-    deadline = time.time() + 60.0
+    deadline = time.time() + crowded(60.0)
     while not result_files(folder):
         assert job.poll() is None, finish(job)[1]
         assert time.time() < deadline
@@ -291,7 +292,7 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
     code, output = run(words, TEST_LOG=str(before), **settings)
     elapsed = time.time() - mark.stat().st_mtime
     assert code == 1, output
-    assert elapsed < 5.0
+    assert elapsed < crowded(5.0)
     assert output.count("Traceback") == 1, output
     assert output.count(f"hpcclear failed on rank {rank} of 2 in stage") == 1, output
     assert "raised on purpose" in output

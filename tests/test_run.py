@@ -1,0 +1,108 @@
+"""The second command: every step runs whatever became of the others, and the table says what became of each."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+PROJECT = """
+[tool.ruff.lint]
+select = ["F"]
+[tool.mypy]
+packages = ["hpcclear"]
+[tool.pytest.ini_options]
+testpaths = ["tests"]
+markers = ["full: long profile"]
+[tool.importlinter]
+root_package = "hpcclear"
+[[tool.importlinter.contracts]]
+name = "floors"
+type = "layers"
+layers = ["hpcclear.above", "hpcclear.below"]
+"""
+FILES = {
+    "pyproject.toml": PROJECT,
+    "hpcclear/__init__.py": "",
+    "hpcclear/above.py": "import hpcclear.below as below\n\nprint(below.number)\n",
+    "hpcclear/below.py": "number: int = 1\n",
+    "tests/test_one.py": "def test_one():\n    assert True\n",
+}
+STEPS = ("tests, serial and under mpiexec", "lint", "format", "types", "layers")
+FAULTS = {
+    (): {},
+    ("lint",): {"hpcclear/below.py": "import os\n\nnumber: int = 1\n"},
+    STEPS: {
+        "tests/test_one.py": "def test_one():\n    assert []\n",
+        "hpcclear/below.py": "import hpcclear.above as above\nimport os\n\nnumber: int='one'\n",
+    },
+}
+
+
+def run(checkout: Path, *words: str, set_up: str = "") -> tuple[int, str, dict[str, str]]:
+    """Exit code, output, and the table's results of a small project of the same shape."""
+    for name, text in FILES.items():
+        path = checkout / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            path.write_text(text)
+    (checkout / "jobs").mkdir()
+    (checkout / "jobs" / "environment.sh").write_text(set_up)
+    shutil.copy(HERE / "run.sh", checkout / "tests")
+    tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "PYTHONPATH"))}
+    done = subprocess.run(
+        ["bash", "tests/run.sh", *words],
+        cwd=checkout,
+        env=inherited | {"PATH": tools},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=1800,
+    )
+    rows = re.findall(r"^(\S.*?) +(ok|RED) +\d+:\d\d$", done.stdout, re.MULTILINE)
+    return done.returncode, done.stdout, dict(rows)
+
+
+@pytest.mark.parametrize("red", FAULTS)
+def test_every_step_runs_and_the_table_names_the_red_ones(red, tmp_path):
+    for name, text in FAULTS[red].items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    code, output, rows = run(tmp_path)
+    assert code == bool(red), output
+    expected = {"set-up": "ok"} | {name: "RED" if name in red else "ok" for name in STEPS}
+    assert rows == expected, output
+    assert re.search(r"^1 (passed|failed) in ", output, re.MULTILINE), output
+
+
+@pytest.mark.parametrize("words", ["return 3", "exit 2", "no-such-command"])
+def test_a_set_up_that_fails_is_one_line_and_nothing_runs(words, tmp_path):
+    code, output, rows = run(tmp_path, set_up=words)
+    assert code == 1
+    assert rows == {"set-up": "RED"}
+    assert output.rstrip().endswith("set-up failed: nothing was tested")
+    assert "== " not in output
+
+
+def test_further_words_go_to_pytest(tmp_path):
+    code, output, _ = run(tmp_path, "--junitxml=found.xml", "tests/test_one.py")
+    assert code == 0, output
+    assert 'tests="1"' in (tmp_path / "found.xml").read_text()
+
+
+def test_quick_says_what_it_leaves_out_and_leaves_out_what_exists(tmp_path):
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_mopso.py").write_text("def test_two():\n    assert True\n")
+    (tmp_path / "tests" / "test_trust.py").write_text("assert False\n")
+    code, output, _ = run(tmp_path, "--quick")
+    assert code == 0, output
+    assert "2 passed" in output
+    (left_out,) = re.findall(r"^long=\(([^)]*)\)$", (HERE / "run.sh").read_text(), re.MULTILINE)
+    for name in left_out.split():
+        assert (HERE / f"test_{name}.py").exists()
+        assert re.search(rf"^ .*\b{name}\b", output, re.MULTILINE)
