@@ -53,39 +53,55 @@ def launch(ranks: int, *arguments: object) -> list[dict[str, Any]]:
 # ---- on the ranks ----------------------------------------------------------------------------------
 
 
+LINE: dict[str, Any] = {}
+"""What this rank says of itself."""
+
+
+class Watched:
+    """The evaluator, with the time of its first finished sample."""
+
+    def __init__(self, worker: Any) -> None:
+        self._worker = worker
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._worker, name)
+
+    def advance(self, seconds: float) -> np.ndarray:
+        records: np.ndarray = self._worker.advance(seconds)
+        if records.size:
+            LINE.setdefault("first", time.time() - float(os.environ["LAUNCHED_AT"]))
+        return records
+
+
+def make_watched(payload: Any, ranks: Any) -> Watched:
+    """The maker of every rank's worker, by a name that pickle finds."""
+    from hpcclear.ensemble.simulate import make_evaluator
+
+    return Watched(make_evaluator(payload, ranks))
+
+
 def inside(task: str, count: int) -> int:
     """One rank: samples or statistics on all of them, then a line about itself."""
-    from hpcclear.ensemble.simulate import KIND, MAKERS, sample_points
+    from hpcclear.ensemble.simulate import payload_of
     from hpcclear.ranks.boundary import run_on_ranks
-    from hpcclear.ranks.team import COLUMNS, Ranks
+    from hpcclear.ranks.team import COLUMNS, Ranks, Task
 
-    line: dict[str, Any] = {}
-
-    class Watched:
-        """The evaluator, with the time of its first finished sample."""
-
-        def __init__(self, worker: Any) -> None:
-            self._worker = worker
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._worker, name)
-
-        def advance(self, seconds: float) -> np.ndarray:
-            records: np.ndarray = self._worker.advance(seconds)
-            if records.size:
-                line.setdefault("first", time.time() - float(os.environ["LAUNCHED_AT"]))
-            return records
+    line = LINE
 
     def program(ranks: Ranks) -> None:
         scene, points = design(count)
         if task == "statistics":
-            from hpcclear.ensemble.statistics import run_statistics
+            from hpcclear.ensemble import statistics
+            from hpcclear.ensemble.session import Options
 
+            statistics.make_evaluator = make_watched
             with tempfile.TemporaryDirectory() as folder:
-                run_statistics(scene, Path(folder) / "out.nc", ranks, samples=count, style="quiet")
+                output, options = Path(folder) / "out.nc", Options(style="quiet")
+                statistics.run_statistics(scene, output, ranks, samples=count, options=options)
                 spent = ranks.stage_seconds["statistics"]
         else:
-            records = sample_points(scene, points, ranks)
+            work = Task("samples", make_watched, payload_of(scene, points))
+            records = ranks.run_points(work, points.values)
             spent = ranks.stage_seconds["samples"]
             cost = records["rhs_evaluations"]
             line["spread"] = float(np.quantile(cost, 0.99) / np.quantile(cost, 0.01))
@@ -93,8 +109,7 @@ def inside(task: str, count: int) -> int:
         line["busy"] = float(spent[:, COLUMNS.index("busy")].sum())
         line["made"] = float(spent[:, COLUMNS.index("compile")].max())
 
-    makers = {**MAKERS, KIND: lambda payload, ranks: Watched(MAKERS[KIND](payload, ranks))}
-    code = run_on_ranks(program, makers)
+    code = run_on_ranks(program)
     line["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     print(json.dumps(line), flush=True)
     return code

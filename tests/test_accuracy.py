@@ -9,7 +9,6 @@ from scipy.stats import chi2
 from hpcclear.accuracy import averaging, integration, methods, random_inputs, surrogate
 from hpcclear.accuracy.methods import LARGEST_STEP, QUANTITIES
 from hpcclear.accuracy.profile import FULL, QUICK, Profile
-from hpcclear.accuracy.resting import MAKERS, Resting
 from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
@@ -183,7 +182,7 @@ def test_clearances_that_differ_are_varied_apart():
 
 @pytest.fixture(scope="module")
 def measured():
-    return measure(TWIN, alone(MAKERS), TINY)
+    return measure(TWIN, alone(), TINY)
 
 
 def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
@@ -237,15 +236,7 @@ def test_without_clearance_there_is_nothing_to_measure():
     ideal = {key: {"kind": "ideal"} for key in ("joints.crank_rod", "joints.rod_slider")}
     scene = PAPER.with_({**ideal, "effects.contact": None, "effects.friction": {"law": "none"}})
     with pytest.raises(InputError, match="without clearance"):
-        measure(scene, alone(MAKERS), TINY)
-
-
-def test_a_resting_rank_takes_no_samples():
-    rest = Resting()
-    assert rest.pending > 10**9
-    assert rest.advance(0.0).size == 0
-    with pytest.raises(AssertionError):
-        rest.submit(np.arange(1), np.zeros((1, 1)))
+        measure(scene, alone(), TINY)
 
 
 def test_profiles_differ_in_size_only():

@@ -16,10 +16,9 @@ import pytest
 from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks import boundary as comm
-from hpcclear.ranks import launcher
+from hpcclear.ranks import boundary, launcher
 from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
-from hpcclear.ranks.team import COLUMNS
+from hpcclear.ranks.team import COLUMNS, Task
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -109,11 +108,32 @@ def test_seconds_of_all_ranks_add_up_to_the_wall_time_of_a_stage(runs, ranks):
     assert runs[ranks]["seconds_serial"][0, COLUMNS.index("write")] > 0.0
 
 
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_a_stage_on_fewer_ranks_leaves_the_others_idle(runs, ranks):
+    run = runs[ranks]
+    assert run["on_one"].tobytes() == records_of(np.arange(200), design(200)).tobytes()
+    busy = run["seconds_on one"][:, COLUMNS.index("busy")]
+    assert busy[0] > 0.09  # 200 samples of 2 ms in 4 lanes
+    assert (busy[1:] == 0.0).all()
+
+
+@pytest.mark.parametrize("ranks", [0, 1, 2, 3])
+def test_every_rank_does_once_what_is_to_be_done_everywhere(runs, ranks):
+    run = runs[ranks]
+    assert run["called"].tolist() == [f"{ranks}.npz-{rank}" for rank in range(max(ranks, 1))]
+    table = run["seconds_everywhere"]
+    assert (table[:, COLUMNS.index("compile")] >= 0.05).all()
+    np.testing.assert_allclose(table.sum(axis=1), table[0].sum(), rtol=1e-9)
+
+
 ERRORS = [
     "worker on root",
     "worker on a rank",
     "workers everywhere",
     "maker on root",
+    "call on root",
+    "call on a rank",
+    "call on a rank, root busy",
     "import on a rank",
     "first on node",
     "payload",
@@ -148,7 +168,14 @@ def test_work_finished_before_an_error_reaches_root(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "how", ["bad input", "bad input on a rank", "bad input on every rank", "deaf root, bad input"]
+    "how",
+    [
+        "bad input",
+        "bad input on a rank",
+        "bad input in a call on a rank",
+        "bad input on every rank",
+        "deaf root, bad input",
+    ],
 )
 def test_bad_input_on_any_rank_is_a_message_and_exit_code_2(how, tmp_path):
     code, output = finish(start(3, "failing.py", how, tmp_path / "mark"))
@@ -198,7 +225,9 @@ def test_a_signal_stops_a_run_that_then_resumes_to_the_same_result(ranks, number
     assert np.load(tmp_path / "result.npy").tobytes() == expected.tobytes()
 
 
-@pytest.mark.parametrize("where", ["begin", "polling", "deaf", "set-up of a rank"])
+@pytest.mark.parametrize(
+    "where", ["begin", "polling", "deaf", "set-up of a rank", "call of a rank"]
+)
 def test_a_signal_is_obeyed_in_every_state(where, tmp_path):
     stop_and_resume(tmp_path, where, signal.SIGTERM, 2)
 
@@ -285,18 +314,18 @@ def test_no_mpi_library_is_needed_in_one_process_but_named_when_missing(tmp_path
 
 
 def test_the_mpi_library_is_described_without_starting_it():
-    assert comm.describe_mpi()
+    assert boundary.describe_mpi()
     from mpi4py import MPI
 
     assert not MPI.Is_initialized()
 
 
 def test_one_process_in_a_notebook_gets_plain_exceptions():
-    ranks = comm.alone({"sleep": make_sleeping})
-    result = ranks.run_points("sleep", {"cost": 1e-4}, design(20))
+    ranks = boundary.alone()
+    result = ranks.run_points(Task("sleep", make_sleeping, {"cost": 1e-4}), design(20))
     assert result.tobytes() == records_of(np.arange(20), design(20)).tobytes()
     with pytest.raises(ArithmeticError, match="on purpose"):
-        ranks.run_points("sleep", {"cost": 1e-4, "fails_at": 3}, design(20))
+        ranks.run_points(Task("sleep", make_sleeping, {"cost": 1e-4, "fails_at": 3}), design(20))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from running import HUNT_CROSSLEY, LATCHED, scene_with
 from hpcclear.base.outcome import ON_REQUEST, RESPONSES
 from hpcclear.dynamics.evaluator import evaluate_records
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.simulate import MAKERS, sample_points
+from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
@@ -94,7 +94,7 @@ def test_ranks_know_what_a_study_asks_for(how):
     """Ranks get no study: what its objective needs must reach them all the same."""
     scene = asking({}) if how == "study" else asking({"numerics.responses": True}, "mean-gap")
     points = Points(("C",), np.array([[2e-4], [3e-4]]), (("joints.crank_rod.clearance",),))
-    records = sample_points(scene, points, alone(MAKERS))
+    records = sample_points(scene, points, alone())
     assert records.tobytes() == evaluate_records(scene, points, lanes=32).tobytes()
     assert all(np.isfinite(records[name]).all() for name in RESPONSES)
 

@@ -7,7 +7,6 @@ import pytest
 from click.testing import CliRunner
 
 from hpcclear.accuracy.plan import Plan, Row, measure, simulations_of
-from hpcclear.accuracy.resting import MAKERS
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
@@ -78,7 +77,7 @@ def test_simulations_of_a_study_are_counted():
 
 
 def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
-    found = measure(SCENE, alone(MAKERS), (1e-2, 1e-5))
+    found = measure(SCENE, alone(), (1e-2, 1e-5))
     assert [row.error for row in found.rows] == [None, 1e-2, 1e-5]
     file, loose, strict = found.rows
     assert file.scene == SCENE
@@ -91,7 +90,7 @@ def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
 
 def test_a_scene_without_a_study_is_refused_with_a_remedy():
     with pytest.raises(InputError, match="study"):
-        measure(load_scene(JOBS / "hunt_crossley.toml"), alone(MAKERS))
+        measure(load_scene(JOBS / "hunt_crossley.toml"), alone())
 
 
 def test_the_command_refuses_an_error_that_is_none():
@@ -104,10 +103,10 @@ def test_the_command_refuses_an_error_that_is_none():
 def test_core_seconds_of_a_long_run_are_predicted():
     """A minute on this process; the machine should have nothing else to do."""
     scene = SCENE.with_({"numerics.transient_revolutions": 20})
-    plan = measure(scene, alone(MAKERS), ())
+    plan = measure(scene, alone(), ())
     count = int(60.0 / plan.rows[0].seconds)
     points = design(scene.with_({"study.samples": count}), None)
-    ranks = alone(MAKERS)
+    ranks = alone()
     sample_points(scene, points, ranks, stage="long")
     busy = ranks.stage_seconds["long"][0, 0]
     assert plan.rows[0].seconds * count == pytest.approx(busy, rel=0.2)

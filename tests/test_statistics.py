@@ -12,8 +12,9 @@ from patience import crowded
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpacked
+from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
-from hpcclear.ranks import boundary as comm
+from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene.sampling import MonteCarloPoints, monte_carlo
 from hpcclear.statistics.streams.accumulator import Accumulator
@@ -22,7 +23,15 @@ from hpcclear.statistics.streams.summary import ROWS, Summary, columns, empty, m
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
 sys.path.insert(0, str(PROGRAM.parent))
 
-from streaming_run import MADE_UP, MadeUp, scene_of  # noqa: E402
+from streaming_run import MadeUp, make_made_up, scene_of  # noqa: E402
+
+QUIET = Options(style="quiet")
+
+
+@pytest.fixture(autouse=True)
+def _made_up(monkeypatch):
+    """No kernel: what ranks simulate follows from index and point alone."""
+    monkeypatch.setattr("hpcclear.ensemble.statistics.make_evaluator", make_made_up)
 
 
 def outcomes(samples: int, seed: int = 3) -> np.ndarray:
@@ -194,10 +203,10 @@ def test_points_on_demand_are_the_points():
 
 
 def test_dataset_round_trip_and_raw_samples(tmp_path):
-    ranks = comm.alone(MADE_UP)
+    ranks = alone()
     scene = scene_of(9000)
     output, raw = tmp_path / "statistics.nc", tmp_path / "raw"
-    content = run_statistics(scene, output, ranks, raw=raw, style="quiet")
+    content = run_statistics(scene, output, ranks, raw=raw, options=QUIET).content
     assert dataset.read(output, "statistics").identical(content)
     kept = [dataset.read(path, "samples") for path in sorted(raw.iterdir())]
     objective = np.concatenate([part["objective"].values for part in kept])
@@ -206,10 +215,40 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
     expected = points[:, 0] + 10.0 * points[:, -1]
     np.testing.assert_array_equal(objective[np.isfinite(objective)], expected[points[:, 0] <= 0.4])
     np.testing.assert_allclose(content["objective_mean"], np.nanmean(objective), rtol=1e-13)
-    again = run_statistics(scene, output, ranks, style="quiet")  # done already: only read
-    assert again.identical(content)
+    again = run_statistics(scene, output, ranks, options=QUIET)  # done already: only read
+    assert again.content.identical(content)
     with pytest.raises(InputError, match="another run"):
-        run_statistics(scene, output, ranks, samples=8000, style="quiet")
+        run_statistics(scene, output, ranks, samples=8000, options=QUIET)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("hpcclear.ensemble.identity.DEFAULT_LANES", 64),
+        ("hpcclear.results.dataset._versions", lambda: "numba 0.1"),
+        ("hpcclear.results.dataset._processor", lambda: "another one"),
+    ],
+)
+def test_statistics_go_on_only_with_the_same_lanes_versions_and_processor(
+    tmp_path, monkeypatch, name, value
+):
+    scene, output = scene_of(5000), tmp_path / "statistics.nc"
+    run_statistics(scene, output, alone(), options=QUIET)
+    monkeypatch.setattr(name, value)
+    with pytest.raises(InputError, match="another run"):
+        run_statistics(scene, output, alone(), options=QUIET)
+
+
+def test_fresh_statistics_go_beside_what_is_there_and_say_where(tmp_path):
+    scene, output = scene_of(5000), tmp_path / "statistics.nc"
+    fresh = Options(fresh=True, style="quiet")
+    for expected in ("statistics.nc", "statistics-2.nc", "statistics-3.nc"):
+        found = run_statistics(scene, output, alone(), options=fresh)
+        assert found.output == tmp_path / expected
+        assert dataset.read(found.output, "statistics").identical(found.content)
+    assert {path.name for path in tmp_path.glob("*.nc")} == {
+        "statistics.nc", "statistics-2.nc", "statistics-3.nc", "timing.nc",
+    }  # fmt: skip
 
 
 def test_latin_hypercubes_are_refused(tmp_path):
@@ -218,7 +257,7 @@ def test_latin_hypercubes_are_refused(tmp_path):
         {**scene.resolved(), "study": {**scene.resolved()["study"], "method": "lhs"}}
     )
     with pytest.raises(InputError, match=r"study\.method"):
-        run_statistics(hypercube, tmp_path / "out.nc", comm.alone({}))
+        run_statistics(hypercube, tmp_path / "out.nc", alone())
 
 
 def launch(ranks: int, *arguments: object) -> subprocess.CompletedProcess:
@@ -246,7 +285,7 @@ def test_bytes_do_not_depend_on_ranks_or_stops(tmp_path):
     assert launch(0, files[2], 60000).returncode == 0
     assert files[0].read_bytes() == files[1].read_bytes() == files[2].read_bytes()
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".lock"}
-    assert left == {path.name for path in files}
+    assert left == {*(path.name for path in files), "timing.nc"}
 
 
 def peak(output: Path, samples: int) -> float:

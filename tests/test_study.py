@@ -20,7 +20,6 @@ from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.study import optimisation, responses, run_study, simulations, surrogates
 from hpcclear.study.paper import claims
-from hpcclear.study.paper import readings as audit
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -28,7 +27,6 @@ sys.path.insert(0, str(PROGRAMS))
 
 import formula  # noqa: E402
 
-MAKERS = formula.MAKERS
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
 
@@ -39,8 +37,7 @@ def scene_of(*overrides: str):
 
 @pytest.fixture(autouse=True)
 def _dynamics(monkeypatch):
-    monkeypatch.setattr(responses, "simulate", formula.respond)
-    monkeypatch.setattr(audit, "simulate", formula.respond)
+    formula.replace_dynamics(monkeypatch.setattr)
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +45,9 @@ def results(tmp_path_factory):
     """One study, done in one go."""
     place = tmp_path_factory.mktemp("study") / "whole"
     patch = pytest.MonkeyPatch()
-    patch.setattr(responses, "simulate", formula.respond)
-    patch.setattr(audit, "simulate", formula.respond)
+    formula.replace_dynamics(patch.setattr)
     told: list[str] = []
-    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    run_study(scene_of(), place, alone(), progress_style="quiet", tell=told.append)
     patch.undo()
     assert told == []
     return place
@@ -205,7 +201,7 @@ def test_readings_compare_with_the_printed_values(results):
 
 def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_path):
     place = tmp_path / "pieces"
-    stages = formula.run_in_pieces(scene_of(), place, alone(MAKERS))
+    stages = formula.run_in_pieces(scene_of(), place, alone())
     assert stages == 7
     assert contents(place) == contents(results)
 
@@ -215,11 +211,11 @@ def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monk
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "finish", _interrupt)
         with pytest.raises(KeyboardInterrupt):
-            run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+            run_study(scene_of(), place, alone(), progress_style="quiet")
     part = min((place / "checkpoint").glob("part-*.nc"))
     part.write_bytes(part.read_bytes()[:-1])
     (place / "claims.nc").unlink()
-    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+    run_study(scene_of(), place, alone(), progress_style="quiet")
     assert contents(place) == contents(results)
 
 
@@ -228,7 +224,7 @@ def _interrupt(checkpoint: Checkpoint) -> None:
 
 
 def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
-    place, ranks, calls = tmp_path / "stopped", alone(MAKERS), [0]
+    place, ranks, calls = tmp_path / "stopped", alone(), [0]
     work = formula.FormulaWorker.advance
 
     def advance(self, seconds):
@@ -242,16 +238,16 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
     with pytest.raises(Stopped):
         run_study(scene, place, ranks, progress_style="quiet")
     assert (place / "checkpoint").is_dir()
-    ranks = alone(MAKERS)
+    ranks = alone()
     with pytest.raises(Stopped):
         run_study(scene, place, ranks, progress_style="quiet")
     before = calls[0]
-    run_study(scene, place, alone(MAKERS), progress_style="quiet")
+    run_study(scene, place, alone(), progress_style="quiet")
     assert contents(place) == contents(results)
     again = calls[0]
     assert again > before
     told: list[str] = []
-    run_study(scene, place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
     assert calls[0] == again  # nothing is done twice
     assert "finished" in told[0]
 
@@ -281,7 +277,7 @@ def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
 def test_failed_samples_are_left_out_and_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(formula, "FAILS_ABOVE", 0.26)
     place = tmp_path / "failing"
-    run_study(scene_of(), place, alone(MAKERS), progress_style="quiet")
+    run_study(scene_of(), place, alone(), progress_style="quiet")
     samples = dataset.read(place / "samples.nc")
     heavy = samples["m3"].to_numpy() > 0.26
     assert heavy.any()
@@ -298,7 +294,7 @@ def test_failed_samples_are_left_out_and_counted(tmp_path, monkeypatch):
 def test_all_failed_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)
     with pytest.raises(InputError, match=r"all of these simulations failed.*max_steps"):
-        run_study(scene_of(), tmp_path / "out", alone(MAKERS), progress_style="quiet")
+        run_study(scene_of(), tmp_path / "out", alone(), progress_style="quiet")
 
 
 def test_points_are_added_where_the_surrogate_fails(tmp_path, monkeypatch):
@@ -313,7 +309,7 @@ def test_points_are_added_where_the_surrogate_fails(tmp_path, monkeypatch):
     monkeypatch.setattr(formula, "objective", valley)
     told: list[str] = []
     scene = scene_of("study.verification.infill_rounds=4", "study.seed=5")
-    run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet", tell=told.append)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", tell=told.append)
     assert "% off the true one" in told[0]
     assert "failed there to the end" not in " ".join(told)
     found = dataset.read(tmp_path / "out" / "verification.nc")
@@ -327,7 +323,7 @@ def test_points_are_added_where_the_surrogate_fails(tmp_path, monkeypatch):
 def test_a_surrogate_that_never_holds_is_reported(tmp_path):
     told: list[str] = []
     scene = scene_of("study.verification.tolerance=1e-9")
-    run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet", tell=told.append)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", tell=told.append)
     assert "failed there to the end" in told[-1]
     found = dataset.read(tmp_path / "out" / "verification.nc")
     assert told[-1] in found.attrs["remarks"]
@@ -336,7 +332,7 @@ def test_a_surrogate_that_never_holds_is_reported(tmp_path):
 def test_results_of_another_study_are_refused(results):
     scene = scene_of("study.seed=4")
     with pytest.raises(InputError, match=r"study\.seed"):
-        run_study(scene, results, alone(MAKERS), progress_style="quiet")
+        run_study(scene, results, alone(), progress_style="quiet")
 
 
 def test_fresh_starts_beside(results, tmp_path, monkeypatch):
@@ -346,9 +342,7 @@ def test_fresh_starts_beside(results, tmp_path, monkeypatch):
     told: list[str] = []
     monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)  # ends at once
     with pytest.raises(InputError, match="failed"):
-        run_study(
-            scene_of(), place, alone(MAKERS), fresh=True, progress_style="quiet", tell=told.append
-        )
+        run_study(scene_of(), place, alone(), fresh=True, progress_style="quiet", tell=told.append)
     assert (tmp_path / "taken-2").is_dir()
     assert str(tmp_path / "taken-2") in told[0]
 
@@ -363,21 +357,21 @@ def test_fresh_starts_beside(results, tmp_path, monkeypatch):
 def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message):
     scene = scene_of(*overrides, "study.surrogate.models=[['m2', 'm3']]")
     with pytest.raises(InputError, match=message):
-        run_study(scene, tmp_path / "out", alone(MAKERS), progress_style="quiet")
+        run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
 
 
 @pytest.mark.parametrize("name", ["peak-contact-force", "peak-crank-moment"])
 def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, monkeypatch, name):
     monkeypatch.setattr(formula, "FIELD", name.replace("-", "_"))
     scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
-    run_study(scene, place, alone(MAKERS), progress_style="quiet")
+    run_study(scene, place, alone(), progress_style="quiet")
     samples = dataset.read(place / "samples.nc")
     assert samples["objective"].attrs["units"] == samples["mean_gap"].attrs["units"] == "m"
     assert not (place / "claims.nc").exists()
     assert not (place / "readings.nc").exists()
     assert np.isnan(dataset.read(place / "verification.nc")["mean_paper"]).all()
     told: list[str] = []
-    run_study(scene, place, alone(MAKERS), progress_style="quiet", tell=told.append)
+    run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
     assert told == [f"{place} holds the finished study."]
 
 
@@ -409,7 +403,7 @@ def test_units_follow_the_objective_and_nothing_else_does(
     """What depends on the objective has its unit; a position stays in metres."""
     monkeypatch.setattr(formula, "FIELD", "" if name == "mean-gap" else name.replace("-", "_"))
     place = tmp_path / "out"
-    run_study(scene_of(f"study.objective={name}"), place, alone(MAKERS), progress_style="quiet")
+    run_study(scene_of(f"study.objective={name}"), place, alone(), progress_style="quiet")
     for path in sorted(place.rglob("*.nc")):
         found = dataset.read(path)
         table = KINDS[found.attrs["hpcclear_kind"]]

@@ -259,8 +259,8 @@ AFTER = [
     "once hpcclear.results.checkpoint:Checkpoint.flush 2",
     "once hpcclear.results.files:write_bytes 3",
     "call hpcclear.ranks.progress:Progress.add 5",
-    "call hpcclear.ensemble.samples:discard",
-    "call hpcclear.ensemble.samples:timing_of",
+    "call hpcclear.results.checkpoint:Checkpoint.finish",
+    "call hpcclear.ensemble.session:timing_of",
     "call hpcclear.cli.printing:describe_samples",
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
@@ -278,7 +278,7 @@ STUDY_CASES = [
     "call hpcclear.study.paper.readings:_over_steps",
     "call hpcclear.study.paper.claims:judge",
     "call hpcclear.results.checkpoint:Checkpoint.save_stage 2",
-    "call hpcclear.study:_write_timing",
+    "call hpcclear.ensemble.session:timing_of",
     "call hpcclear.results.checkpoint:Checkpoint.finish",
 ]
 

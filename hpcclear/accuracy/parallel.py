@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.accuracy.profile import Profile
-from hpcclear.accuracy.resting import SOME_RANKS
 from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.ensemble.simulate import payload_of
-from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.ensemble.simulate import make_evaluator, payload_of
+from hpcclear.ranks.team import COLUMNS, Ranks, Task
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
@@ -64,10 +63,10 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     coordinates = region.lower + unit * (region.upper - region.lower)
     paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
-    payload = {**payload_of(scene, points), "ranks": number}
     stage = _stage(number, samples)
+    task = Task(stage, make_evaluator, payload_of(scene, points), workers=number)
     started = time.perf_counter()
-    ranks.run_points(SOME_RANKS, payload, points.values, stage=stage, keep=False)
+    ranks.run_points(task, points.values, keep=False)
     wall = time.perf_counter() - started
     return float(wall - ranks.stage_seconds[stage][0, COLUMNS.index("compile")])
 

@@ -115,7 +115,6 @@ def measure(
     scene : Scene
         With a study.
     ranks : Ranks
-        Made with `hpcclear.ensemble.simulate.MAKERS`.
     errors : tuple of float
         Target errors of the ladder.
     workers : int

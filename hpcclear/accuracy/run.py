@@ -29,7 +29,6 @@ def measure(
     scene : Scene
         With a clearance joint at least.
     ranks : Ranks
-        Made with `hpcclear.accuracy.resting.MAKERS`.
     profile : Profile
     tell : callable
         Gets what is going on, a line at a time.

@@ -88,13 +88,12 @@ def _is_root() -> bool:
 
 def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
     """Run a command that uses every rank."""
-    from hpcclear.accuracy.resting import MAKERS
     from hpcclear.ranks.boundary import run_on_ranks
 
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
         stop.limit_time(time_limit)
-    return run_on_ranks(program, MAKERS, stop)
+    return run_on_ranks(program, stop)
 
 
 @cli.command(short_help="Say what a file would simulate, at what cost.")
@@ -193,14 +192,17 @@ def sample(
 
     def program(ranks: "Ranks") -> None:
         from hpcclear.cli.printing import describe_samples, describe_statistics
-        from hpcclear.ensemble.samples import run_sample, run_summary
+        from hpcclear.ensemble.samples import run_sample
+        from hpcclear.ensemble.session import Options
+        from hpcclear.ensemble.statistics import run_statistics
 
         scene, place = _scene(file, overrides), _place(output)
-        how: dict[str, Any] = {"fresh": fresh, "interval": interval, "style": progress}
+        options = Options(fresh, interval, progress)
         if statistics:
-            describe_statistics(run_summary(scene, place, ranks, raw=raw and _place(raw), **how))
+            kept = None if raw is None else _place(raw)
+            describe_statistics(run_statistics(scene, place, ranks, raw=kept, options=options))
         else:
-            describe_samples(run_sample(scene, place, ranks, table=points, **how))
+            describe_samples(run_sample(scene, place, ranks, table=points, options=options))
 
     _check_kind(points, statistics, raw)
     return _on_ranks(program, time_limit)

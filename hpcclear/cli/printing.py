@@ -2,6 +2,7 @@
 
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -11,8 +12,10 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.ensemble.session import Finished
 from hpcclear.scene import Scene
+
+if TYPE_CHECKING:
+    from hpcclear.ensemble.session import Finished
 
 WIDTH = 80
 
@@ -170,14 +173,14 @@ def flag_remarks(flags: int) -> list[str]:
     return [text for flag, text in REMARKS.items() if flags & flag]
 
 
-def _load(found: Finished) -> list[tuple[str, str]]:
+def _load(found: "Finished") -> list[tuple[str, str]]:
     """Wall time, and how every rank spent it."""
     words = "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s"
     ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(found.spent)]
     return [("wall time", f"{found.seconds:.1f} s"), *ranks]
 
 
-def describe_statistics(found: Finished) -> None:
+def describe_statistics(found: "Finished") -> None:
     """Print mean and deviation of f with the error of the mean, failures and load of a streamed Monte Carlo."""
     out, content = console(), found.content
     by_status = content["samples_by_status"]
@@ -192,7 +195,7 @@ def describe_statistics(found: Finished) -> None:
     out.print(f"statistics {found.output}")
 
 
-def describe_samples(found: Finished) -> None:
+def describe_samples(found: "Finished") -> None:
     """Print throughput, range of f, failures and load of a batch of samples."""
     out, samples = console(), found.content
     f = samples["objective"].to_numpy()

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import Evaluator
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.simulate import COMPILE, payload_of
-from hpcclear.ranks.progress import Progress, Style
+from hpcclear.ensemble.simulate import payload_of
+from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -25,7 +24,7 @@ from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 
-def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
+def compile_share(payload: Mapping[str, Any], ranks: Ranks) -> None:
     """Compile this rank's share of the parts; root and the others are at it together.
 
     Parameters
@@ -41,32 +40,6 @@ def make_compiler(payload: Mapping[str, Any], ranks: Ranks) -> "Compiled":
         mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
     for part in mine:
         part(payload)
-    return Compiled()
-
-
-class Compiled:
-    """A worker that has done its work when it is made."""
-
-    lanes = 1
-
-    def __init__(self) -> None:
-        self._waiting: list[int] = []
-
-    @property
-    def pending(self) -> int:
-        """Samples not returned yet."""
-        return len(self._waiting)
-
-    def submit(self, index: np.ndarray, points: np.ndarray) -> None:
-        """Queue samples: indices of shape (n,), points of shape (n, d)."""
-        self._waiting += index.tolist()
-
-    def advance(self, seconds: float) -> np.ndarray:
-        """Return the records of all samples."""
-        records = np.zeros(self.pending, OUTCOME)
-        records["sample"] = self._waiting
-        self._waiting.clear()
-        return records
 
 
 def _ensemble(payload: Mapping[str, Any]) -> None:
@@ -104,13 +77,10 @@ def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> N
     style : str
         How progress is shown.
     """
-    # One sample that takes as long as the compilers do: its rate would say nothing.
-    progress = Progress("compiling", style="quiet")
     if style != "quiet":
         print(
             "compiling what this study needs: up to a minute the first time",
             file=sys.stderr,
             flush=True,
         )
-    nothing = np.zeros((1, 1))  # a stage needs a sample
-    ranks.run_points(COMPILE, payload_of(scene, points), nothing, progress=progress)
+    ranks.everywhere("compile", compile_share, payload_of(scene, points))

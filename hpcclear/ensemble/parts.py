@@ -169,12 +169,11 @@ class Summariser:
 
 
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
-    """A rank's worker: the simulations of `payload["samples"]`, summed up where they are made."""
-    from hpcclear.ensemble.simulate import KIND
+    """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated."""
     from hpcclear.scene import load_scene
     from hpcclear.scene.sampling import MonteCarloPoints
 
-    worker = ranks.make(KIND, payload["samples"])
+    worker = payload["make"](payload["samples"], ranks)
     points = MonteCarloPoints(load_scene(payload["design"]), payload["total"])
     return Summariser(worker, points, payload["edges"])
 

@@ -1,10 +1,113 @@
-"""What a command that simulates leaves behind."""
+"""The life of a run, which `sample`, `sample --statistics` and `run` share.
 
+A place, its lock, what a killed run left there, the key that says whether results are this run's, going on from
+them, and at the end the times and the removal of what was unfinished.
+"""
+
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 import xarray as xr
+
+from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.ranks.progress import Style
+from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.results import dataset, files
+from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard, key_attribute
+from hpcclear.results.lock import Lock
+from hpcclear.results.places import fresh_sibling, parts_of
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a run is carried out, which changes no result.
+
+    Attributes
+    ----------
+    fresh : bool
+        Start anew beside an earlier result.
+    interval : float
+        Seconds between two checkpoints.
+    style : str
+        How progress is shown.
+    """
+
+    fresh: bool = False
+    interval: float = INTERVAL
+    style: Style = "auto"
+
+
+DEFAULT_OPTIONS = Options()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run puts its results, and what belongs to it there.
+
+    Attributes
+    ----------
+    output : Path
+        The file, or the directory, of the results.
+    parts : Path
+        Directory of what is unfinished.
+    timing : Path
+    lock : Path
+    folders : tuple of Path
+        Where a killed run may have left half a file.
+    """
+
+    output: Path
+    parts: Path
+    timing: Path
+    lock: Path
+    folders: tuple[Path, ...]
+
+    @classmethod
+    def of_file(cls, output: Path, fresh: bool) -> Self:
+        """A single file, with a hidden directory beside it; `fresh`: another one, if anything is there.
+
+        Raises
+        ------
+        InputError, StorageError
+            Nothing can be written there.
+        """
+        files.probe(output)
+        if fresh and any(os.path.lexists(path) for path in (output, parts_of(output))):
+            output = fresh_sibling(output)
+        parent = output.parent
+        lock = parent / f".{output.name}.lock"
+        return cls(output, parts_of(output), parent / "timing.nc", lock, (parent,))
+
+    @classmethod
+    def of_directory(cls, directory: Path, fresh: bool, folders: Sequence[str] = ()) -> Self:
+        """A directory, made if its parent exists; `fresh`: another one, if anything is in it.
+
+        Raises
+        ------
+        InputError, StorageError
+            It cannot be made.
+        """
+        try:
+            if fresh and directory.exists() and any(directory.iterdir()):
+                directory = fresh_sibling(directory)
+            directory.mkdir(exist_ok=True)
+        except OSError as error:
+            raise files.refused(directory, error) from None
+        inside = tuple(directory / name for name in folders)
+        lock = directory / ".hpcclear.lock"
+        return cls(
+            directory, directory / "checkpoint", directory / "timing.nc", lock, (directory, *inside)
+        )
 
 
 @dataclass(frozen=True)
@@ -27,3 +130,144 @@ class Finished:
     timing: Path
     seconds: float
     spent: np.ndarray
+
+
+class Session:
+    """One run at its place, on root: a context in which no other run works there.
+
+    Parameters
+    ----------
+    place : Place
+    key : mapping of str to str
+        What makes the run what it is (`hpcclear.ensemble.identity`).
+    ranks : Ranks
+    options : Options
+    tell : callable
+        Gets what was found on disk and could not be used, a sentence at a time.
+
+    Attributes
+    ----------
+    attributes : dict of str to str
+        Of every file of results: what made them, and the key; empty before `described`.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        key: Mapping[str, str],
+        ranks: Ranks,
+        options: Options,
+        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{text}\n"),
+    ) -> None:
+        self.place = place
+        self.key = dict(key)
+        self.ranks = ranks
+        self.options = options
+        self.tell = tell
+        self.attributes: dict[str, str] = {}
+        self._checkpoint: Checkpoint | None = None
+        self._told = 0
+        self._lock = Lock(place.lock.parent, place.lock.name)
+
+    def __enter__(self) -> Self:
+        self._lock.acquire()
+        try:
+            for folder in self.place.folders:
+                files.remove_leftovers(folder)
+        except BaseException:
+            self._lock.release()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._lock.release()
+
+    def found(self, kind: str) -> xr.Dataset | None:
+        """The file of an earlier run of the same command, if it is there; another run's is refused."""
+        if not self.place.output.exists():
+            return None
+        content = dataset.read(self.place.output, kind)
+        check_key(content, self.key, self.place.output)
+        return content
+
+    def has_all(self, names: Sequence[str]) -> bool:
+        """Whether all these files of the directory are there; another run's are refused."""
+        there = [path for name in names if (path := self.place.output / name).exists()]
+        for path in there:
+            check_key(dataset.read(path), self.key, path)
+        return len(there) == len(names)
+
+    def described(self, scene: Scene, points: Points | None = None) -> Scene:
+        """The scene with the settings that its target error asks for at `points`; sets `attributes`."""
+        chosen, reason = scene, ""
+        if points is not None and scene.numerics.target_error is not None:
+            with self.ranks.stage("settings"):
+                chosen, reason = resolve(scene, points)
+        self.attributes = {
+            **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+            **recorded(reason),
+            **key_attribute(self.key),
+        }
+        return chosen
+
+    def opened(
+        self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
+    ) -> Checkpoint:
+        """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            self._checkpoint = Checkpoint(
+                self.place.parts,
+                self.key,
+                interval=self.options.interval,
+                names=names,
+                units=units,
+                attributes=self.attributes,
+            )
+        self.tell_problems()
+        return self._checkpoint
+
+    def tell_problems(self) -> None:
+        """Tell what was found in the checkpoint and could not be used, each once."""
+        problems = [] if self._checkpoint is None else self._checkpoint.problems
+        for problem in problems[self._told :]:
+            self.tell(problem)
+        self._told = len(problems)
+
+    def write(self, content: xr.Dataset) -> xr.Dataset:
+        """Write the result file; returns what was written."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            dataset.write(content, self.place.output)
+        return content
+
+    def close(self, attributes: Mapping[str, str] | None = None) -> None:
+        """Write the times, and remove what was unfinished: all results are in place.
+
+        Who found all done keeps the times that were measured. `attributes` are those of the times' file.
+        """
+        if self.ranks.stage_seconds or not self.place.timing.exists():
+            dataset.write(timing_of(self.ranks, attributes), self.place.timing)
+        if self._checkpoint is not None:
+            self._checkpoint.finish()
+        else:  # the run that finished may have been killed before it could
+            discard(self.place.parts)
+
+    def finished(self, content: xr.Dataset, began: float) -> Finished:
+        """What to print of a run that wrote one file, or found it; `began`: by `time.perf_counter`."""
+        spent = np.zeros((self.ranks.size, len(COLUMNS)))
+        spent = sum(self.ranks.stage_seconds.values(), spent)
+        seconds = time.perf_counter() - began
+        return Finished(content, self.place.output, self.place.timing, seconds, spent)
+
+
+def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:
+    """Where the time of this job went, by rank and stage."""
+    stages = list(ranks.stage_seconds) or ["none"]
+    empty = np.zeros((ranks.size, len(COLUMNS)))
+    seconds = np.stack([ranks.stage_seconds.get(stage, empty) for stage in stages], axis=1)
+    data = {name: seconds[:, :, k] for k, name in enumerate(COLUMNS)}
+    return dataset.timing_dataset(stages, data, shlex.join(sys.argv), attributes)

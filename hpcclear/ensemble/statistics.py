@@ -1,9 +1,8 @@
 """Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
 
-import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,20 +10,25 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
-from hpcclear.dynamics.target import recorded, resolve
-from hpcclear.ensemble.parts import PARTIAL, Parts, PartsProgress, part_length, unpacked
-from hpcclear.ensemble.simulate import KIND, PARTS, payload_of, saving
-from hpcclear.ranks.progress import Progress, Style
-from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.ensemble.identity import statistics_key
+from hpcclear.ensemble.parts import (
+    PARTIAL,
+    Parts,
+    PartsProgress,
+    make_summariser,
+    part_length,
+    unpacked,
+)
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
+from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.schedule import Points
+from hpcclear.ranks.team import COLUMNS, Ranks, Task
 from hpcclear.results import dataset, files
-from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, key_attribute
-from hpcclear.results.lock import Lock
-from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.scene import Scene
-from hpcclear.scene.paths import flatten
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
-from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF, ROWS, Summary
+from hpcclear.statistics.streams.summary import ROWS, Summary
 
 STAGE = "statistics"
 
@@ -49,10 +53,8 @@ def run_statistics(
     *,
     samples: int | None = None,
     raw: Path | None = None,
-    fresh: bool = False,
-    interval: float = INTERVAL,
-    style: Style = "auto",
-) -> xr.Dataset:
+    options: Options = DEFAULT_OPTIONS,
+) -> Finished:
     """Simulate Monte Carlo samples on all ranks and write their statistics; on root.
 
     Parameters
@@ -60,24 +62,24 @@ def run_statistics(
     scene : Scene
         With a study that samples by Monte Carlo.
     output : Path
-        NetCDF file of kind ``statistics``; what is unfinished goes into a hidden directory beside it.
+        NetCDF file of kind ``statistics``; timing.nc goes beside it, what is unfinished into a hidden directory.
     ranks : Ranks
-        Made with `hpcclear.ensemble.simulate.MAKERS`.
     samples : int, optional
         Number of samples, the study's by default.
     raw : Path, optional
         Directory for the samples themselves, a file of kind ``samples`` for every 4096.
-    fresh : bool
-        Start anew beside an earlier result.
-    interval : float
-        Seconds between two checkpoints.
-    style : str
-        How progress is shown.
+    options : Options
+
+    Returns
+    -------
+    Finished
+        The statistics.
 
     Raises
     ------
     InputError, StorageError, Stopped, RankFailed
     """
+    began = time.perf_counter()
     if scene.study is None or scene.study.method == "lhs":
         method = None if scene.study is None else scene.study.method
         raise InputError(
@@ -86,146 +88,123 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
-    files.probe(output)
-    output = fresh_sibling(output) if fresh else output
+    place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
-    entries = {name: repr(value) for name, value in flatten(scene.resolved())}
-    layout = f"{len(points)} in blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
-    version = dataset.provenance(scene.text, scene.hash)["hpcclear_version"]
-    key = {**entries, "hpcclear version": version, "statistics": layout}
-    with Lock(output.parent, f".{output.name}.lock"):
-        files.remove_leftovers(output.parent)
-        if output.exists():
-            content = dataset.read(output, "statistics")
-            check_key(content, key, output)
-            return content
-        return _accumulate(scene, points, output, key, ranks, raw, interval, style)
+    with Session(place, statistics_key(scene, len(points)), ranks, options) as session:
+        content = session.found("statistics")
+        if content is None:
+            content = _Streaming(scene, points, session, raw).run()
+        session.close()
+    return session.finished(content, began)
 
 
-def _accumulate(
-    scene: Scene,
-    points: MonteCarloPoints,
-    output: Path,
-    key: dict[str, str],
-    ranks: Ranks,
-    raw: Path | None,
-    interval: float,
-    style: Style,
-) -> xr.Dataset:
-    """Simulate what is left, with the statistics so far on disk every few seconds."""
-    chosen, reason = scene, ""
-    if scene.numerics.target_error is not None:
-        with ranks.stage("settings"):
-            chosen, reason = resolve(scene, points.page(0))
-    attributes = {
-        **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
-        **recorded(reason),
-        **key_attribute(key),
-    }
-    checkpoint = Checkpoint(parts_of(output), key, interval=interval, attributes=attributes)
-    if raw is not None:
-        files.make_directory(raw)
+class _Streaming:
+    """Simulates what is left of a design, with the statistics so far on disk every few seconds.
 
-    def keep_raw(number: int, records: np.ndarray) -> None:
+    Parameters
+    ----------
+    scene : Scene
+    points : MonteCarloPoints
+    session : Session
+        Entered.
+    raw : Path or None
+        Directory for the samples themselves.
+    """
+
+    def __init__(
+        self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
+    ) -> None:
+        few = points.page(0)
+        chosen = session.described(scene, few)
+        self._payload = payload_of(chosen, few)
+        self._design = chosen.resolved()
+        self._points = points
+        self._session = session
+        self._raw = raw
+        self._checkpoint = session.opened()
         if raw is not None:
-            page = points.page(number)
+            files.make_directory(raw)
+        self._sums = Accumulator(len(points), on_block=self._keep_raw)
+        earlier = self._checkpoint.load_stage(STAGE)
+        session.tell_problems()
+        if earlier is not None:
+            self._sums.restore(earlier)
+        self._saved = time.monotonic()
+
+    def run(self) -> xr.Dataset:
+        """Simulate, and write the statistics."""
+        with saving(self._save):
+            seconds = self._run_samples()
+            if not self._sums.complete:
+                self._run_parts(seconds)
+        return self._session.write(statistics_dataset(self._sums, self._session.attributes))
+
+    def _keep_raw(self, number: int, records: np.ndarray) -> None:
+        """Write a block of samples, if they are wanted."""
+        if self._raw is not None:
+            page = self._points.page(number)
             units = dict(zip(page.names, page.units, strict=True))
-            content = dataset.samples_dataset(page.names, page.values, units, records, attributes)
-            dataset.write(content, raw / f"samples-{number:08d}.nc")
+            content = dataset.samples_dataset(
+                page.names, page.values, units, records, self._session.attributes
+            )
+            dataset.write(content, self._raw / f"samples-{number:08d}.nc")
 
-    sums = Accumulator(len(points), on_block=keep_raw)
-    earlier = checkpoint.load_stage(STAGE)
-    for problem in checkpoint.problems:
-        sys.stderr.write(f"{problem}\n")
-    if earlier is not None:
-        sums.restore(earlier)
-    saved = time.monotonic()
+    def _save(self) -> None:
+        with self._session.ranks.writing():
+            self._checkpoint.save_stage(STAGE, self._sums.state())
+        self._saved = time.monotonic()
 
-    def save() -> None:
-        nonlocal saved
-        with ranks.writing():
-            checkpoint.save_stage(STAGE, sums.state())
-        saved = time.monotonic()
+    def _save_when_due(self) -> None:
+        if time.monotonic() - self._saved > self._checkpoint.interval:
+            self._save()
 
-    def save_when_due() -> None:
-        if time.monotonic() - saved > checkpoint.interval:
-            save()
-
-    how: dict[str, Any] = {"stage": STAGE, "save": save_when_due, "keep": False}
-    with saving(save):
-        seconds = _run_samples(
-            chosen, points, sums, ranks, whole=raw is not None, style=style, **how
+    def _run(
+        self, task: Task, points: Points, take: Callable[[np.ndarray], None], progress: Progress
+    ) -> None:
+        self._session.ranks.run_points(
+            task, points, on_records=take, save=self._save_when_due, progress=progress, keep=False
         )
-        if not sums.complete:
-            _run_parts(chosen, points, sums, ranks, seconds, style=style, **how)
-    content = statistics_dataset(sums, attributes)
-    with ranks.writing():
-        dataset.write(content, output)
-        checkpoint.finish()
-    return content
 
+    def _run_samples(self) -> float:
+        """Let ranks send samples: all of them if they are kept, else those of the first block, which decides the
+        histograms, and of blocks that an earlier run left with samples. Returns seconds of a rank for one; 0: none was made."""
+        if self._raw is not None:
+            self._sums.forget_parts()
+        left = self._sums.remaining()
+        if self._raw is None:
+            left = left.begun(self._sums.edges is None)
+        if len(left) == 0:
+            return 0.0
 
-def _run_samples(
-    scene: Scene,
-    points: MonteCarloPoints,
-    sums: Accumulator,
-    ranks: Ranks,
-    *,
-    whole: bool,
-    style: Style,
-    **how: Any,
-) -> float:
-    """Let ranks send samples: all of them if they are kept, else those of the first block, which decides the
-    histograms, and of blocks that an earlier run left with samples. Returns seconds of a rank for one; 0: none was made."""
-    if whole:
-        sums.forget_parts()
-    left = sums.remaining()
-    if not whole:
-        left = left.begun(sums.edges is None)
-    if len(left) == 0:
-        return 0.0
+        def take(records: np.ndarray) -> None:
+            numbered = records.astype(OUTCOME)
+            numbered["sample"] = left.samples(records["sample"])
+            self._sums.add(numbered)
 
-    def take(records: np.ndarray) -> None:
-        numbered = records.astype(OUTCOME)
-        numbered["sample"] = left.samples(records["sample"])
-        sums.add(numbered)
+        progress = Progress("samples", self._session.options.style)
+        task = Task(STAGE, make_evaluator, self._payload)
+        self._run(task, _Left(self._points, left), take, progress)
+        busy = self._session.ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
+        return float(busy) / len(left)
 
-    ranks.run_points(
-        KIND, payload_of(scene, points.page(0)), _Left(points, left),
-        on_records=take, progress=Progress("samples", style), **how,
-    )  # fmt: skip
-    busy = ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
-    return float(busy) / len(left)
+    def _run_parts(self, seconds: float) -> None:
+        """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
+        sums = self._sums
+        left = int(sums.total - sums.taken)
+        parts = Parts(sums, part_length(left, self._session.ranks.size, sums.block, seconds))
+        payload = {
+            "make": make_evaluator,
+            "samples": self._payload,
+            "design": self._design,
+            "total": len(self._points),
+            "edges": sums.edges,
+        }
+        progress = PartsProgress("samples", self._session.options.style, sums.total, sums.taken)
+        self._run(Task(STAGE, make_summariser, payload, PARTIAL), parts, self._add_parts, progress)
 
-
-def _run_parts(
-    scene: Scene,
-    points: MonteCarloPoints,
-    sums: Accumulator,
-    ranks: Ranks,
-    seconds: float,
-    *,
-    style: Style,
-    **how: Any,
-) -> None:
-    """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
-    left = int(sums.total - sums.taken)
-    parts = Parts(sums, part_length(left, ranks.size, sums.block, seconds))
-
-    def take(records: np.ndarray) -> None:
+    def _add_parts(self, records: np.ndarray) -> None:
         for record in records:
-            sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
-
-    payload = {
-        "samples": payload_of(scene, points.page(0)),
-        "design": scene.resolved(),
-        "total": len(points),
-        "edges": sums.edges,
-    }
-    ranks.run_points(
-        PARTS, payload, parts, dtype=PARTIAL, on_records=take,
-        progress=PartsProgress("samples", style, sums.total, sums.taken), **how,
-    )  # fmt: skip
+            self._sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
 
 
 def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = None) -> xr.Dataset:

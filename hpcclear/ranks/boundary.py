@@ -10,29 +10,23 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Mail, Nap, Tag
 from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
-from hpcclear.ranks.team import Leave, Maker, RankFailed, Ranks
+from hpcclear.ranks.team import Leave, RankFailed, Ranks
 
 
-def run_on_ranks(
-    program: Callable[[Ranks], int | None],
-    makers: Mapping[str, Maker],
-    stop: StopSwitch | None = None,
-) -> int:
+def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None = None) -> int:
     """Run `program` on root while the other ranks work for it: the boundary no error crosses.
 
     Parameters
     ----------
     program : callable
         Gets the `Ranks`; its return value is the exit code (None is 0).
-    makers : mapping of str to callable
-        For each kind of stage, what makes a rank's worker.
     stop : StopSwitch, optional
         Entered already, to hear signals from early on; by default one without a time limit.
 
@@ -52,15 +46,15 @@ def run_on_ranks(
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
-        ranks = Ranks(mail, makers, stop)
+        ranks = Ranks(mail, stop)
         code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
         mail.finalize()
         return code
 
 
-def alone(makers: Mapping[str, Maker]) -> Ranks:
+def alone() -> Ranks:
     """One process without signals, exits or MPI, for notebooks: errors are plain exceptions."""
-    return Ranks(Mail(), makers, StopSwitch())
+    return Ranks(Mail(), StopSwitch())
 
 
 def describe_mpi() -> str:

@@ -13,18 +13,19 @@ _SHORTEST = 2e-4  # s
 
 
 class Tag(IntEnum):
-    """What a message says; the first four come from root."""
+    """What a message says; the first five come from root."""
 
-    STAGE = 1  # a stage begins: (name, kind, payload)
-    BLOCK = 2  # samples: (index, points, ask_below)
-    END = 3  # the stage is over, drop what is unfinished
-    LEAVE = 4  # the program is over: exit code
-    ASK = 5  # wants samples: (finished records or None, need)
-    RECORDS = 6  # finished records
-    DONE = 7  # the stage is over here: (finished records or None, busy seconds, set-up seconds)
-    STOP = 8  # was told to stop: reason
-    ERROR = 9  # failed: (report or InputError, finished records or None)
-    LEFT = 10  # has heard LEAVE
+    STAGE = 1  # a stage begins: its task
+    CALL = 2  # do this once: (name, function, payload)
+    BLOCK = 3  # samples: (index, points, ask_below)
+    END = 4  # the stage is over, drop what is unfinished
+    LEAVE = 5  # the program is over: exit code
+    ASK = 6  # wants samples: (finished records or None, need)
+    RECORDS = 7  # finished records
+    DONE = 8  # stage or call are over here: (finished records or None, busy and set-up seconds)
+    STOP = 9  # was told to stop: reason
+    ERROR = 10  # failed: (report or InputError, finished records or None)
+    LEFT = 11  # has heard LEAVE
 
 
 class Message(NamedTuple):

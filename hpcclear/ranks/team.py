@@ -7,7 +7,8 @@ poll with short sleeps, so that waiting costs nothing and errors and stops are h
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -27,6 +28,31 @@ COLUMNS = ("busy", "idle", "compile", "write")
 
 Maker = Callable[[Any, "Ranks"], Worker]
 """Makes a rank's worker from the payload of a stage; called on every rank."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the ranks do in a stage that simulates; it travels to every rank.
+
+    Attributes
+    ----------
+    name : str
+        Of the stage, for reports and timing.
+    make : callable
+        A function of a module: pickle sends its name.
+    payload : object
+        What it makes a worker from, such as a scene's content.
+    dtype : dtype
+        Of the records; has a field ``sample``.
+    workers : int, optional
+        How many ranks get samples, root first; by default all. The others only make their worker.
+    """
+
+    name: str
+    make: Maker
+    payload: object
+    dtype: np.dtype = OUTCOME
+    workers: int | None = None
 
 
 class RankFailed(Exception):
@@ -57,9 +83,8 @@ class Ranks:
         every row of a stage adds up to its wall time.
     """
 
-    def __init__(self, mail: Mail, makers: Mapping[str, Maker], stop: StopSwitch) -> None:
+    def __init__(self, mail: Mail, stop: StopSwitch) -> None:
         self.mail = mail
-        self._makers = makers
         self.stop_switch = stop
         self._stage = "start"
         self._desk: Desk | None = None
@@ -128,30 +153,22 @@ class Ranks:
 
     def run_points(
         self,
-        kind: str,
-        payload: object,
+        task: Task,
         points: Points,
         *,
-        stage: str | None = None,
         completed: np.ndarray | None = None,
         on_records: Callable[[np.ndarray], object] | None = None,
         save: Callable[[], object] | None = None,
         progress: Progress | None = None,
-        dtype: np.dtype = OUTCOME,
         keep: bool = True,
     ) -> np.ndarray:
         """Simulate a design on all ranks; call it on root, as often as needed.
 
         Parameters
         ----------
-        kind : str
-            Which of the makers makes the workers.
-        payload : object
-            What the maker needs, such as the scene's text; it travels to every rank.
+        task : Task
         points : ndarray, shape (n, d), or Points
             The design, or an object that makes the rows asked for.
-        stage : str, optional
-            Name for reports and timing; `kind` by default.
         completed : structured ndarray, optional
             Records of samples finished before; they are not simulated again.
         on_records : callable, optional
@@ -161,8 +178,6 @@ class Ranks:
             while `on_records` still gets what the ranks had finished by then.
         progress : Progress, optional
             Shown meanwhile.
-        dtype : dtype, optional
-            Type of the records; has a field ``sample``.
         keep : bool, optional
             Return the records; without, memory does not grow with them.
 
@@ -178,17 +193,60 @@ class Ranks:
         RankFailed, InputError
             If another rank failed; likewise.
         """
-        earlier = np.empty(0, dtype) if completed is None else completed.astype(dtype)
+        earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
         progress = Progress("", style="quiet") if progress is None else progress
-        name = kind if stage is None else stage
-        run = _Run(self, HandOut(len(points), earlier["sample"], self.size), points, progress)
+        book = HandOut(len(points), earlier["sample"], task.workers or self.size)
+        run = _Run(self, book, points, progress)
         run.on_records, run.save, run.kept = on_records, save, [earlier] if keep else None
         progress.start(len(points), earlier)
-        with contextlib.closing(progress), self._timed(name) as spent:
+        with contextlib.closing(progress), self._timed(task.name) as spent:
             if not run.book.done:
-                run.work(name, kind, payload, spent)
+                run.work(task, spent)
         records = np.concatenate(run.kept or [earlier[:0]])
         return records[np.argsort(records["sample"])]
+
+    def everywhere(
+        self, name: str, function: Callable[[Any, "Ranks"], object], payload: object
+    ) -> None:
+        """Call `function(payload, ranks)` once on every rank, and wait until all have returned; on root.
+
+        Parameters
+        ----------
+        name : str
+            For reports and timing; the time is booked as set-up.
+        function : callable
+            A function of a module: pickle sends its name.
+        payload : object
+            Travels to every rank.
+
+        Raises
+        ------
+        Stopped
+            If asked to end early.
+        RankFailed, InputError
+            If another rank failed.
+        """
+        with self._timed(name) as spent:
+            self.raise_if_stopped()
+            self.mail.tell_others(Tag.CALL, (name, function, payload))
+            spent[0, COLUMNS.index("compile")] = self._call(function, payload)
+            waited_for, nap = set(range(1, self.size)), Nap()
+            while waited_for and not self.stop_switch.is_set():
+                message = self.mail.poll()
+                if message is None:
+                    nap.take()
+                elif message.tag == Tag.DONE:
+                    waited_for.discard(message.source)
+                    spent[message.source, COLUMNS.index("compile")] = message.body[2]
+                else:
+                    self._heed(message)
+            self.raise_if_stopped()
+
+    def _call(self, function: Callable[[Any, "Ranks"], object], payload: object) -> float:
+        """Do this rank's share of a call; the seconds it took."""
+        started = time.perf_counter()
+        function(payload, self)
+        return time.perf_counter() - started
 
     @contextlib.contextmanager
     def _timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
@@ -217,14 +275,11 @@ class Ranks:
             report, _ = message.body
             raise report if isinstance(report, InputError) else RankFailed(report)
 
-    def make(self, kind: str, payload: object) -> Worker:
-        """A worker of one of the kinds, for a maker that builds on another."""
-        return self._makers[kind](payload, self)
-
-    def _make_desk(self, kind: str, payload: object) -> tuple[Desk, float]:
+    def _make_desk(self, task: Task) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
-        self._desk = Desk(self.make(kind, payload))
+        self._desk = Desk(task.make(task.payload, self))
+        self._desk.exhausted = task.workers is not None and self.rank >= task.workers
         return self._desk, time.perf_counter() - started
 
     def serve(self) -> NoReturn:
@@ -238,13 +293,17 @@ class Ranks:
             elif message.tag == Tag.LEAVE:
                 raise Leave(message.body)
             elif message.tag == Tag.STAGE:
-                self._stage, kind, payload = message.body
-                self._serve_stage(kind, payload)
+                self._stage = message.body.name
+                self._serve_stage(message.body)
+                nap.reset()
+            elif message.tag == Tag.CALL:
+                self._stage, function, payload = message.body
+                self.mail.send(0, Tag.DONE, (None, 0.0, self._call(function, payload)))
                 nap.reset()
 
-    def _serve_stage(self, kind: str, payload: object) -> None:
+    def _serve_stage(self, task: Task) -> None:
         """Ask for samples before the last ones are done, send records along, until root ends it."""
-        desk, setup = self._make_desk(kind, payload)
+        desk, setup = self._make_desk(task)
         asked, sent_at, nap = False, time.monotonic(), Nap()
         while (message := self.mail.poll()) is None or message.tag != Tag.END:
             self._pass_on_stop()
@@ -297,13 +356,13 @@ class _Run:
         self.save: Callable[[], object] | None = None
         self.kept: list[np.ndarray] | None = None
 
-    def work(self, name: str, kind: str, payload: object, spent: np.ndarray) -> None:
+    def work(self, task: Task, spent: np.ndarray) -> None:
         """Run the stage; whatever ends it, everything finished is collected and delivered."""
         self._spent = spent
         self._ranks.raise_if_stopped()
-        self._mail.tell_others(Tag.STAGE, (name, kind, payload))
+        self._mail.tell_others(Tag.STAGE, task)
         try:
-            self._hand_out(kind, payload)
+            self._hand_out(task)
         except BaseException as error:
             self._failed = not isinstance(error, Stopped)
             self._gather(until=time.monotonic() + 1.2)
@@ -311,9 +370,9 @@ class _Run:
         self._gather(until=None)
         self._ranks._desk = None
 
-    def _hand_out(self, kind: str, payload: object) -> None:
+    def _hand_out(self, task: Task) -> None:
         """Answer the others and work along until every sample is finished."""
-        desk, self._spent[0, COLUMNS.index("compile")] = self._ranks._make_desk(kind, payload)
+        desk, self._spent[0, COLUMNS.index("compile")] = self._ranks._make_desk(task)
         nap = Nap()
         while not self.book.done:
             while (message := self._mail.poll()) is not None:

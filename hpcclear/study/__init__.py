@@ -15,8 +15,6 @@ is done, and each finished sample within seconds, so that the same command goes 
 and ends with the same bytes.
 """
 
-import shlex
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,13 +23,12 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.compiling import compile_ahead
-from hpcclear.ensemble.simulate import run_key
+from hpcclear.ensemble.identity import run_key
+from hpcclear.ensemble.session import Options, Place, Session
 from hpcclear.ranks.progress import Style
-from hpcclear.ranks.team import COLUMNS, Ranks
-from hpcclear.results import dataset, files
-from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
-from hpcclear.results.lock import Lock
-from hpcclear.results.places import fresh_sibling
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
@@ -65,7 +62,6 @@ def run_study(
         Where results go; made if its parent exists. What an earlier run of the same study finished
         there is not done again.
     ranks : Ranks
-        Made with `hpcclear.ensemble.simulate.MAKERS`.
     fresh : bool
         Start anew in a directory beside it, if there is one already.
     progress_style : {"auto", "bar", "log", "quiet"}
@@ -88,30 +84,31 @@ def run_study(
     study = scene.required_study
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
-    place = _made(Path(directory), fresh, tell)
-    key = run_key(scene, "run")
-    with Lock(place):
-        for folder in (place, place / "responses"):
-            files.remove_leftovers(folder)
-        if _finished(place, key, scene):
-            discard(place / "checkpoint")  # the run that finished may have been killed over it
-            tell(f"{place} holds the finished study.")
-            return None
-        attributes = {**dataset.provenance(scene.text, scene.hash), **key_attribute(key)}
-        units = {variable.name: variable.unit for variable in study.variables}
-        checkpoint = Checkpoint(
-            place / "checkpoint", key, names=study.names, units=units, attributes=attributes
-        )
-        for problem in checkpoint.problems:
-            tell(problem)
-        simulations = Simulations(scene, ranks, checkpoint, progress_style)
-        columns = tuple(variable.paths for variable in study.variables)
-        points = Points(study.names, np.empty((0, len(columns))), columns)
-        compile_ahead(scene, ranks, points, progress_style)
-        _tell_the_story(Run(scene, place, ranks, checkpoint, simulations, tell))
-        _write_timing(place, ranks, attributes)
-        checkpoint.finish()
+    place = Place.of_directory(Path(directory), fresh, ("responses",))
+    if place.output != Path(directory):
+        tell(f"Results go to {place.output}.")
+    options = Options(fresh, style=progress_style)
+    with Session(place, run_key(scene, "run"), ranks, options, tell) as session:
+        if session.has_all(_results(scene)) and not unfinished(place.parts):
+            tell(f"{place.output} holds the finished study.")
+        else:
+            _carry_out(scene, session)
+        session.close(session.attributes)
     return None
+
+
+def _carry_out(scene: Scene, session: Session) -> None:
+    """Go on from what is there, to the end."""
+    study, style = scene.required_study, session.options.style
+    session.described(scene)
+    units = {variable.name: variable.unit for variable in study.variables}
+    checkpoint = session.opened(study.names, units)
+    columns = tuple(variable.paths for variable in study.variables)
+    points = Points(study.names, np.empty((0, len(columns))), columns)
+    compile_ahead(scene, session.ranks, points, style)
+    simulations = Simulations(scene, session.ranks, checkpoint, style)
+    directory = session.place.output
+    _tell_the_story(Run(scene, directory, session.ranks, checkpoint, simulations, session.tell))
 
 
 def _tell_the_story(run: Run) -> None:
@@ -194,35 +191,9 @@ def _write_samples(run: Run) -> None:
     run.write(content, "samples.nc")
 
 
-def _write_timing(place: Path, ranks: Ranks, attributes: dict[str, str]) -> None:
-    table = np.stack(list(ranks.stage_seconds.values()), axis=1)
-    data = {name: table[:, :, k] for k, name in enumerate(COLUMNS)}
-    content = dataset.timing_dataset(
-        list(ranks.stage_seconds), data, shlex.join(sys.argv), attributes
-    )
-    dataset.write(content, place / "timing.nc")
-
-
-def _made(directory: Path, fresh: bool, tell: Callable[[str], object]) -> Path:
-    """The directory to work in, made if need be."""
-    try:
-        if fresh and directory.exists() and any(directory.iterdir()):
-            directory = fresh_sibling(directory)
-            tell(f"Results go to {directory}.")
-        directory.mkdir(exist_ok=True)
-    except OSError as error:
-        raise files.refused(directory, error) from None
-    return directory
-
-
-def _finished(place: Path, key: dict[str, str], scene: Scene) -> bool:
-    """Whether all results of this run are there; results of another run are refused."""
-    study = scene.required_study
+def _results(scene: Scene) -> list[str]:
+    """Files of a study that is finished."""
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
     names += ["claims.nc"] if paper.is_comparable(scene) else []
-    names += ["sensitivity.nc"] if study.groups else []
-    names += ["readings.nc"] if audit.applies(scene) else []
-    there = [place / name for name in names if (place / name).exists()]
-    for path in there:
-        check_key(dataset.read(path), key, path)
-    return len(there) == len(names) and not unfinished(place / "checkpoint")
+    names += ["sensitivity.nc"] if scene.required_study.groups else []
+    return names + (["readings.nc"] if audit.applies(scene) else [])

@@ -6,13 +6,13 @@ from synthetic import design, make_sleeping
 
 from hpcclear.ranks.boundary import run_on_ranks
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.team import Ranks, Task
 
 
 def program(ranks: Ranks) -> None:
     progress = Progress("sampling", interval=0.1)
-    ranks.run_points("sleep", {"cost": 5e-3}, design(150), progress=progress)
+    ranks.run_points(Task("sleep", make_sleeping, {"cost": 5e-3}), design(150), progress=progress)
 
 
 if __name__ == "__main__":
-    sys.exit(run_on_ranks(program, {"sleep": make_sleeping}))
+    sys.exit(run_on_ranks(program))

@@ -21,9 +21,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from hpcclear import cli
-from hpcclear.ensemble import simulate as work
+from hpcclear.ensemble import simulate
 from hpcclear.ranks import launcher, stopping
-from hpcclear.ranks import team as ranks
+from hpcclear.ranks.team import Ranks, Task
 from hpcclear.results import checkpoint
 
 RANK = launcher.launched_rank() or 0
@@ -104,34 +104,42 @@ def tell_when_it_listens(mark: pathlib.Path) -> None:
     stopping.StopSwitch.__enter__ = entered  # type: ignore[method-assign]
 
 
+make_evaluator = simulate.make_evaluator
+
+
+def make_watched(payload: dict, ranks: Ranks) -> Watched:
+    """The maker of every rank's worker, by a name that pickle finds."""
+    if FAIL == "maker" and HERE:
+        fail()
+    return Watched(make_evaluator(payload, ranks), ranks.where.split("'")[1], payload)
+
+
 def watch() -> None:
-    make, run_points = work.MAKERS[work.KIND], ranks.Ranks.run_points
-    stage = ranks.Ranks.stage
+    run_points, everywhere, stage = Ranks.run_points, Ranks.everywhere, Ranks.stage
 
-    def made(payload: object, ranks: ranks.Ranks) -> Watched:
-        if FAIL == "maker" and HERE:
-            fail()
-        return Watched(make(payload, ranks), ranks.where.split("'")[1], payload)
-
-    def watched_run_points(self, kind, payload, points, *, on_records=None, **options):
-        note("stage", [options.get("stage") or kind])
+    def watched_run_points(self, task: Task, points, *, on_records=None, **options):
+        note("stage", [task.name])
 
         def receive(records: np.ndarray) -> None:
             known = records["sample"]
-            note("received", names(options["stage"], payload, known, points[known]))
+            note("received", names(task.name, task.payload, known, points[known]))
             if on_records is not None:
                 on_records(records)
 
-        watched = receive if kind == work.KIND else on_records
-        return run_points(self, kind, payload, points, on_records=watched, **options)
+        return run_points(self, task, points, on_records=receive, **options)
 
-    def watched_stage(self: ranks.Ranks, name: str) -> object:
+    def watched_everywhere(self: Ranks, name: str, *rest: object) -> None:
+        note("stage", [name])
+        everywhere(self, name, *rest)
+
+    def watched_stage(self: Ranks, name: str) -> object:
         note("stage", [name])
         return stage(self, name)
 
-    work.MAKERS[work.KIND] = made  # type: ignore[index]
-    ranks.Ranks.stage = watched_stage  # type: ignore[method-assign]
-    ranks.Ranks.run_points = watched_run_points  # type: ignore[method-assign]
+    simulate.make_evaluator = make_watched  # type: ignore[assignment]
+    Ranks.stage = watched_stage  # type: ignore[method-assign]
+    Ranks.everywhere = watched_everywhere  # type: ignore[method-assign]
+    Ranks.run_points = watched_run_points  # type: ignore[method-assign]
     bracket(checkpoint.Checkpoint, "__init__", "", "opened")
     bracket(checkpoint.Checkpoint, "flush", "saving", "saved")
     bracket(checkpoint.Checkpoint, "save_stage", "saving a stage", "saved a stage")

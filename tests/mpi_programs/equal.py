@@ -1,23 +1,40 @@
 """Repeated stages in one job; writes what came back and the seconds spent: equal.py OUT.npz."""
 
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 from synthetic import design, make_sleeping
 
 from hpcclear.ranks.boundary import run_on_ranks
-from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.ranks.team import COLUMNS, Ranks, Task
+
+
+def leave_a_mark(name: str, ranks: Ranks) -> None:
+    """What every rank does once."""
+    time.sleep(0.05)
+    with open(f"{name}-{ranks.rank}", "x"):
+        pass
 
 
 def program(ranks: Ranks) -> None:
     points = design(200)
     seen: list[np.ndarray] = []
-    payload = {"cost": 2e-3, "lanes": 4}
-    full = ranks.run_points("sleep", payload, points, on_records=seen.append, stage="full")
-    half = ranks.run_points("sleep", payload, points, completed=full[::2], stage="half")
-    few = ranks.run_points("sleep", payload, points[:1])
-    none = ranks.run_points("sleep", payload, points[:0])
-    streamed = ranks.run_points("sleep", payload, points[:9], on_records=seen.append, keep=False)
+
+    def task(name: str, workers: int | None = None) -> Task:
+        return Task(name, make_sleeping, {"cost": 2e-3, "lanes": 4}, workers=workers)
+
+    full = ranks.run_points(task("full"), points, on_records=seen.append)
+    half = ranks.run_points(task("half"), points, completed=full[::2])
+    few = ranks.run_points(task("sleep"), points[:1])
+    none = ranks.run_points(task("sleep"), points[:0])
+    streamed = ranks.run_points(task("sleep"), points[:9], on_records=seen.append, keep=False)
+    on_one = ranks.run_points(task("on one", 1), points)
+    ranks.everywhere("everywhere", leave_a_mark, sys.argv[1])
+    called = sorted(
+        path.name for path in Path(sys.argv[1]).parent.glob(f"{Path(sys.argv[1]).name}-*")
+    )
     with ranks.stage("serial"), ranks.writing():
         pass
     np.savez(
@@ -27,6 +44,8 @@ def program(ranks: Ranks) -> None:
         few=few,
         none=none,
         streamed=streamed,
+        on_one=on_one,
+        called=called,
         seen=np.concatenate(seen),
         size=ranks.size,
         **{f"seconds_{name}": table for name, table in ranks.stage_seconds.items()},
@@ -35,4 +54,4 @@ def program(ranks: Ranks) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_on_ranks(program, {"sleep": make_sleeping}))
+    sys.exit(run_on_ranks(program))

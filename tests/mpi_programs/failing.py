@@ -12,7 +12,7 @@ from synthetic import SleepingWorker, design
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import run_on_ranks
-from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.team import Ranks, Task
 
 HOW, MARK = sys.argv[1], pathlib.Path(sys.argv[2])
 OTHER = 1
@@ -85,6 +85,20 @@ def make(payload: object, ranks: Ranks) -> SleepingWorker:
     return SleepingWorker(2e-3)
 
 
+def call(payload: object, ranks: Ranks) -> None:
+    if HOW == "call on root" and ranks.is_root:
+        fail()
+    if HOW == "call on a rank" and ranks.rank == OTHER:
+        fail()
+    if HOW == "call on a rank, root busy":
+        if ranks.is_root:
+            time.sleep(60.0)
+        if ranks.rank == OTHER:
+            fail()
+    if HOW == "bad input in a call on a rank" and ranks.rank == OTHER:
+        refuse()
+
+
 def count(records: np.ndarray) -> None:
     if HOW == "callback":
         fail()
@@ -101,7 +115,9 @@ def program(ranks: Ranks) -> int | None:
         MARK.touch()
         return 1
     payload = Unwelcome() if HOW == "payload" else None
-    ranks.run_points("fail", payload, design(20_000), stage="sampling", on_records=count)
+    if "call" in HOW.split():
+        ranks.everywhere("call", call, None)
+    ranks.run_points(Task("sampling", make, payload), design(20_000), on_records=count)
     return None
 
 
@@ -116,4 +132,4 @@ def program_with_fit(ranks: Ranks) -> int | None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_on_ranks(program_with_fit, {"fail": make}))
+    sys.exit(run_on_ranks(program_with_fit))

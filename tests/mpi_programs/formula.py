@@ -5,11 +5,13 @@ conflict in m2; m1, u1 and I1 have no influence. Samples with m3 above `FAILS_AB
 """
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.outcome import OUTCOME, Status, failed
+from hpcclear.ensemble import compiling, simulate
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -154,22 +156,8 @@ def make_formula(payload: dict[str, Any], ranks: Ranks) -> FormulaWorker:
     return FormulaWorker(payload)
 
 
-class NothingToCompile(FormulaWorker):
-    """Stands in for the compiler."""
-
-    def advance(self, seconds: float) -> np.ndarray:
-        records = np.zeros(len(self._queue), OUTCOME)
-        records["sample"] = [index for index, _ in self._queue]
-        self._queue.clear()
-        return records
-
-
-def make_compiler(payload: dict[str, Any], ranks: Ranks) -> NothingToCompile:
-    """Maker of the ranks' compilers."""
-    return NothingToCompile(payload)
-
-
-MAKERS = {"points": make_formula, "compile": make_compiler}
+def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
+    """Takes the place of the compilers."""
 
 
 def respond(scene: Scene):
@@ -187,9 +175,12 @@ def respond(scene: Scene):
     return dataset.response_dataset(angle / 523.0, {**data, **scalars})
 
 
-def replace_dynamics() -> None:
-    """Responses by formula, too."""
-    responses.simulate = audit.simulate = respond
+def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:
+    """Samples and responses by formula, and nothing is compiled."""
+    set_attribute(simulate, "make_evaluator", make_formula)
+    set_attribute(compiling, "compile_share", compile_nothing)
+    set_attribute(responses, "simulate", respond)
+    set_attribute(audit, "simulate", respond)
 
 
 def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
@@ -224,4 +215,4 @@ if __name__ == "__main__":
         scene = load_scene(sys.argv[1])
         run_study(scene, sys.argv[2], ranks, progress_style="quiet")
 
-    sys.exit(run_on_ranks(program, MAKERS))
+    sys.exit(run_on_ranks(program))

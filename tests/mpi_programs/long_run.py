@@ -12,7 +12,7 @@ import numpy as np
 from synthetic import SleepingWorker, design, make_sleeping
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.team import Ranks, Task
 
 WHERE, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
 
@@ -35,12 +35,20 @@ def make_slowly(payload: dict, ranks: Ranks) -> SleepingWorker:
     return make_sleeping(payload, ranks)
 
 
+def wait_on_ranks(payload: object, ranks: Ranks) -> None:
+    if not ranks.is_root:
+        reached("call of a rank")
+        time.sleep(60.0)
+
+
 def program(ranks: Ranks) -> None:
     reached("begin")
     if WHERE == "begin":
         time.sleep(0.3)
     if WHERE == "set-up of a rank":
-        ranks.run_points("slow", {"cost": 1e-3}, design(10**6))
+        ranks.run_points(Task("slow", make_slowly, {"cost": 1e-3}), design(10**6))
+    if WHERE == "call of a rank":
+        ranks.everywhere("call", wait_on_ranks, None)
     if WHERE == "polling":
         with ranks.stage("fit"):
             while True:
@@ -52,12 +60,7 @@ def program(ranks: Ranks) -> None:
         time.sleep(60.0)
     path = FOLDER / "records"
     completed = np.frombuffer(path.read_bytes() if path.exists() else b"", OUTCOME)
-    payload = {"cost": 4e-3, "lanes": 2}
+    task = Task("sampling", make_sleeping, {"cost": 4e-3, "lanes": 2})
     points = design(100_000 if WHERE == "limited" else 800)
-    result = ranks.run_points(
-        "sleep", payload, points, completed=completed, on_records=save, stage="sampling"
-    )
+    result = ranks.run_points(task, points, completed=completed, on_records=save)
     np.save(FOLDER / "result.npy", result)
-
-
-MAKERS = {"sleep": make_sleeping, "slow": make_slowly}

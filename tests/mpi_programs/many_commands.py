@@ -18,7 +18,7 @@ import xarray  # noqa: F401
 from hpcclear import cli, scene
 from hpcclear.cli import printing  # noqa: F401
 from hpcclear.dynamics import evaluator  # noqa: F401
-from hpcclear.ensemble import samples
+from hpcclear.ensemble import identity, samples
 from hpcclear.ranks import boundary
 from hpcclear.results import dataset  # noqa: F401
 
@@ -68,7 +68,7 @@ def run(words: list[str], user: int | None) -> dict[str, object]:
 if __name__ == "__main__":
     boundary.describe_mpi()  # loads the library once for all; the rest is what another user may not read
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
-    samples.sample_key(shipped, samples.design(shipped, None))
+    identity.sample_key(shipped, samples.design(shipped, None))
     for line in sys.stdin:
         asked = json.loads(line)
         print(json.dumps(run(asked["words"], asked["user"])), flush=True)

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.ensemble.simulate import KIND, MAKERS
+from hpcclear.ensemble import statistics
+from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
-from hpcclear.ranks import boundary as comm
+from hpcclear.ranks.boundary import run_on_ranks
 from hpcclear.ranks.stopping import StopSwitch
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import load_scene
 
 SCENE = Path(__file__).parents[2] / "jobs" / "quickstart.toml"
@@ -56,7 +58,9 @@ class MadeUp:
         return records.copy()
 
 
-MADE_UP = {**MAKERS, KIND: lambda payload, ranks: MadeUp()}
+def make_made_up(payload: object, ranks: Ranks) -> MadeUp:
+    """What takes the place of the kernel."""
+    return MadeUp()
 
 
 def scene_of(samples: int):
@@ -65,14 +69,16 @@ def scene_of(samples: int):
 
 
 def main(output: str, samples: str, limit: str = "") -> int:
-    def program(ranks: comm.Ranks) -> None:
-        run_statistics(scene_of(int(samples)), Path(output), ranks, style="quiet")
+    def program(ranks: Ranks) -> None:
+        options = Options(style="quiet")
+        run_statistics(scene_of(int(samples)), Path(output), ranks, options=options)
         print("peak MB", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
+    statistics.make_evaluator = make_made_up  # type: ignore[assignment]
     with StopSwitch(ends_process=True) as stop:
         if limit:
             stop.limit_time(float(limit))
-        return comm.run_on_ranks(program, MADE_UP, stop)
+        return run_on_ranks(program, stop)
 
 
 if __name__ == "__main__":

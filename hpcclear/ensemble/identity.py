@@ -1,0 +1,35 @@
+"""What makes a run what it is, so that only the same run goes on from its results."""
+
+import hashlib
+import json
+
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.results.dataset import provenance
+from hpcclear.scene import Scene
+from hpcclear.scene.paths import flatten
+from hpcclear.scene.points import Points
+from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF
+
+
+def run_key(scene: Scene, command: str) -> dict[str, str]:
+    """What every run is made of: its scene, the versions, the processor and the lanes.
+
+    The scene entry by entry, so that a message can name those that changed; besides, all that
+    shapes the last bits of a result. The number of ranks is not among it.
+    """
+    origin = provenance(scene.text, scene.hash)
+    entries = {path: json.dumps(value) for path, value in flatten(scene.resolved())}
+    made_by = {name: origin[name] for name in ("hpcclear_version", "versions", "processor")}
+    return {"command": command, "lanes": str(DEFAULT_LANES), **made_by, **entries}
+
+
+def sample_key(scene: Scene, points: Points) -> dict[str, str]:
+    """The key of `sample`: the run's, and the points themselves."""
+    digest = hashlib.sha256(points.values.tobytes() + repr((points.names, points.paths)).encode())
+    return {**run_key(scene, "sample"), "points": digest.hexdigest()[:16]}
+
+
+def statistics_key(scene: Scene, samples: int) -> dict[str, str]:
+    """The key of `sample --statistics`: the run's, and how so many samples are summed up."""
+    layout = f"{samples} in blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
+    return {**run_key(scene, "sample --statistics"), "statistics": layout}
