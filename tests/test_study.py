@@ -2,9 +2,11 @@
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 
 import moocore
 import numpy as np
@@ -14,12 +16,14 @@ from patience import crowded
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
+from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
-from hpcclear.study import optimisation, responses, run_study, simulations, surrogates
+from hpcclear.study import extent, optimisation, responses, run_study, simulations, surrogates
 from hpcclear.study.paper import claims
+from hpcclear.study.paper import readings as audit
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -204,6 +208,35 @@ def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_p
     stages = formula.run_in_pieces(scene_of(), place, alone())
     assert stages == 7
     assert contents(place) == contents(results)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["study.verification.infill_rounds=0"],
+        ["study.sensitivity.sobol_samples=0", "study.verification.audit_samples=0"],
+    ],
+)
+def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overrides):
+    """What `plan` counts: samples stage by stage, and single responses."""
+    scene = scene_of(*overrides)
+    made, run_points, responded = Counter[str](), Ranks.run_points, Counter[str]()
+
+    def counted(self, task, points, **options):
+        made[re.sub(r"(-\d+| check)?: simulations", "", task.name)] += len(points)
+        return run_points(self, task, points, **options)
+
+    def respond(one):
+        responded["all"] += 1
+        return formula.respond(one)
+
+    monkeypatch.setattr(Ranks, "run_points", counted)
+    monkeypatch.setattr(responses, "simulate", respond)
+    monkeypatch.setattr(audit, "simulate", respond)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
+    said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
+    assert dict(made) == said
+    assert extent.responses_of(scene) == responded["all"]
 
 
 def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):

@@ -19,6 +19,7 @@ from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
+from hpcclear.study import extent
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -74,13 +75,15 @@ class Plan:
     samples : int
         Simulations of `sample`.
     study : int or None
-        Simulations of `run`, at least; None if the study has no case.
+        Simulations of `run`, unless surrogates are refused, which takes more; None if the study has no case.
     startup : float
         Seconds each rank needs before it simulates.
     memory : float
         Bytes a rank.
     columns : int
         Study variables.
+    responses : int
+        Single responses of `run`, which rank 0 simulates alone.
     """
 
     rows: tuple[Row, ...]
@@ -89,6 +92,7 @@ class Plan:
     startup: float
     memory: float
     columns: int
+    responses: int = 0
 
     def core_seconds(self, row: Row, simulations: int, ranks: int) -> float:
         """Core-seconds of a job, start-up on every rank included."""
@@ -143,9 +147,9 @@ def measure(
             rows.append(Row(error, one, seconds, reason))
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     startup = process_age_at_start()
-    return Plan(
-        tuple(rows), study.samples, simulations_of(scene), startup, peak, len(study.variables)
-    )
+    whole = sum(extent.samples_of(scene).values()) if study.cases else None
+    alone = extent.responses_of(scene) if study.cases else 0
+    return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
 
 
 def cost(scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str) -> float:
@@ -197,22 +201,6 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
         if evaluator.pending < 2 * DEFAULT_LANES:
             evaluator.submit(np.arange(len(points)), points.values)
         evaluator.advance(0.2)
-
-
-def simulations_of(scene: Scene) -> int | None:
-    """Simulations of a whole study, the least there can be: surrogates that are refused take more."""
-    study = scene.study
-    if study is None or not study.cases:
-        return None
-    s, v = study.sensitivity, study.verification
-    count = len(study.models) * (study.samples + 2 * max(study.test_samples, 2))
-    if study.groups:
-        each = len(study.groups) * (s.samples + s.test_samples)
-        together = s.together_samples + max(s.test_samples, 20) if len(study.groups) > 1 else 0
-        count += s.rounds * s.levels * (each + together)
-        count += s.sobol_samples * (len(study.names) + 2)
-    # alpha and beta, what lies between, and the original, in each case
-    return count + len(study.cases) * (2 + v.designs + 1) * v.samples
 
 
 def ladder(error: float | None) -> tuple[float, ...]:

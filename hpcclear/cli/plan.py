@@ -60,7 +60,10 @@ def _needs(
     if row.reason:
         rows.append(("settings", row.reason))
     if command == "run":
-        text = "at least: refused surrogates and misses take more; fits and swarm run on one core"
+        text = (
+            f"and {plan.responses} single responses; refused surrogates and misses take more; "
+            "single responses, fits and swarm run on one core"
+        )
         rows.append(("simulations", f"{simulations}, {text}"))
         rows.append(("sample alone", f"{plan.samples} simulations"))
     return rows

@@ -14,6 +14,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.scene.study import Study
 from hpcclear.statistics.random.distributions import Distribution, Normal, TruncatedNormal, Uniform
 from hpcclear.statistics.random.inputs import Derived, RandomInput
 from hpcclear.statistics.random.moments import RobustObjective
@@ -206,6 +207,15 @@ class Choice:
     printed: tuple[float, float] | None = None
 
 
+_ENDS = ((-2, "alpha"), (-1, "beta"))
+"""Column of the objective that an end of the front has the least of, and its name."""
+
+
+def chosen_in_all(study: Study) -> tuple[int, int]:
+    """How many designs `extremes` chooses, and `spread` at most."""
+    return 2 * len(_ENDS) * len(study.cases), study.verification.designs * len(study.cases)
+
+
 def extremes(run: Run, fronts: Result) -> list[Choice]:
     """Alpha (least mean) and beta (least deviation) of each case.
 
@@ -215,7 +225,7 @@ def extremes(run: Run, fronts: Result) -> list[Choice]:
     chosen = []
     for index, case in enumerate(run.study.cases):
         padded = fronts[f"front_{index}"]
-        for column, letter in ((-2, "alpha"), (-1, "beta")):
+        for column, letter in _ENDS:
             best = np.nanargmin(padded[..., column], axis=1)
             own = padded[np.arange(len(padded)), best]
             average = own[:, :-2].mean(axis=0)

@@ -10,6 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulate
 from hpcclear.results.dataset import variable_name
 from hpcclear.scene import Scene
+from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, Run
 
@@ -26,6 +27,11 @@ def compared(run: Run, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
     cases = [case.name for case in run.study.cases]
     names = [f"{case} {letter}" for case in cases for letter in ("alpha", "beta")]
     return [("original", known[f"{cases[0]} original"]), *((name, known[name]) for name in names)]
+
+
+def simulations(study: Study) -> int:
+    """Single responses: each is simulated for its statistics, and for its file."""
+    return 2 * (1 + 2 * len(study.cases))
 
 
 def scene_of(run: Run, choice: Choice, revolutions: int) -> Scene:

@@ -8,6 +8,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box
+from hpcclear.scene.study import Study
 from hpcclear.statistics.sensitivity import (
     IntervalDesign,
     IntervalSettings,
@@ -28,12 +29,20 @@ STAGE = "sensitivity"
 _NORMAL_95 = 1.959963984540054
 
 
-def surfaces(run: Run) -> tuple[tuple[str, ...], ...]:
+def surfaces(study: Study) -> tuple[tuple[str, ...], ...]:
     """Inputs of each surface: the groups, and all of them together if they are more than one."""
-    groups = run.study.groups
+    groups = study.groups
     together = {name for group in groups for name in group}
-    everything = tuple(name for name in run.study.names if name in together)
+    everything = tuple(name for name in study.names if name in together)
     return groups if len(groups) < 2 else (*groups, everything)
+
+
+def simulations(study: Study) -> int:
+    """Simulations of `analyse`, unless a surface is refused."""
+    if not study.groups:
+        return 0
+    each = sum(one.steps * (one.n_points + one.n_test) for one in _layouts(study))
+    return study.sensitivity.levels * each + _sobol_rows(study) * (len(study.names) + 2)
 
 
 def analyse(run: Run) -> Result:
@@ -45,7 +54,7 @@ def analyse(run: Run) -> Result:
         The data variables of sensitivity.nc, its coordinates but for names, and ``failed``.
     """
     designs = _designs(run)
-    inputs = surfaces(run)
+    inputs = surfaces(run.study)
     parameter = run.study.sensitivity.parameter
     batches = [
         run.simulations.designs((*names, parameter), design.points).values
@@ -68,7 +77,7 @@ def write(run: Run, result: Result) -> None:
     """Write sensitivity.nc."""
     data = {k: v for k, v in result.items() if k not in ("interval", "clearance", "failed")}
     coords = {
-        "surface": np.array([" ".join(names) for names in surfaces(run)]),
+        "surface": np.array([" ".join(names) for names in surfaces(run.study)]),
         "interval": result["interval"],
         "clearance": result["clearance"],
         "parameter": np.array(run.study.names),
@@ -82,22 +91,30 @@ def write(run: Run, result: Result) -> None:
 
 
 def _designs(run: Run) -> list[IntervalDesign]:
-    settings, inputs = run.study.sensitivity, surfaces(run)
+    settings = run.study.sensitivity
     lower, upper = run.study.variable(settings.parameter).bounds
     clearances = np.linspace(lower, upper, settings.levels)
     found = []
-    for k, names in enumerate(inputs):
-        together = k == len(run.study.groups)
-        laid_out = IntervalSettings(
+    for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
+        rng = run.rng("sensitivity", " ".join(names))
+        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
+    return found
+
+
+def _layouts(study: Study) -> list[IntervalSettings]:
+    """How many points each surface gets."""
+    settings = study.sensitivity
+    separate = [False] * len(study.groups)
+    return [
+        IntervalSettings(
             steps=settings.rounds,
             shrink=settings.shrink,
             n_points=settings.together_samples if together else settings.samples,
             n_test=max(settings.test_samples, 20) if together else settings.test_samples,
             order=settings.together_order if together else settings.order,
         )
-        rng = run.rng("sensitivity", " ".join(names))
-        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
-    return found
+        for together in (separate if len(separate) < 2 else [*separate, True])
+    ]
 
 
 def _bounds(run: Run, names: Sequence[str]) -> Array:
@@ -252,10 +269,16 @@ def _surface(
 
 
 def _sobol_points(run: Run) -> Array:
-    rows = run.study.sensitivity.sobol_samples
-    if rows < 2:
+    rows = _sobol_rows(run.study)
+    if rows == 0:
         return np.empty((0, len(run.study.names)))
     return sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
+
+
+def _sobol_rows(study: Study) -> int:
+    """Rows of each of the two samples; none where fewer than two were asked for."""
+    rows = study.sensitivity.sobol_samples
+    return rows if rows >= 2 else 0
 
 
 def _global(run: Run, values: Array | None) -> Result:

@@ -9,6 +9,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
+from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -50,7 +51,7 @@ def fit_all(run: Run) -> Result:
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
             samples=run.study.samples,
-            test_samples=max(run.study.test_samples, 2),
+            test_samples=_tests(run.study),
             r2_min=settings.r2,
             rmae_max=settings.rmae,
             max_resamples=settings.resamplings,
@@ -59,6 +60,16 @@ def fit_all(run: Run) -> Result:
         )
         result |= _packed(k, model) | _checked(run, k, model, STAGE)
     return result
+
+
+def simulations(study: Study) -> int:
+    """Simulations of `fit_all`, unless a model is refused."""
+    return len(study.models) * (study.samples + 2 * _tests(study))
+
+
+def _tests(study: Study) -> int:
+    """Fresh points that a fit, and again the check of its result, are judged by."""
+    return max(study.test_samples, 2)
 
 
 def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
@@ -120,7 +131,7 @@ def _checked(run: Run, k: int, model: PiecewiseKriging, stage: str) -> Result:
     """Accuracy over the whole domain on fresh points, which decided nothing."""
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
-    unit = unit_lhs(max(run.study.test_samples, 2), len(names), rng)
+    unit = unit_lhs(_tests(run.study), len(names), rng)
     points = model.lower + unit * (model.upper - model.lower)
     truth = run.simulations.values(names, points, f"{stage} check")
     reached = accuracy(truth, model.predict(points))

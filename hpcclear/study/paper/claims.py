@@ -45,7 +45,7 @@ class Sensitivities:
 
     def __init__(self, run: Run, result: Result) -> None:
         self.names = run.study.names
-        self.inputs = surfaces(run)
+        self.inputs = surfaces(run.study)
         self.result = result
         self.settings = run.study.sensitivity
 

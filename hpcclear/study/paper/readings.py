@@ -67,9 +67,19 @@ def applies(scene: Scene) -> bool:
     )
 
 
-def readings(run: Run) -> list[Reading]:
+def simulations(scene: Scene) -> tuple[int, int]:
+    """Samples on the ranks, and single responses, of `evaluate`."""
+    if not applies(scene):
+        return 0, 0
+    designs, made = len(printed_designs(scene)), readings(scene)
+    over_steps = sum(reading.over_steps for reading in made)
+    each = scene.required_study.verification.audit_samples + 1
+    return designs * each * (len(made) - over_steps), designs * (STEP_SAMPLES + 1) * over_steps
+
+
+def readings(scene: Scene) -> list[Reading]:
     """All combinations over time, and the scene's own over solver steps."""
-    own = run.scene.number("effects.contact.restitution")
+    own = scene.number("effects.contact.restitution")
     restitutions = [own] if own == OTHER_RESTITUTION else [own, OTHER_RESTITUTION]
     combinations = itertools.product(restitutions, (True, False), (True, False))
     return [*(Reading(*one) for one in combinations), Reading(own, True, True, True)]
@@ -84,7 +94,8 @@ def evaluate(run: Run) -> Result:
         The data variables of readings.nc, of shape (readings, designs).
     """
     rows = [
-        run.part(f"{STAGE}-{k}", _row, reading)["row"] for k, reading in enumerate(readings(run))
+        run.part(f"{STAGE}-{k}", _row, reading)["row"]
+        for k, reading in enumerate(readings(run.scene))
     ]
     table = np.array(rows)
     result = {name: table[..., k] for k, name in enumerate((*_COLUMNS, "objective_smallest"))}
@@ -97,7 +108,7 @@ def write(run: Run, result: Result) -> None:
     designs = printed_designs(run.scene)
     printed = np.array([choice.printed for choice in designs])
     coords = {
-        "reading": np.array([reading.text for reading in readings(run)]),
+        "reading": np.array([reading.text for reading in readings(run.scene)]),
         "design": np.array([choice.name for choice in designs]),
     }
     data = {**result, "mean_paper": printed[:, 0], "deviation_paper": printed[:, 1]}
