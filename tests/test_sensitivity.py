@@ -18,9 +18,7 @@ from hpcclear.statistics.sensitivity import (
     convergence_intervals,
     design_intervals,
     select_influential,
-    sensitivity_history,
     sobol_design,
-    sobol_indices,
 )
 
 BOUNDS = np.array([[0.105, 0.42], [1.3e-4, 5.0e-4]])  # a mass and an inertia
@@ -46,13 +44,16 @@ def with_noise(function: Function, sigma: float, seed: int) -> Function:
 
 def history(function: Function, seed: int = 0, **settings: float) -> SensitivityHistory:
     rng = np.random.default_rng(seed)
-    return sensitivity_history(
-        function,
-        BOUNDS,
-        CLEARANCES,
-        rng,
-        IntervalSettings(**settings),  # type: ignore[arg-type]
-    )
+    chosen = IntervalSettings(**settings)  # type: ignore[arg-type]
+    design = design_intervals(BOUNDS, CLEARANCES, rng, chosen)
+    return analyse_intervals(design, function(design.points))
+
+
+def sobol_indices(
+    function: Function, bounds: np.ndarray, rng: np.random.Generator, rows: int, **options: float
+) -> SobolIndices:
+    points = sobol_design(bounds, rows, rng)
+    return analyse_sobol(function(points), len(bounds), rng, **options)  # type: ignore[arg-type]
 
 
 # the design ---------------------------------------------------------------------------------------
@@ -409,7 +410,7 @@ def test_known_indices(
 
 def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -> SobolIndices:
     rng = np.random.default_rng(seed)
-    return sobol_indices(function, TORUS, rng, 256, **options)  # type: ignore[arg-type]
+    return sobol_indices(function, TORUS, rng, 256, **options)
 
 
 def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say() -> None:

@@ -1,20 +1,21 @@
 """What acts on the mechanism: contact, friction, gravity and loads, as in the scene file."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, problem
 
-LATCHED_LAWS = (
+LatchedLaw = Literal[
     "lankarani-nikravesh",
     "flores",
     "gonthier",
     "hu-guo",
     "herbert-mcwhannell",
     "lee-wang",
-)
+]
+LATCHED_LAWS: tuple[str, ...] = get_args(LatchedLaw)
 """Laws whose damping is scaled by the approach speed, latched at each impact."""
 DIVIDING_LAWS = ("flores", "gonthier", "hu-guo")
 """Of these, the ones whose damping factor divides by the restitution."""
@@ -23,16 +24,7 @@ DIVIDING_LAWS = ("flores", "gonthier", "hu-guo")
 class Contact(Table):
     """Normal contact force of every clearance joint."""
 
-    law: Literal[
-        "hertz",
-        "hunt-crossley",
-        "lankarani-nikravesh",
-        "flores",
-        "gonthier",
-        "hu-guo",
-        "herbert-mcwhannell",
-        "lee-wang",
-    ]
+    law: Literal["hertz", "hunt-crossley", LatchedLaw]
     restitution: Annotated[float, Quantity("", least=0, most=1)] | None = None
     """Coefficient of restitution of the laws that latch the impact speed."""
     damping: Annotated[float, Quantity("s/m", least=0)] | None = None

@@ -73,8 +73,21 @@ class Table(BaseModel):
         return data
 
 
+class Converted:
+    """What an entry is made into: an annotation whose `convert` is pydantic's validator."""
+
+    def convert(self, value: Any) -> Any:
+        """The value as the scene holds it; raises PydanticCustomError."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.convert)
+
+
 @dataclass(frozen=True)
-class Quantity:
+class Quantity(Converted):
     """A finite float in an SI unit, given as a number or as a string with a unit; open or closed
     bounds."""
 
@@ -140,11 +153,6 @@ class Quantity:
         unit = f" in {self.unit}" if self.unit and not limits else ""
         return f"Write a number{unit}{' ' if limits else ''}{limits}"
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.convert)
-
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
@@ -164,7 +172,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Count:
+class Count(Converted):
     """A whole number within closed bounds, or one word in its place."""
 
     least: int = 0
@@ -186,11 +194,6 @@ class Count:
             raise problem(f"must be from {self.least} to {self.most}", remedy)
         return value
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.convert)
-
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
@@ -204,7 +207,7 @@ linear between."""
 
 
 @dataclass(frozen=True)
-class CurveOf:
+class CurveOf(Converted):
     """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit."""
 
     unit: str
@@ -236,11 +239,6 @@ class CurveOf:
                 "Make both equal, or leave the last row out",
             )
         return pairs
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.convert)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

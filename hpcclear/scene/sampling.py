@@ -45,9 +45,7 @@ def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
     ----------
     McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
     """
-    from scipy.stats import (
-        qmc,
-    )  # scipy.stats takes most of a second to import; a single response needs none of it
+    from scipy.stats import qmc  # most of a second to import; a single response needs none of it
 
     return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
 
@@ -119,10 +117,8 @@ def monte_carlo(
 
     Parameters
     ----------
-    scene : Scene
-        With a study.
-    samples : int, optional
-        Number of points, `study.samples` by default.
+    scene, samples
+        As `latin_hypercube`.
     random : sequence of str, optional
         Random inputs in use, all by default; a case's `random` to verify its designs.
     design : mapping of variable name to SI value, optional

@@ -101,16 +101,12 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
     return lower, upper
 
 
-class Variable(Table):
-    """One column of a design: a name, the scene entries it drives, and its bounds in SI."""
+class NamedInput(Table):
+    """A named row of the study and the scene entries that get its value."""
 
     name: str
     paths: tuple[str, ...]
     """Scene entries that all get its value."""
-    range: Range | None = None
-    """Bounds, SI."""
-    ratio: Range | None = None
-    """For an inertia: bounds of r = I / (m L^2 / 12), sampled in place of I."""
 
     @model_validator(mode="before")
     @classmethod
@@ -119,6 +115,24 @@ class Variable(Table):
             return data
         paths = _resolve_paths(data)
         row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
+        return cls._in_si(row, paths)
+
+    @classmethod
+    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+        """The row with the entries whose unit follows from its paths in SI."""
+        raise NotImplementedError
+
+
+class Variable(NamedInput):
+    """One column of a design: a name, the scene entries it drives, and its bounds in SI."""
+
+    range: Range | None = None
+    """Bounds, SI."""
+    ratio: Range | None = None
+    """For an inertia: bounds of r = I / (m L^2 / 12), sampled in place of I."""
+
+    @classmethod
+    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         if ("range" in row) == ("ratio" in row):
             raise problem(
                 "a variable needs either a range or, for an inertia, a ratio",
@@ -156,12 +170,10 @@ def is_link_inertia(path: str) -> bool:
     return path in (*PAPER_PATHS["I1"], *PAPER_PATHS["I2"])
 
 
-class RandomInput(Table):
+class RandomInput(NamedInput):
     """A random number of the scene: about the design's value, or wherever the design is
     (`absolute`)."""
 
-    name: str
-    paths: tuple[str, ...]
     distribution: Literal["uniform", "normal", "truncated-normal"]
     range: Range | None = None
     """Bounds of an absolute uniform distribution, SI."""
@@ -172,13 +184,8 @@ class RandomInput(Table):
     deviation: float | None = None
     """Standard deviation of "normal", and of "truncated-normal" before it is cut, SI."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _resolve(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping):
-            return data
-        paths = _resolve_paths(data)
-        row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
+    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         quantity = quantities()[paths[0]]
         if "range" in row:
             row["range"] = _range(row["range"], quantity, "range")

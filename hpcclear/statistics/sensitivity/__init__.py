@@ -11,14 +11,12 @@ from hpcclear.statistics.sensitivity.intervals import (
     SensitivityHistory,
     analyse_intervals,
     design_intervals,
-    sensitivity_history,
 )
 from hpcclear.statistics.sensitivity.selection import Influence, Selection, select_influential
 from hpcclear.statistics.sensitivity.sobol import (
     SobolIndices,
     analyse_sobol,
     sobol_design,
-    sobol_indices,
 )
 
 __all__ = [
@@ -35,7 +33,5 @@ __all__ = [
     "convergence_intervals",
     "design_intervals",
     "select_influential",
-    "sensitivity_history",
     "sobol_design",
-    "sobol_indices",
 ]

@@ -14,7 +14,6 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.response_surface import (
-    Evaluate,
     ResponseSurface,
     Sampler,
     check_bounds,
@@ -220,36 +219,6 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
         failed=failed,
         order=design.settings.order,
     )
-
-
-def sensitivity_history(
-    evaluate: Evaluate,
-    bounds: ArrayLike,
-    clearances: ArrayLike,
-    rng: np.random.Generator,
-    settings: IntervalSettings = DEFAULTS,
-    sample: Sampler = latin_hypercube,
-) -> SensitivityHistory:
-    """Design, evaluate and analyse in one call; `evaluate` gets all points at once.
-
-    Parameters
-    ----------
-    evaluate : callable
-        Points of shape (n, d + 1), the clearance last -> values of shape (n,), NaN where failed.
-    bounds, clearances, rng, settings, sample
-        See `design_intervals`.
-
-    Returns
-    -------
-    SensitivityHistory
-
-    Raises
-    ------
-    InputError
-        See `design_intervals` and `analyse_intervals`.
-    """
-    design = design_intervals(bounds, clearances, rng, settings, sample)
-    return analyse_intervals(design, evaluate(design.points))
 
 
 def _surface(

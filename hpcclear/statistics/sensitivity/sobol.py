@@ -18,7 +18,7 @@ from scipy.stats import qmc
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import ROUNDING, check_confidence
-from hpcclear.statistics.surrogate.response_surface import Evaluate, check_bounds
+from hpcclear.statistics.surrogate.response_surface import check_bounds
 
 
 @dataclass(frozen=True)
@@ -154,39 +154,6 @@ def analyse_sobol(
         n_rows=n_rows,
         n_dropped=n_dropped,
         confidence=confidence,
-    )
-
-
-def sobol_indices(
-    evaluate: Evaluate,
-    bounds: ArrayLike,
-    rng: np.random.Generator,
-    n_rows: int = 1024,
-    *,
-    confidence: float = 0.95,
-    n_resamples: int = 200,
-) -> SobolIndices:
-    """Design, evaluate and analyse in one call; `evaluate` gets all points at once.
-
-    Parameters
-    ----------
-    evaluate : callable
-        Points of shape (n, d) -> values of shape (n,), NaN where failed.
-    bounds, n_rows, rng, confidence, n_resamples
-        See `sobol_design` and `analyse_sobol`.
-
-    Returns
-    -------
-    SobolIndices
-
-    Raises
-    ------
-    InputError
-        See `sobol_design` and `analyse_sobol`.
-    """
-    points = sobol_design(bounds, n_rows, rng)
-    return analyse_sobol(
-        evaluate(points), points.shape[1], rng, confidence=confidence, n_resamples=n_resamples
     )
 
 
