@@ -6,7 +6,7 @@ import pytest
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
-from hpcclear.statistics.search.mopso import Swarm, SwarmSettings, minimise
+from hpcclear.statistics.search.mopso import ParticleSwarm, SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import Archive, cut, hypervolume, relative_gain
 
 
@@ -118,7 +118,7 @@ def test_velocity_follows_equations_22_and_23():
     # span a plane, and the change of velocity stays in it only if r1 and r2 are scalars
     settings = SwarmSettings(mutation_share=0.0, particles=20)
     target = np.array([0.3, 0.6, 0.8])
-    swarm = Swarm(unit(3), 5, np.random.default_rng(0), settings=settings)
+    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0), settings=settings)
     for _ in range(3):
         before, state = swarm.ask(), swarm.state()
         swarm.tell(((before - target) ** 2).sum(axis=1))
@@ -141,7 +141,7 @@ def test_velocity_follows_equations_22_and_23():
 
 def test_speed_is_limited_and_turned_back_at_bounds():
     settings = SwarmSettings(mutation_share=0.0, speed_limit=0.3)
-    swarm = Swarm(unit(5), 30, np.random.default_rng(2), settings=settings)
+    swarm = ParticleSwarm(unit(5), 30, np.random.default_rng(2), settings=settings)
     turned = 0
     for _ in range(29):
         before = swarm.ask()
@@ -160,7 +160,7 @@ def test_speed_is_limited_and_turned_back_at_bounds():
 
 def test_without_feasible_points_the_least_violation_leads():
     settings = SwarmSettings(mutation_share=0.0, tournament=2000)  # all but sure to draw the best
-    swarm = Swarm(unit(3), 5, np.random.default_rng(0), settings=settings)
+    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0), settings=settings)
     points = swarm.ask()
     violations = 1.0 + points.sum(axis=1)
     swarm.tell(points[:, :2], violations)
@@ -175,7 +175,7 @@ def test_without_feasible_points_the_least_violation_leads():
 
 def test_archive_is_the_brute_force_front_of_all_points_told():
     seen = []
-    swarm = Swarm(unit(4), 3, np.random.default_rng(4))
+    swarm = ParticleSwarm(unit(4), 3, np.random.default_rng(4))
     while not swarm.done:
         values = np.round(dtlz2(swarm.ask()), 2)  # rounding makes ties and duplicates
         seen.append(values)
@@ -191,7 +191,7 @@ def test_archive_is_the_brute_force_front_of_all_points_told():
 @pytest.mark.parametrize("function", [zdt3, dtlz2])
 def test_archive_never_holds_dominated_points_and_keeps_its_size(function):
     settings = SwarmSettings(archive_capacity=60)
-    swarm = Swarm(unit(8), 40, np.random.default_rng(1), settings=settings)
+    swarm = ParticleSwarm(unit(8), 40, np.random.default_rng(1), settings=settings)
     best = np.full(3, np.inf)
     while not swarm.done:
         values = function(swarm.ask())
@@ -299,7 +299,7 @@ def test_no_feasible_point_is_said_and_not_invented():
 
 def test_among_infeasible_points_the_smaller_violation_is_remembered():
     settings = SwarmSettings(particles=3)
-    swarm = Swarm(unit(2), 5, np.random.default_rng(0), settings=settings)
+    swarm = ParticleSwarm(unit(2), 5, np.random.default_rng(0), settings=settings)
     first = swarm.ask()
     swarm.tell(np.ones((3, 2)), [0.5, 0.5, 0.0])
     second = swarm.ask()
@@ -312,7 +312,7 @@ def test_among_infeasible_points_the_smaller_violation_is_remembered():
 
 def test_bounds_hold_for_every_point_asked():
     bounds = np.array([(-1e-4, 3e-4), (1e6, 1e6 + 1), (-5.0, 0.1), (0.1, 0.3)])
-    swarm = Swarm(bounds, 60, np.random.default_rng(3))
+    swarm = ParticleSwarm(bounds, 60, np.random.default_rng(3))
     met = np.zeros((4, 2), bool)
     while not swarm.done:
         points = swarm.ask()
@@ -335,7 +335,7 @@ def test_bad_bounds_are_refused():
         [0, 1],
     ):
         with pytest.raises(InputError, match="bounds"):
-            Swarm(bounds, 10, rng)
+            ParticleSwarm(bounds, 10, rng)
 
 
 def test_bad_settings_and_arguments_are_refused():
@@ -352,17 +352,17 @@ def test_bad_settings_and_arguments_are_refused():
         with pytest.raises(InputError, match=next(iter(option))):
             SwarmSettings(**option)
     with pytest.raises(InputError, match="iterations"):
-        Swarm(unit(2), 0, rng)
+        ParticleSwarm(unit(2), 0, rng)
     with pytest.raises(InputError, match="outside the bounds"):
-        Swarm(unit(2), 5, rng, start=[[0.5, 1.5]])
+        ParticleSwarm(unit(2), 5, rng, start=[[0.5, 1.5]])
     with pytest.raises(InputError, match="start"):
-        Swarm(unit(2), 5, rng, start=[[0.5, 0.5, 0.5]])
+        ParticleSwarm(unit(2), 5, rng, start=[[0.5, 0.5, 0.5]])
     with pytest.raises(InputError, match="size"):
         run(zdt1, 5, 0, 2, size=1)
 
 
 def test_wrong_shapes_told_are_refused():
-    swarm = Swarm(unit(3), 5, np.random.default_rng(0), reference=[1.0, 1.0])
+    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0), reference=[1.0, 1.0])
     for values in (np.zeros((99, 2)), np.zeros((100, 3)), np.zeros((100, 0)), np.zeros((1, 2, 2))):
         with pytest.raises(InputError):
             swarm.tell(values)
@@ -372,7 +372,7 @@ def test_wrong_shapes_told_are_refused():
 
 
 def test_finished_swarm_refuses_more():
-    swarm = Swarm(unit(3), 1, np.random.default_rng(0))
+    swarm = ParticleSwarm(unit(3), 1, np.random.default_rng(0))
     swarm.tell(zdt1(swarm.ask()))
     with pytest.raises(InputError, match="all its iterations"):
         swarm.tell(zdt1(swarm.ask()))
@@ -395,7 +395,7 @@ def test_scale_of_the_objectives_does_not_matter():
 
 
 def test_asking_twice_changes_nothing():
-    swarm = Swarm(unit(3), 5, np.random.default_rng(0))
+    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0))
     points = swarm.ask()
     points[:] = 7.0  # what a caller does with the points is no concern of the swarm
     assert np.all(swarm.ask() <= 1.0)
@@ -407,7 +407,7 @@ def test_asking_twice_changes_nothing():
 def test_interrupted_run_continues_bit_for_bit(kind, stop, tmp_path):
     def begin():
         rng = np.random.Generator(getattr(np.random, kind)(0))
-        return Swarm(unit(6), 30, rng, reference=[140.0, 50.0])
+        return ParticleSwarm(unit(6), 30, rng, reference=[140.0, 50.0])
 
     def advance(swarm, until):
         while swarm.iteration < until:
@@ -418,7 +418,7 @@ def test_interrupted_run_continues_bit_for_bit(kind, stop, tmp_path):
     whole = advance(begin(), 30)
     np.savez(tmp_path / "swarm.npz", **advance(begin(), stop).state())
     with np.load(tmp_path / "swarm.npz", allow_pickle=False) as saved:
-        resumed = advance(Swarm.from_state(saved), 30)
+        resumed = advance(ParticleSwarm.from_state(saved), 30)
     for key, array in whole.state().items():
         assert array.tobytes() == resumed.state()[key].tobytes(), key
     assert whole.front().remark == resumed.front().remark
@@ -427,20 +427,22 @@ def test_interrupted_run_continues_bit_for_bit(kind, stop, tmp_path):
 
 def test_settings_travel_with_the_state():
     settings = SwarmSettings(particles=17, c1=1.5, archive_capacity=50, mutation_share=0.0)
-    swarm = Swarm(unit(2), 5, np.random.default_rng(0), settings=settings)
-    assert Swarm.from_state(swarm.state()).settings == settings
+    swarm = ParticleSwarm(unit(2), 5, np.random.default_rng(0), settings=settings)
+    assert ParticleSwarm.from_state(swarm.state()).settings == settings
 
 
 def test_broken_state_is_refused():
-    state = Swarm(unit(2), 5, np.random.default_rng(0)).state()
+    state = ParticleSwarm(unit(2), 5, np.random.default_rng(0)).state()
     with pytest.raises(InputError, match="missing"):
-        Swarm.from_state({key: value for key, value in state.items() if key != "velocities"})
+        ParticleSwarm.from_state(
+            {key: value for key, value in state.items() if key != "velocities"}
+        )
     with pytest.raises(InputError, match="shapes"):
-        Swarm.from_state({**state, "positions": state["positions"][:50]})
+        ParticleSwarm.from_state({**state, "positions": state["positions"][:50]})
     unknown = np.frombuffer(b'{"bit_generator": "os.system"}', dtype=np.uint8)
     for generator in (unknown, unknown[:9], np.frombuffer(b"[1]", dtype=np.uint8)):
         with pytest.raises(InputError, match="generator state"):
-            Swarm.from_state({**state, "generator": generator})
+            ParticleSwarm.from_state({**state, "generator": generator})
 
 
 def test_generator_state_includes_the_half_used_word():
@@ -463,7 +465,7 @@ def test_failed_points_never_enter_the_archive():
 
 
 def test_infinite_values_and_nan_violations_are_infeasible():
-    swarm = Swarm(unit(2), 2, np.random.default_rng(0), settings=SwarmSettings(particles=4))
+    swarm = ParticleSwarm(unit(2), 2, np.random.default_rng(0), settings=SwarmSettings(particles=4))
     values = np.array([[1.0, 1.0], [-np.inf, 0.0], [0.5, np.inf], [0.0, 0.0]])
     swarm.tell(values, [0.0, 0.0, 0.0, np.nan])
     front = swarm.front()
@@ -500,7 +502,9 @@ def test_one_objective(seed):
 
 
 def test_start_designs_are_evaluated_first():
-    swarm = Swarm([(2, 4), (-1, 1)], 5, np.random.default_rng(0), start=[[2.5, 0.25], [4.0, -1.0]])
+    swarm = ParticleSwarm(
+        [(2, 4), (-1, 1)], 5, np.random.default_rng(0), start=[[2.5, 0.25], [4.0, -1.0]]
+    )
     assert np.allclose(swarm.ask()[:2], [[2.5, 0.25], [4.0, -1.0]], rtol=0, atol=1e-15)
 
 
@@ -520,7 +524,7 @@ def test_remark_is_honest():
     assert not early.settled
     assert early.remark.startswith("still improving")
     assert early.gain > 1e-3
-    unfinished = Swarm(unit(5), 10, np.random.default_rng(0))
+    unfinished = ParticleSwarm(unit(5), 10, np.random.default_rng(0))
     unfinished.tell(zdt1(unfinished.ask()))
     assert unfinished.front().remark.startswith("not finished: 1 of 10")
     assert not unfinished.front().settled

@@ -13,7 +13,7 @@ from hpcclear.statistics.random.distributions import (
     nodes_needed,
     piece_rule,
 )
-from hpcclear.statistics.random.inputs import Derived, RandomInput
+from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, sample_moments
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
@@ -57,19 +57,19 @@ def designs(count, seed=1):
 
 
 UNIFORM = (
-    RandomInput("C", Uniform(3e-4, 1e-3)),
-    RandomInput("m", Uniform(-0.05, 0.05), about_design=True),
-    RandomInput("u", Uniform(-0.1, 0.1), about_design=True),
-    RandomInput("I", Uniform(-1e-4, 1e-4), about_design=True),
+    RandomVariable("C", Uniform(3e-4, 1e-3)),
+    RandomVariable("m", Uniform(-0.05, 0.05), about_design=True),
+    RandomVariable("u", Uniform(-0.1, 0.1), about_design=True),
+    RandomVariable("I", Uniform(-1e-4, 1e-4), about_design=True),
 )
 NORMAL = (
-    RandomInput("C", Normal(6.5e-4, 5e-5)),
-    RandomInput("m", Normal(0.0, 0.015), about_design=True),
-    RandomInput("u", Normal(0.005, 0.015), about_design=True),
+    RandomVariable("C", Normal(6.5e-4, 5e-5)),
+    RandomVariable("m", Normal(0.0, 0.015), about_design=True),
+    RandomVariable("u", Normal(0.005, 0.015), about_design=True),
 )
 TRUNCATED = (
-    RandomInput("C", TruncatedNormal(6e-4, 2e-4, 3e-4, 1e-3)),
-    RandomInput("u", TruncatedNormal(0.02, 0.05, -0.1, 0.06), about_design=True),
+    RandomVariable("C", TruncatedNormal(6e-4, 2e-4, 3e-4, 1e-3)),
+    RandomVariable("u", TruncatedNormal(0.02, 0.05, -0.1, 0.06), about_design=True),
 )
 CASES = pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1]])
 
@@ -386,7 +386,7 @@ def test_support_must_stay_inside_the_domain():
         with pytest.raises(InputError, match="does not extrapolate") as caught:
             objective(outside)
         assert caught.value.key == DESIGN[column]
-    wide = RobustObjective(surrogate(), DESIGN, (RandomInput("C", Uniform(2.9e-4, 1e-3)),))
+    wide = RobustObjective(surrogate(), DESIGN, (RandomVariable("C", Uniform(2.9e-4, 1e-3)),))
     with pytest.raises(InputError, match="does not extrapolate") as caught:
         wide(place)
     assert caught.value.key == "C"
@@ -402,7 +402,7 @@ def test_support_must_stay_inside_the_domain():
         (DESIGN, UNIFORM + UNIFORM[:1], {}, "design_names, random_inputs"),
         (DESIGN, UNIFORM[1:], {}, "C"),
         ((*DESIGN, "q"), UNIFORM, {}, "q"),
-        (DESIGN, (*UNIFORM, RandomInput("q", Uniform(0, 1))), {}, "q"),
+        (DESIGN, (*UNIFORM, RandomVariable("q", Uniform(0, 1))), {}, "q"),
         (("m", "u"), UNIFORM, {"fixed": {"I": 3e-4}}, "I"),
         ((*DESIGN, "C"), UNIFORM, {}, "C"),
         (DESIGN, UNIFORM, {"fixed": {"m": 1.5}}, "m"),

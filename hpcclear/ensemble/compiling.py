@@ -18,7 +18,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.distributions import Uniform
-from hpcclear.statistics.random.inputs import RandomInput
+from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -61,7 +61,7 @@ def _statistics(payload: Mapping[str, Any]) -> None:
     bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
     model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
     model.predict(points)
-    objective = RobustObjective(model, ("x",), [RandomInput("y", Uniform(0.0, 1.0))])
+    objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.0, 1.0))])
     minimise(objective, bounds[:1], iterations=4, rng=rng, size=2)
 
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from hpcclear.scene.content import Content
 from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
 from hpcclear.scene.paths import flatten
+from hpcclear.scene.tables import SceneTables
 
 NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
 
@@ -15,7 +15,7 @@ def slender_inertia(mass: float, length: float) -> float:
     return mass * length**2 / 12
 
 
-def effects_on(scene: Content) -> Iterator[str]:
+def effects_on(scene: SceneTables) -> Iterator[str]:
     """What is on, in words."""
     for name, label in NAMES.items():
         joint = getattr(scene.joints, name)
@@ -45,7 +45,7 @@ def effects_on(scene: Content) -> Iterator[str]:
         yield "uncertainty of each sample"
 
 
-def warnings(scene: Content) -> Iterator[str]:
+def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     for name in ("crank", "rod"):
         link = getattr(scene.mechanism, name)
@@ -79,7 +79,7 @@ def warnings(scene: Content) -> Iterator[str]:
             )
 
 
-def differences(first: Content, second: Content) -> list[str]:
+def differences(first: SceneTables, second: SceneTables) -> list[str]:
     """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
     equal."""
     ours, theirs = dict(flatten(first.resolved())), dict(flatten(second.resolved()))

@@ -12,8 +12,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.scene.content import Content
 from hpcclear.scene.study import Study
+from hpcclear.scene.tables import SceneTables
 from hpcclear.scene.variables import Variable
 
 
@@ -26,7 +26,7 @@ class Box:
     upper: Array
 
 
-def box(scene: Content, names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
+def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[str] = ()) -> Box:
     """Bounds of some study variables.
 
     Parameters
@@ -65,7 +65,7 @@ def _reaches(study: Study, widen: Iterable[str]) -> dict[str, float]:
 
 
 def _bounds(
-    scene: Content, variable: Variable, names: tuple[str, ...], reach: dict[str, float]
+    scene: SceneTables, variable: Variable, names: tuple[str, ...], reach: dict[str, float]
 ) -> tuple[float, float]:
     lower, upper = variable.bounds
     width = reach.get(variable.paths[0], 0.0)
@@ -91,7 +91,7 @@ def _bounds(
     return min(ratios), max(ratios)
 
 
-def _span(scene: Content, path: str, names: tuple[str, ...]) -> tuple[float, float]:
+def _span(scene: SceneTables, path: str, names: tuple[str, ...]) -> tuple[float, float]:
     """Range of the design values at a path: its variable's, if that is among `names`, else the
     scene's."""
     for name in names:
@@ -102,7 +102,7 @@ def _span(scene: Content, path: str, names: tuple[str, ...]) -> tuple[float, flo
     return value, value
 
 
-def to_physical(scene: Content, names: Sequence[str], coordinates: Array) -> Array:
+def to_physical(scene: SceneTables, names: Sequence[str], coordinates: Array) -> Array:
     """Sampling coordinates to SI values: ratios become inertias by mass and length of the same row.
 
     Both arrays have shape ``(n, d)``, a column a name.
@@ -110,12 +110,12 @@ def to_physical(scene: Content, names: Sequence[str], coordinates: Array) -> Arr
     return _scaled(scene, names, coordinates, inverse=False)
 
 
-def to_coordinates(scene: Content, names: Sequence[str], values: Array) -> Array:
+def to_coordinates(scene: SceneTables, names: Sequence[str], values: Array) -> Array:
     """SI values to sampling coordinates, the inverse of `to_physical`; shapes ``(n, d)``."""
     return _scaled(scene, names, values, inverse=True)
 
 
-def _scaled(scene: Content, names: Sequence[str], columns: Array, inverse: bool) -> Array:
+def _scaled(scene: SceneTables, names: Sequence[str], columns: Array, inverse: bool) -> Array:
     variables = [scene.required_study.variable(name) for name in names]
     result = np.array(columns, dtype=np.float64)
     paths = [variable.paths for variable in variables]
@@ -127,7 +127,7 @@ def _scaled(scene: Content, names: Sequence[str], columns: Array, inverse: bool)
 
 
 def slender_inertias(
-    scene: Content, paths: Sequence[Sequence[str]], values: Array, inertia: str
+    scene: SceneTables, paths: Sequence[Sequence[str]], values: Array, inertia: str
 ) -> Array | float:
     """m L^2/12 of the link whose inertia stands at the path `inertia`, of each row (kg m2).
 
@@ -140,7 +140,7 @@ def slender_inertias(
 
 
 def entries(
-    scene: Content, paths: Sequence[Sequence[str]], values: Array, path: str
+    scene: SceneTables, paths: Sequence[Sequence[str]], values: Array, path: str
 ) -> Array | float:
     """What stands at `path` in each row: the column that drives it, shape (n,), or the scene's
     number."""

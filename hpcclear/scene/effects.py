@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import model_validator
 
-from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, problem
+from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
 
 LatchedLaw = Literal[
     "lankarani-nikravesh",
@@ -36,33 +36,33 @@ class Contact(Table):
     def _parameters_fit_law(self) -> "Contact":
         latched = self.law in LATCHED_LAWS
         if latched and self.restitution is None:
-            raise problem(
+            raise invalid(
                 f"the law {self.law!r} needs a restitution",
                 "Add restitution = 0.9 or so",
                 key="restitution",
                 value=None,
             )
         if not latched and self.restitution is not None:
-            raise problem(
+            raise invalid(
                 f"the law {self.law!r} has no restitution",
                 "Remove it, or set effects.contact as a whole table",
                 key="restitution",
             )
         if self.law == "hunt-crossley" and self.damping is None:
-            raise problem(
+            raise invalid(
                 "the law 'hunt-crossley' needs a fixed damping factor",
                 "Add damping = 0.5 (s/m) or so",
                 key="damping",
                 value=None,
             )
         if self.law != "hunt-crossley" and self.damping is not None:
-            raise problem(
+            raise invalid(
                 f"the law {self.law!r} has no fixed damping factor",
                 "Remove it, or set effects.contact as a whole table",
                 key="damping",
             )
         if self.law in DIVIDING_LAWS and self.restitution == 0:
-            raise problem(
+            raise invalid(
                 f"the damping of {self.law!r} divides by the restitution, so 0 has no meaning",
                 'Use a value above 0, or the law "lankarani-nikravesh"',
                 key="restitution",
@@ -101,7 +101,7 @@ class Friction(Table):
                 or self.ramp_speed is not None
                 or self.speeds is not None
             ):
-                raise problem(
+                raise invalid(
                     'the law "none" has no parameters, and a parameter says that friction is meant',
                     'Write friction = "none" (--set effects.friction=none) to switch it off, '
                     'or set law = "coulomb"',
@@ -110,33 +110,33 @@ class Friction(Table):
                 )
             return self
         if self.coefficient is None:
-            raise problem(
+            raise invalid(
                 f"the law {self.law!r} needs a coefficient",
                 "Add coefficient = 0.01 or so",
                 "coefficient",
                 None,
             )
         if self.law == "coulomb" and self.speeds is not None:
-            raise problem(
+            raise invalid(
                 "the law 'coulomb' has one ramp speed",
                 "Write ramp_speed = 0.01 (m/s) instead",
                 "speeds",
             )
         if self.law == "ambrosio" and self.ramp_speed is not None:
-            raise problem(
+            raise invalid(
                 "the law 'ambrosio' has two speeds",
                 "Write speeds = [0.001, 0.01] (m/s) instead",
                 "ramp_speed",
             )
         if self.law == "ambrosio" and self.speeds is None:
-            raise problem(
+            raise invalid(
                 "the law 'ambrosio' needs two speeds",
                 "Add speeds = [0.001, 0.01] (m/s)",
                 "speeds",
                 None,
             )
         if self.speeds is not None and not self.speeds[0] < self.speeds[1]:
-            raise problem(
+            raise invalid(
                 "the first speed must be below the second", "Write them in rising order", "speeds"
             )
         return self
@@ -173,7 +173,7 @@ class Effects(Table):
             return data
         for key in ("friction", "guide_friction"):
             if isinstance(data.get(key), str) and data[key] != "none":
-                raise problem(
+                raise invalid(
                     'a table is expected here, or "none"',
                     'Write "none" to switch it off, or a table such as { coefficient = 0.01 }'
                     + (' with law = "coulomb"' if key == "friction" else ""),

@@ -25,7 +25,7 @@ LONGEST_CURVE = 10_000
 MOST_LISTED = 20
 
 
-def problem(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
+def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
     """An error for validators: `key` is relative to the table that is validated; `...` means "look
     it up"."""
     return PydanticCustomError(
@@ -62,14 +62,14 @@ class Table(BaseModel):
         if isinstance(data, Table):
             return data
         if not isinstance(data, Mapping):
-            raise problem("a table is expected here", "Write it as [table] or { key = value }")
+            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
         known = tuple(cls.model_fields)
         for key in data:
             if not isinstance(key, str):
-                raise problem("keys are strings", "Write the key as text", key=repr(key))
+                raise invalid("keys are strings", "Write the key as text", key=repr(key))
             if key not in known:
                 reason, remedy = cls.elsewhere.get(key, ("is not a known key", nearest(key, known)))
-                raise problem(reason, remedy, key=key)
+                raise invalid(reason, remedy, key=key)
         return data
 
 
@@ -102,7 +102,7 @@ class Quantity(Converted):
         """The value in SI; raises PydanticCustomError."""
         number = self.number(value)
         if not self.holds(number):
-            raise problem(
+            raise invalid(
                 f"must be {self.bounds()}" + (f": {self.why}" if self.why else ""), self._remedy()
             )
         return number
@@ -113,17 +113,17 @@ class Quantity(Converted):
             try:
                 value = to_si(value, self.unit)
             except UnitError as error:
-                raise problem(error.reason, error.remedy) from None
+                raise invalid(error.reason, error.remedy) from None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise problem("a number is expected here", self._remedy())
+            raise invalid("a number is expected here", self._remedy())
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise problem("the number must be finite", self._remedy())
+            raise invalid("the number must be finite", self._remedy())
         if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
-            raise problem("the number is of no physical size", self._remedy())
+            raise invalid("the number is of no physical size", self._remedy())
         return number
 
     def holds(self, value: Any) -> Any:
@@ -189,9 +189,9 @@ class Count(Converted):
         if isinstance(value, float) and value.is_integer():
             value = int(value)
         if isinstance(value, bool) or not isinstance(value, int):
-            raise problem("a whole number is expected here", remedy)
+            raise invalid("a whole number is expected here", remedy)
         if not self.least <= value <= self.most:
-            raise problem(f"must be from {self.least} to {self.most}", remedy)
+            raise invalid(f"must be from {self.least} to {self.most}", remedy)
         return value
 
     def __get_pydantic_json_schema__(
@@ -218,23 +218,23 @@ class CurveOf(Converted):
             return Quantity(self.unit).convert(value)
         remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...] over one turn"
         if not 2 <= len(value) <= LONGEST_CURVE:
-            raise problem(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
+            raise invalid(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
         if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-            raise problem("every row of a table is a pair [angle, value]", remedy)
+            raise invalid("every row of a table is a pair [angle, value]", remedy)
         angle, height = Quantity("rad"), Quantity(self.unit)
         pairs = tuple((angle.convert(row[0]), height.convert(row[1])) for row in value)
         if any(second[0] <= first[0] for first, second in itertools.pairwise(pairs)):
-            raise problem(
+            raise invalid(
                 "the crank angles must rise from row to row",
                 "Sort the rows by angle, each angle once",
             )
         span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi
         if span > turn * (1 + 1e-12):
-            raise problem(
+            raise invalid(
                 "the table is longer than one turn", "Give one turn (2 pi rad, 360 deg); it repeats"
             )
         if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
-            raise problem(
+            raise invalid(
                 "the curve repeats every turn, but its last value differs from its first",
                 "Make both equal, or leave the last row out",
             )
@@ -262,18 +262,18 @@ class NamedRows:
             rows: list[Any] = []
             for name, row in value.items():
                 if not isinstance(row, Mapping):
-                    raise problem(
+                    raise invalid(
                         "a table is expected here", "Write it as { key = value }", key=str(name)
                     )
                 if "name" in row:
-                    raise problem(
+                    raise invalid(
                         "the name is the key of this table", "Remove it", key=f"{name}.name"
                     )
                 rows.append({"name": name, **row})
             return rows
         if isinstance(value, tuple):
             return value
-        raise problem("a table is expected here", "Write it as [table] or { key = value }")
+        raise invalid("a table is expected here", "Write it as [table] or { key = value }")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

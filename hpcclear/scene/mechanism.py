@@ -14,7 +14,7 @@ from hpcclear.scene.fields import (
     PositiveLength,
     Quantity,
     Table,
-    problem,
+    invalid,
 )
 
 
@@ -50,7 +50,7 @@ class Mechanism(Table):
     @model_validator(mode="after")
     def _assembles(self) -> "Mechanism":
         if self.rod.length <= self.crank.length:
-            raise problem(
+            raise invalid(
                 f"the rod must be longer than the crank ({self.crank.length:g} m), "
                 "or the crank cannot turn round",
                 "Lengthen the rod or shorten the crank",
@@ -130,7 +130,7 @@ class ClearanceJoint(Table):
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
         if self.clearance >= self.bearing_radius:
-            raise problem(
+            raise invalid(
                 "the clearance must be smaller than the bearing radius "
                 f"({self.bearing_radius:g} m), or no journal is left",
                 "Write the radial clearance R_B - R_J",

@@ -8,13 +8,13 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import describing, domain
-from hpcclear.scene.content import Content, plain
-from hpcclear.scene.fields import problem
+from hpcclear.scene.fields import invalid
 from hpcclear.scene.paths import PHYSICAL, replace
+from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.validation import check_path, validated
 
 
-class Scene(Content):
+class Scene(SceneTables):
     """A scene file, validated: SI numbers, frozen, equal when its content is equal.
 
     Make one with `load_scene`; change one with `with_`, which validates anew.
@@ -31,7 +31,7 @@ class Scene(Content):
             for row in rows:
                 for path in row.paths:
                     if path not in numbers:
-                        raise problem(
+                        raise invalid(
                             f"drives {path}, and this scene has no number there",
                             "Give that entry a value first, or remove the variable",
                             key=f"study.{table}.{row.name}",
@@ -40,7 +40,7 @@ class Scene(Content):
         try:
             domain.box(self, widen=tuple(row.name for row in self.study.random))
         except InputError as error:
-            raise problem(error.reason, error.remedy, error.key, error.value) from None
+            raise invalid(error.reason, error.remedy, error.key, error.value) from None
         return self
 
     def _check_corners(self) -> None:
@@ -72,7 +72,7 @@ class Scene(Content):
                 except ValidationError as error:
                     context = error.errors(include_url=False)[0].get("ctx", {})
                     reason = context.get("reason", "it is not valid")
-                    raise problem(
+                    raise invalid(
                         f"reaches {name} = {value:g}, which makes no mechanism: {reason}",
                         "Narrow it",
                         key=f"study.{key}.{name}",

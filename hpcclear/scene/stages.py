@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from hpcclear.scene.fields import Count, Quantity, Table, problem
+from hpcclear.scene.fields import Count, Quantity, Table, invalid
 
 Names = tuple[str, ...]
 Share = Annotated[float, Quantity("", above=0, below=1)]
@@ -50,7 +50,7 @@ class Sensitivity(Table):
     def check(self) -> None:
         """Contradictions between the entries; PydanticCustomError with a key below the study."""
         if self.sobol_samples & (self.sobol_samples - 1):
-            raise problem(
+            raise invalid(
                 "must be a power of two, or the sequence is not balanced",
                 "Write 4096, say",
                 key="sensitivity.sobol_samples",

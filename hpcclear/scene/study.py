@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
-from hpcclear.scene.fields import Count, NamedRows, Table, nearest, problem
+from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
 from hpcclear.scene.variables import Case, RandomInput, Variable
 
@@ -70,7 +70,7 @@ class Study(Table):
     @model_validator(mode="after")
     def _consistent(self) -> "Study":
         if not self.variables:
-            raise problem(
+            raise invalid(
                 "the list of variables is empty",
                 "Name at least one, such as m2 = { range = [0.1, 0.4] }",
                 key="variables",
@@ -87,7 +87,7 @@ class Study(Table):
         for variable in self.variables:
             for path in variable.paths:
                 if path in owner:
-                    raise problem(
+                    raise invalid(
                         f"{variable.name} and {owner[path]} both drive {path}",
                         "Remove one, or give them different paths",
                         key=f"variables.{variable.name}",
@@ -100,14 +100,14 @@ class Study(Table):
             if other is not None or (
                 row.name in self.names and self.variable(row.name).paths != row.paths
             ):
-                raise problem(
+                raise invalid(
                     f"drives what the study variable {other or row.name} drives",
                     f"Name the random input {other or row.name}, without a path",
                     key=f"random.{row.name}",
                 )
             for path in row.paths:
                 if owner.setdefault(path, row.name) != row.name:
-                    raise problem(
+                    raise invalid(
                         f"{row.name} and {owner[path]} both drive {path}",
                         "Remove one",
                         key=f"random.{row.name}",
@@ -119,7 +119,7 @@ class Study(Table):
             return
         if self.variable(row.name).range is None:
             if row.absolute:
-                raise problem(
+                raise invalid(
                     "a distribution that does not follow the design needs a domain in SI",
                     f"Give study.variables.{row.name} a range instead of a ratio",
                     key=f"random.{row.name}",
@@ -134,7 +134,7 @@ class Study(Table):
                 lower - slack <= row.centre - row.reach and row.centre + row.reach <= upper + slack
             )
         if not inside:
-            raise problem(
+            raise invalid(
                 "the distribution is wider than its domain, "
                 f"{row.name} from {lower:g} to {upper:g}",
                 f"Narrow it, or widen study.variables.{row.name}.range",
@@ -145,19 +145,19 @@ class Study(Table):
         for case in self.cases:
             for name in case.random:
                 if name not in (known := tuple(row.name for row in self.random)):
-                    raise problem(
+                    raise invalid(
                         f"{name!r} is not a random input of this study",
                         nearest(name, known),
                         key=f"cases.{case.name}",
                     )
                 if name not in self.optimisation:
-                    raise problem(
+                    raise invalid(
                         f"the surrogate of the optimisation does not know {name!r}",
                         "Add it to study.variables and to study.surrogate.optimisation",
                         key=f"cases.{case.name}",
                     )
             if not self.design_variables(case.name):
-                raise problem(
+                raise invalid(
                     "every variable of this case is random wherever the design is, "
                     "so nothing can be chosen",
                     "Add a study variable, or give a half_width instead of a range",
@@ -174,28 +174,28 @@ class Study(Table):
             names = tuple(names)
             for name in names:
                 if name not in self.names:
-                    raise problem(
+                    raise invalid(
                         f"{name!r} is not a study variable", nearest(name, self.names), key=key
                     )
             if len(set(names)) < len(names):
-                raise problem("a variable is named twice", "Remove one", key=key)
+                raise invalid("a variable is named twice", "Remove one", key=key)
         if any(
             not names for names in (self.surrogate.models or ()) + (self.sensitivity.groups or ())
         ):
-            raise problem(
+            raise invalid(
                 "a model needs at least one input",
                 "Name one, or remove the empty list",
                 key="surrogate.models",
             )
         if self.sensitivity.groups:
             if self.sensitivity.parameter not in self.names:
-                raise problem(
+                raise invalid(
                     f"{self.sensitivity.parameter!r} is not a study variable",
                     nearest(self.sensitivity.parameter, self.names),
                     key="sensitivity.parameter",
                 )
             if any(self.sensitivity.parameter in group for group in self.sensitivity.groups):
-                raise problem(
+                raise invalid(
                     "the parameter is held fixed, so it cannot be an input of a surface",
                     "Remove it from the group",
                     key="sensitivity.groups",
@@ -217,7 +217,7 @@ class Study(Table):
         if self.cases:
             inputs = max(len(model) for model in self.models)
             if self.samples < inputs + 2:
-                raise problem(
+                raise invalid(
                     f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
                     f"Ask for at least {10 * inputs} samples",
                     key="samples",
@@ -286,7 +286,7 @@ def _with_paths(row: Any, variable: Any) -> Any:
 def _enough(inputs: int, order: int, samples: int, key: str) -> None:
     terms = math.comb(inputs + order, order)
     if samples < terms:
-        raise problem(
+        raise invalid(
             f"a surface of order {order} in {inputs} inputs has {terms} terms, "
             f"more than the {samples} samples",
             f"Ask for at least {2 * terms} samples, or lower the order",

@@ -1,4 +1,4 @@
-"""Content against a model, and what is wrong with it as an error that a user can mend."""
+"""SceneTables against a model, and what is wrong with it as an error that a user can mend."""
 
 import re
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ def check_path(path: object) -> None:
 
 
 def validated(model: type[Valid], content: Mapping[str, Any]) -> Valid:
-    """Content as a model of its kind.
+    """SceneTables as a model of its kind.
 
     Raises
     ------

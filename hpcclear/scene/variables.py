@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from hpcclear.base.normal import TAIL
 from hpcclear.base.outcome import ON_REQUEST
-from hpcclear.scene.fields import Quantity, Table, nearest, problem
+from hpcclear.scene.fields import Quantity, Table, invalid, nearest
 from hpcclear.scene.paths import quantities
 
 PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
@@ -44,16 +44,16 @@ def _resolve_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
     name = data.get("name")
     if not isinstance(name, str) or not _NAME.fullmatch(name) or name in RESERVED:
         reason = "is taken by a result" if name in RESERVED else "is not a name"
-        raise problem(
+        raise invalid(
             reason, "Use a letter, then letters, digits or _, and give the path as path = ..."
         )
     if "path" in data and "paths" in data:
-        raise problem("path and paths contradict each other", "Keep one of them", key="path")
+        raise invalid("path and paths contradict each other", "Keep one of them", key="path")
     given = data.get("paths", data.get("path"))
     key = "path" if "path" in data else "paths"
     if given is None:
         if name not in PAPER_PATHS:
-            raise problem(
+            raise invalid(
                 "is not one of the known names, so it needs a path",
                 f'Add path = "drive.speed", say; known names are {", ".join(PAPER_PATHS)}',
             )
@@ -64,20 +64,20 @@ def _resolve_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
         or not paths
         or any(not isinstance(p, str) for p in paths)
     ):
-        raise problem(
+        raise invalid(
             "a dotted path, or a list of them, is expected here", "Write it in quotes", key=key
         )
     for path in paths:
         if path not in quantities():
-            raise problem(
+            raise invalid(
                 f"{path!r} is not a physical number of a scene",
                 nearest(path, tuple(quantities())),
                 key=key,
             )
     if len(set(paths)) < len(paths):
-        raise problem("a path stands there twice", "Remove one", key=key)
+        raise invalid("a path stands there twice", "Remove one", key=key)
     if len({quantities()[path].unit for path in paths}) > 1:
-        raise problem("the paths have different units", "Use a variable for each unit", key=key)
+        raise invalid("the paths have different units", "Use a variable for each unit", key=key)
     return tuple(paths)
 
 
@@ -87,17 +87,17 @@ def _number(value: Any, quantity: Quantity, key: str) -> float:
         return quantity.convert(value)
     except PydanticCustomError as error:
         context = error.context or {}
-        raise problem(context["reason"], context["remedy"], key=key) from None
+        raise invalid(context["reason"], context["remedy"], key=key) from None
 
 
 def _range(value: Any, quantity: Quantity, key: str) -> Range:
     """A pair in rising order."""
     if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise problem("two bounds are expected here", "Write [lower, upper]", key=key)
+        raise invalid("two bounds are expected here", "Write [lower, upper]", key=key)
     lower, upper = (_number(bound, quantity, key) for bound in value)
     if not lower < upper:
         reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
-        raise problem(reason, "Write the smaller bound first; leave a constant out", key=key)
+        raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
     return lower, upper
 
 
@@ -134,7 +134,7 @@ class Variable(NamedInput):
     @classmethod
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         if ("range" in row) == ("ratio" in row):
-            raise problem(
+            raise invalid(
                 "a variable needs either a range or, for an inertia, a ratio",
                 "Add range = [lower, upper]",
             )
@@ -144,7 +144,7 @@ class Variable(NamedInput):
                 _range(row["range"], quantities()[path], "range")
         else:
             if len(paths) != 1 or not is_link_inertia(paths[0]):
-                raise problem(
+                raise invalid(
                     "only the inertia of crank or rod can be given as a ratio to m L^2/12",
                     "Write range = [lower, upper] instead",
                     key="ratio",
@@ -207,11 +207,11 @@ class RandomInput(NamedInput):
         for key in ("range", "mean", "half_width", "deviation"):
             value = getattr(self, key)
             if key in needed and value is None:
-                raise problem(
+                raise invalid(
                     f"the distribution {self.distribution!r} needs it", "Add it", key, None
                 )
             if key not in allowed and value is not None:
-                raise problem(
+                raise invalid(
                     f"does not belong to this {self.distribution!r} distribution", "Remove it", key
                 )
         return self
@@ -247,9 +247,9 @@ class Case(Table):
     @model_validator(mode="after")
     def _some_random(self) -> "Case":
         if not self.random:
-            raise problem(
+            raise invalid(
                 "a case without random inputs has no deviation to minimise", "Name some", "random"
             )
         if len(set(self.random)) < len(self.random):
-            raise problem("a random input is named twice", "Remove one", key="random")
+            raise invalid("a random input is named twice", "Remove one", key="random")
         return self

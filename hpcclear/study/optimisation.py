@@ -16,7 +16,7 @@ from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.distributions import Distribution, Normal, TruncatedNormal, Uniform
-from hpcclear.statistics.random.inputs import Derived, RandomInput
+from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
@@ -96,7 +96,7 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     return Problem(names, region, objective, scene)
 
 
-def _random_input(row: scene_variables.RandomInput) -> RandomInput:
+def _random_input(row: scene_variables.RandomInput) -> RandomVariable:
     middle = 0.0 if row.centre is None else row.centre
     distribution: Distribution
     if row.distribution == "uniform":
@@ -107,7 +107,7 @@ def _random_input(row: scene_variables.RandomInput) -> RandomInput:
         if row.distribution == "truncated-normal":
             ends = middle - row.reach, middle + row.reach
             distribution = TruncatedNormal(middle, row.deviation, *ends)
-    return RandomInput(row.name, distribution, about_design=not row.absolute)
+    return RandomVariable(row.name, distribution, about_design=not row.absolute)
 
 
 def _ratio(scene: Scene, inertia: str) -> Derived:

@@ -10,7 +10,7 @@ from hpcclear.statistics.random.distributions import Distribution
 
 
 @dataclass(frozen=True)
-class RandomInput:
+class RandomVariable:
     """An input that scatters, independently of the others.
 
     Attributes
@@ -64,7 +64,7 @@ class Wiring:
         self,
         names: Sequence[str],
         design_names: Sequence[str],
-        random_inputs: Sequence[RandomInput],
+        random_inputs: Sequence[RandomVariable],
         fixed: Mapping[str, float],
         derived: Sequence[Derived],
     ) -> None:
@@ -79,7 +79,7 @@ class Wiring:
     def _sources(self, name: str) -> tuple[str, ...]:
         return self.derived[name].of if name in self.derived else (name,)
 
-    def _check(self, design_names: Sequence[str], random_inputs: Sequence[RandomInput]) -> None:
+    def _check(self, design_names: Sequence[str], random_inputs: Sequence[RandomVariable]) -> None:
         if len(self.column) != len(design_names) or len(self.random) != len(random_inputs):
             names = [*design_names, *(one.name for one in random_inputs)]
             raise InputError("design_names, random_inputs", names, "a name twice", "name each once")

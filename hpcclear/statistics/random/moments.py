@@ -20,7 +20,7 @@ from math import sqrt
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.random.inputs import Derived, RandomInput, Wiring
+from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
 from hpcclear.statistics.surrogate.kriging import inside
 
@@ -88,7 +88,7 @@ class RobustObjective:
     model : Kriging or PiecewiseKriging
     design_names : sequence of str
         Names of the design variables, in the order of their columns.
-    random_inputs : sequence of RandomInput
+    random_inputs : sequence of RandomVariable
     fixed : mapping of str to float, optional
         Values of inputs that are neither.
     derived : sequence of Derived, optional
@@ -120,7 +120,7 @@ class RobustObjective:
         self,
         model: Surrogate,
         design_names: Sequence[str],
-        random_inputs: Sequence[RandomInput],
+        random_inputs: Sequence[RandomVariable],
         *,
         fixed: Mapping[str, float] | None = None,
         derived: Sequence[Derived] = (),

@@ -80,7 +80,7 @@ class SwarmSettings:
         _within("swarm.mutation_share", self.mutation_share, 1.0)
 
 
-class Swarm:
+class ParticleSwarm:
     """A particle swarm that asks for points to evaluate and is told their objectives.
 
     Parameters
@@ -218,7 +218,9 @@ class Swarm:
         names = {*_ARRAYS, "archive_positions", "archive_values", "counts", "settings", "generator"}
         if names - set(state):
             found = sorted(state)
-            raise InputError("swarm state", found, "entries missing", "Save all of Swarm.state().")
+            raise InputError(
+                "swarm state", found, "entries missing", "Save all of ParticleSwarm.state()."
+            )
         swarm = cls.__new__(cls)  # the constructor would draw from the generator
         swarm._rng = rng_state.from_array(state["generator"])
         kinds = [type(value) for value in asdict(SwarmSettings()).values()]
@@ -358,10 +360,12 @@ def minimise(
     """Run a swarm to its end.
 
     `function` takes points (n, d) and returns objectives (n, m), or a tuple of them and violations
-    (see `Swarm.tell`). `size` is the largest number of points in the front. The other parameters
-    and the errors raised are those of `Swarm`.
+    (see `ParticleSwarm.tell`). `size` is the largest number of points in the front. The other parameters
+    and the errors raised are those of `ParticleSwarm`.
     """
-    swarm = Swarm(bounds, iterations, rng, settings=settings, start=start, reference=reference)
+    swarm = ParticleSwarm(
+        bounds, iterations, rng, settings=settings, start=start, reference=reference
+    )
     while not swarm.done:
         told = function(swarm.ask())
         if isinstance(told, tuple):

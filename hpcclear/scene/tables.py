@@ -10,7 +10,7 @@ from pydantic import PrivateAttr, field_validator, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import NamedRows, Table, nearest, problem
+from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
@@ -18,7 +18,7 @@ from hpcclear.scene.study import Study
 from hpcclear.scene.variables import PAPER_PATHS
 
 
-class Content(Table):
+class SceneTables(Table):
     """The tables of a scene file, each valid and fitting the others; SI numbers, frozen."""
 
     format_version: Literal[1] = 1
@@ -42,7 +42,7 @@ class Content(Table):
     @classmethod
     def _version_is_a_number(cls, value: Any) -> Any:
         if isinstance(value, bool):  # equal to 1 in Python
-            raise problem("true or false is no version", "Write format_version = 1")
+            raise invalid("true or false is no version", "Write format_version = 1")
         return value
 
     @model_validator(mode="before")
@@ -73,7 +73,7 @@ class Content(Table):
     def _effects_fit_joints(self) -> Self:
         clearance = self.clearance_joints()
         if clearance and self.effects.contact is None:
-            raise problem(
+            raise invalid(
                 "a clearance joint needs a contact law",
                 'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
                 "or make both joints ideal",
@@ -81,7 +81,7 @@ class Content(Table):
                 value=None,
             )
         if not clearance and self.effects.friction.law != "none":
-            raise problem(
+            raise invalid(
                 "friction acts in joints with clearance, and both joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
                 key="effects.friction.law",
