@@ -1,0 +1,32 @@
+"""The package's rooms: every module in one of them, and no two modules that need one another."""
+
+import graphlib
+import tomllib
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOORS = {"hpcclear", "hpcclear.__main__"}
+
+
+@pytest.fixture(scope="module")
+def graph() -> grimp.ImportGraph:
+    """Who imports whom, imports inside functions and those for types alone included."""
+    return grimp.build_graph("hpcclear", exclude_type_checking_imports=False, cache_dir=None)
+
+
+def test_no_modules_need_one_another(graph):
+    arrows = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    graphlib.TopologicalSorter(arrows).prepare()  # names the circle, if there is one
+
+
+def test_every_module_stands_in_a_room_of_the_contract(graph):
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    floors = next(one["layers"] for one in contracts if one["type"] == "layers")
+    rooms = {room.strip() for floor in floors for room in floor.split("|")}
+    loose = {name for name in graph.modules - DOORS if name.split(".")[1] not in rooms}
+    assert not loose
+    assert {path.stem for path in (ROOT / "hpcclear").glob("*.py")} == {"__init__", "__main__"}
