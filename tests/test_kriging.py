@@ -12,7 +12,7 @@ from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
 from hpcclear.statistics.surrogate.predictor import gaussian
-from hpcclear.statistics.surrogate.subintervals import fit_subintervals
+from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
 BOUNDS = np.array([[1.0, 3.0], [-2e-4, 5e-4], [10.0, 11.0]])
 
@@ -233,7 +233,8 @@ class Counted:
 def fit_kinked(evaluate, **changes):
     arguments = {"samples": 30, "test_samples": 40, "max_resamples": 0, "max_depth": 5}
     arguments |= {"r2_min": 0.999, "rmae_max": 0.05, "restarts": 0} | changes
-    return fit_subintervals(evaluate, SQUARE, rng=np.random.default_rng(0), **arguments)
+    settings = SubintervalSettings(**arguments)
+    return fit_subintervals(evaluate, SQUARE, settings, rng=np.random.default_rng(0))
 
 
 def test_recursion_cuts_where_the_kink_is():

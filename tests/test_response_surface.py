@@ -16,7 +16,11 @@ from hpcclear.statistics.surrogate.response_surface import (
     latin_hypercube,
     n_terms,
 )
-from hpcclear.statistics.surrogate.surface_search import fit_until_accepted
+from hpcclear.statistics.surrogate.surface_search import (
+    SearchSettings,
+    SurfaceSearch,
+    fit_until_accepted,
+)
 
 MASSES = np.array([[0.105, 0.42], [0.07, 0.28]])  # kg, m2 and m3 of the paper
 INERTIAS = np.array([[3.1e-5, 1.25e-4], [1.3e-4, 5.0e-4], [0.0, 0.12]])  # badly scaled on purpose
@@ -41,6 +45,15 @@ def cubic(x: np.ndarray) -> np.ndarray:
         + 2e-6 * u * v**2
         + 8e-6 * v**3
     )
+
+
+def search_for(
+    function: Callable[[np.ndarray], np.ndarray],
+    bounds: np.ndarray,
+    rng: np.random.Generator,
+    **settings: object,
+) -> SurfaceSearch:
+    return fit_until_accepted(function, bounds, rng, SearchSettings(**settings))  # type: ignore[arg-type]
 
 
 def sample(n: int, bounds: np.ndarray, seed: int) -> np.ndarray:
@@ -298,7 +311,7 @@ class Counted:
 
 def test_search_takes_the_paper_sample_when_it_suffices() -> None:
     f = Counted(lambda x: x[:, 0] ** 3 + x[:, 1])
-    search = fit_until_accepted(f, BOX, np.random.default_rng(0))
+    search = search_for(f, BOX, np.random.default_rng(0))
     assert search.accepted
     assert search.surface.order == 3
     assert [len(x) for x in f.asked[1:]] == [5, 45]
@@ -307,9 +320,7 @@ def test_search_takes_the_paper_sample_when_it_suffices() -> None:
 
 def test_search_changes_the_order() -> None:
     f = Counted(lambda x: np.cos(2 * x[:, 0]) * x[:, 1] ** 2)
-    search = fit_until_accepted(
-        f, BOX, np.random.default_rng(1), n_test=20, r2_min=0.97, rmae_max=0.5
-    )
+    search = search_for(f, BOX, np.random.default_rng(1), n_test=20, r2_min=0.97, rmae_max=0.5)
     assert search.accepted
     assert [a.order for a in search.attempts] == [3, 2, 4]
     assert search.surface.order == 4
@@ -318,7 +329,7 @@ def test_search_changes_the_order() -> None:
 
 def test_search_raises_the_sample_by_new_points_and_keeps_the_test_points_apart() -> None:
     f = Counted(lambda x: np.sin(3 * x[:, 0]) + x[:, 1])
-    search = fit_until_accepted(
+    search = search_for(
         f, BOX, np.random.default_rng(2), orders=(7,), n_points=20, n_test=20, r2_min=0.99
     )
     assert search.accepted
@@ -334,7 +345,7 @@ def test_search_raises_the_sample_by_new_points_and_keeps_the_test_points_apart(
 def test_search_reports_that_noise_cannot_be_fitted() -> None:
     noise = np.random.default_rng(3)
     f = Counted(lambda x: noise.standard_normal(len(x)))
-    search = fit_until_accepted(f, BOX, np.random.default_rng(4), n_test=30, max_points=150)
+    search = search_for(f, BOX, np.random.default_rng(4), n_test=30, max_points=150)
     assert not search.accepted
     assert "no order of (3, 2, 4)" in search.reason
     assert [len(x) for x in f.asked[1:]] == [30, 45, 45, 60]  # never past max_points
@@ -342,13 +353,13 @@ def test_search_reports_that_noise_cannot_be_fitted() -> None:
 
 
 def test_search_accepts_a_constant_and_survives_failures() -> None:
-    constant = fit_until_accepted(lambda x: np.full(len(x), 0.1), BOX, np.random.default_rng(5))
+    constant = search_for(lambda x: np.full(len(x), 0.1), BOX, np.random.default_rng(5))
     assert constant.accepted
 
     def failing(x: np.ndarray) -> np.ndarray:
         return np.where(x[:, 0] > 0.8, np.nan, x.sum(axis=1))
 
-    search = fit_until_accepted(failing, BOX, np.random.default_rng(0), n_test=10)
+    search = search_for(failing, BOX, np.random.default_rng(0), n_test=10)
     assert search.accepted
     assert search.surface.n_dropped > 0
 
@@ -360,10 +371,10 @@ def test_search_refuses_what_cannot_work() -> None:
     rng = np.random.default_rng(6)
     f = Counted(nothing)
     with pytest.raises(InputError, match="test points"):
-        fit_until_accepted(f, BOX, rng)
+        search_for(f, BOX, rng)
     assert len(f.asked[1:]) == 1  # nothing was spent on training
     with pytest.raises(InputError, match=r"no surface could be fitted.*10 terms"):
-        fit_until_accepted(lambda x: x[:, 0], BOX, rng, orders=(3,), n_points=5, max_points=9)
+        search_for(lambda x: x[:, 0], BOX, rng, orders=(3,), n_points=5, max_points=9)
     for wrong in (
         {"orders": ()},
         {"n_test": 1},
@@ -371,13 +382,13 @@ def test_search_refuses_what_cannot_work() -> None:
         {"n_points": 50, "max_points": 49},
     ):
         with pytest.raises(InputError, match=next(iter(wrong))):
-            fit_until_accepted(lambda x: x[:, 0], BOX, rng, **wrong)
+            search_for(lambda x: x[:, 0], BOX, rng, **wrong)
 
 
 def test_search_repeats_bit_for_bit() -> None:
     def f(x: np.ndarray) -> np.ndarray:
         return np.exp(x[:, 0]) * x[:, 1]
 
-    one, two = (fit_until_accepted(f, BOX, np.random.default_rng(0)) for _ in range(2))
+    one, two = (search_for(f, BOX, np.random.default_rng(0)) for _ in range(2))
     np.testing.assert_array_equal(one.surface.coefficients, two.surface.coefficients)
     assert one.accuracy == two.accuracy

@@ -22,7 +22,7 @@ from hpcclear.statistics.sensitivity import (
 )
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
-from hpcclear.statistics.surrogate.surface_search import fit_until_accepted
+from hpcclear.statistics.surrogate.surface_search import SearchSettings, fit_until_accepted
 from hpcclear.study.run import Result, Run
 
 STAGE = "sensitivity"
@@ -258,12 +258,14 @@ def _surface(
         evaluate,
         bounds,
         run.rng("surface", " ".join(names), str(level)),
-        orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
-        n_points=2 * cut,
-        n_test=max(laid_out.n_test, 20),
-        max_points=cut * 2**settings.resamplings,
-        r2_min=settings.r2,
-        rmae_max=settings.rmae,
+        SearchSettings(
+            orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
+            n_points=2 * cut,
+            n_test=max(laid_out.n_test, 20),
+            max_points=cut * 2**settings.resamplings,
+            r2_min=settings.r2,
+            rmae_max=settings.rmae,
+        ),
     )
     return search.accuracy, search.surface.order, search.surface.n_points, search.accepted
 

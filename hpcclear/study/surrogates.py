@@ -16,7 +16,7 @@ from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
 from hpcclear.statistics.surrogate.stored import SCALARS, models_in
-from hpcclear.statistics.surrogate.subintervals import fit_subintervals
+from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 from hpcclear.study.run import Result, Run
 
 STAGE = "kriging"
@@ -48,15 +48,17 @@ def fit_all(run: Run) -> Result:
         model = fit_subintervals(
             lambda points, names=names: run.simulations.values(names, points, STAGE),  # type: ignore[misc]
             np.column_stack([region.lower, region.upper]),
+            SubintervalSettings(
+                samples=run.study.samples,
+                test_samples=_tests(run.study),
+                r2_min=settings.r2,
+                rmae_max=settings.rmae,
+                max_resamples=settings.resamplings,
+                max_depth=settings.cuts,
+                restarts=settings.restarts,
+            ),
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
-            samples=run.study.samples,
-            test_samples=_tests(run.study),
-            r2_min=settings.r2,
-            rmae_max=settings.rmae,
-            max_resamples=settings.resamplings,
-            max_depth=settings.cuts,
-            restarts=settings.restarts,
         )
         result |= _packed(k, model) | _checked(run, k, model, STAGE)
     return result

@@ -33,36 +33,12 @@ class _Box:
     wanted: list[np.ndarray] = field(default_factory=list)  # training and test points to evaluate
 
 
-def fit_subintervals(
-    evaluate: Evaluate,
-    bounds: np.ndarray,
-    *,
-    rng: np.random.Generator,
-    names: Sequence[str] | None = None,
-    cuts: Sequence[int] | None = None,
-    samples: int = 200,
-    test_samples: int = 100,
-    r2_min: float = 0.99,
-    rmae_max: float = 0.3,
-    max_resamples: int = 1,
-    max_depth: int = 3,
-    restarts: int = 3,
-    sample: Sampler = latin_hypercube,
-) -> PiecewiseKriging:
-    """Fit Kriging models on subintervals until each is accepted or a limit is reached.
+@dataclass(frozen=True)
+class SubintervalSettings:
+    """When a box is accepted, and what is done until it is.
 
-    Boxes of one generation are evaluated in a single call, so that many ranks can share it.
-
-    Parameters
+    Attributes
     ----------
-    evaluate : callable
-        The true function, ``(n, d)`` points to ``(n,)`` values, NaN where it failed.
-    bounds : (d, 2) array
-        The domain.
-    rng : numpy Generator
-        Every box draws from a stream of its own, spawned from this one.
-    names : sequence of str, optional
-        Names of the inputs.
     cuts : sequence of int, optional
         Subintervals of each input to begin with (default 1 each: a single model).
     samples, test_samples : int
@@ -75,6 +51,42 @@ def fit_subintervals(
         How often a box may be cut in half; a refused box at this depth stays, not accepted.
     restarts : int
         See `fit_kriging`.
+    """
+
+    cuts: Sequence[int] | None = None
+    samples: int = 200
+    test_samples: int = 100
+    r2_min: float = 0.99
+    rmae_max: float = 0.3
+    max_resamples: int = 1
+    max_depth: int = 3
+    restarts: int = 3
+
+
+def fit_subintervals(
+    evaluate: Evaluate,
+    bounds: np.ndarray,
+    settings: SubintervalSettings,
+    *,
+    rng: np.random.Generator,
+    names: Sequence[str] | None = None,
+    sample: Sampler = latin_hypercube,
+) -> PiecewiseKriging:
+    """Fit Kriging models on subintervals until each is accepted or a limit is reached.
+
+    Boxes of one generation are evaluated in a single call, so that many ranks can share it.
+
+    Parameters
+    ----------
+    evaluate : callable
+        The true function, ``(n, d)`` points to ``(n,)`` values, NaN where it failed.
+    bounds : (d, 2) array
+        The domain.
+    settings : SubintervalSettings
+    rng : numpy Generator
+        Every box draws from a stream of its own, spawned from this one.
+    names : sequence of str, optional
+        Names of the inputs.
     sample : callable
         ``sample(n, bounds, rng)`` draws points in a box.
 
@@ -87,27 +99,31 @@ def fit_subintervals(
     InputError
         As `fit_kriging` and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
-    pending, done = _first_boxes(np.asarray(bounds, dtype=np.float64), cuts, rng), []
+    pending, done = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng), []
+    counts = settings.samples, settings.test_samples
     for box in pending:
-        box.wanted = [sample(n, box.bounds, box.rng) for n in (samples, test_samples)]
+        box.wanted = [sample(n, box.bounds, box.rng) for n in counts]
     while pending:
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
         for box in pending:
             model = fit_kriging(
-                box.points, box.values, box.bounds, rng=box.rng, names=names, restarts=restarts
+                box.points,
+                box.values,
+                box.bounds,
+                rng=box.rng,
+                names=names,
+                restarts=settings.restarts,
             )
             reached = accuracy(box.truths, model.predict(box.tests))
-            accepted = reached.meets(r2_min, rmae_max)
-            if not accepted and box.resampled < max_resamples:
+            accepted = reached.meets(settings.r2_min, settings.rmae_max)
+            if not accepted and box.resampled < settings.max_resamples:
                 box.resampled += 1
-                box.wanted = [sample(samples, box.bounds, box.rng), box.tests[:0]]
+                box.wanted = [sample(settings.samples, box.bounds, box.rng), box.tests[:0]]
                 following.append(box)
-            elif not accepted and box.depth < max_depth:
+            elif not accepted and box.depth < settings.max_depth:
                 for half in _halves(box, int(np.argmin(model.length_scales))):
-                    half.wanted = [
-                        sample(n, half.bounds, half.rng) for n in (samples, test_samples)
-                    ]
+                    half.wanted = [sample(n, half.bounds, half.rng) for n in counts]
                     following.append(half)
             else:
                 done.append((model, reached, accepted))

@@ -57,18 +57,34 @@ class SurfaceSearch:
     attempts: tuple[Attempt, ...]
 
 
+@dataclass(frozen=True)
+class SearchSettings:
+    """What is tried, in which order, and when it is enough; the defaults follow the paper.
+
+    Attributes
+    ----------
+    orders : sequence of int
+        Total orders, the preferred one first.
+    n_points, n_test, max_points : int
+        First training sample, test points, and the largest training sample.
+    r2_min, rmae_max : float
+        Targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`.
+    """
+
+    orders: Sequence[int] = (3, 2, 4)
+    n_points: int = 45
+    n_test: int = 5
+    max_points: int = 360
+    r2_min: float = 0.9
+    rmae_max: float = 0.5
+
+
 def fit_until_accepted(
     evaluate: Evaluate,
     bounds: ArrayLike,
     rng: np.random.Generator,
-    *,
+    settings: SearchSettings,
     sample: Sampler = latin_hypercube,
-    orders: Sequence[int] = (3, 2, 4),
-    n_points: int = 45,
-    n_test: int = 5,
-    max_points: int = 360,
-    r2_min: float = 0.9,
-    rmae_max: float = 0.5,
 ) -> SurfaceSearch:
     """Raise the sample or change the order until a surface passes, or say that none does.
 
@@ -83,14 +99,9 @@ def fit_until_accepted(
         True function, (n, d) -> (n,).
     bounds : array_like, shape (d, 2)
     rng : numpy.random.Generator
+    settings : SearchSettings
     sample : callable
         ``sample(n, bounds, rng)`` -> points of shape (n, d).
-    orders : sequence of int
-        Total orders, the preferred one first.
-    n_points, n_test, max_points : int
-        First training sample, test points, and the largest training sample.
-    r2_min, rmae_max : float
-        Targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`.
 
     Returns
     -------
@@ -102,12 +113,13 @@ def fit_until_accepted(
         If no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
     limits = check_bounds(bounds)
-    _check_search(orders, n_points, n_test, max_points)
-    test = sample(n_test, limits, rng)
+    _check_search(settings)
+    orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
+    test = sample(settings.n_test, limits, rng)
     true = _test_values(evaluate(test))
     attempts: list[Attempt] = []
     best: tuple[ResponseSurface, Accuracy] | None = None
-    for points, values in _growing_sample(evaluate, sample, limits, rng, n_points, max_points):
+    for points, values in _growing_sample(evaluate, sample, limits, rng, settings):
         for order in orders:
             try:
                 surface = fit_response_surface(points, values, limits, order)
@@ -116,7 +128,7 @@ def fit_until_accepted(
                 continue
             reached = accuracy(true, surface.predict(test))
             attempts.append(Attempt(order, len(points), reached, ""))
-            if reached.meets(r2_min, rmae_max):
+            if reached.meets(*targets):
                 reason = f"order {order} on {len(points)} points meets the targets"
                 return SurfaceSearch(surface, reached, True, reason, tuple(attempts))
             if best is None or reached.rmse < best[1].rmse:
@@ -129,8 +141,8 @@ def fit_until_accepted(
             "raise max_points, lower the orders, or mend the failing simulations",
         )
     reason = (
-        f"no order of {tuple(orders)} reaches R2 >= {r2_min:g} and RMAE <= {rmae_max:g} with up to "
-        f"{attempts[-1].n_points} points; the best has R2 = {best[1].r2:.3g}, "
+        f"no order of {tuple(orders)} reaches R2 >= {targets[0]:g} and RMAE <= {targets[1]:g} "
+        f"with up to {attempts[-1].n_points} points; the best has R2 = {best[1].r2:.3g}, "
         f"RMAE = {best[1].rmae:.3g}"
     )
     return SurfaceSearch(*best, False, reason, tuple(attempts))
@@ -153,25 +165,27 @@ def _growing_sample(
     sample: Sampler,
     bounds: Array,
     rng: np.random.Generator,
-    n_points: int,
-    max_points: int,
+    settings: SearchSettings,
 ) -> Iterator[tuple[Array, Array]]:
     """The training sample, doubled each time by new points and never past `max_points`."""
-    points = sample(n_points, bounds, rng)
+    points = sample(settings.n_points, bounds, rng)
     values = evaluate(points)
     yield points, values
-    while len(points) < max_points:
-        more = sample(min(len(points), max_points - len(points)), bounds, rng)
+    while len(points) < settings.max_points:
+        more = sample(min(len(points), settings.max_points - len(points)), bounds, rng)
         points, values = np.vstack([points, more]), np.append(values, evaluate(more))
         yield points, values
 
 
-def _check_search(orders: Sequence[int], n_points: int, n_test: int, max_points: int) -> None:
-    if len(orders) == 0:
-        raise InputError("orders", tuple(orders), "no order to try", "list at least one")
-    if n_test < 2:
-        raise InputError("n_test", n_test, "R2 needs two test points", "take at least 2")
-    if not 1 <= n_points <= max_points:
+def _check_search(settings: SearchSettings) -> None:
+    if len(settings.orders) == 0:
+        raise InputError("orders", tuple(settings.orders), "no order to try", "list at least one")
+    if settings.n_test < 2:
+        raise InputError("n_test", settings.n_test, "R2 needs two test points", "take at least 2")
+    if not 1 <= settings.n_points <= settings.max_points:
         raise InputError(
-            "n_points", n_points, "outside 1 .. max_points", f"take 1 to {max_points} points"
+            "n_points",
+            settings.n_points,
+            "outside 1 .. max_points",
+            f"take 1 to {settings.max_points} points",
         )
