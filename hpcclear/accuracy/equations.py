@@ -17,6 +17,7 @@ OPEN, FORCE, RATE = 0, 1, 2
 """Columns of what `seen` holds at each joint: gap (m), contact force (N), rate of the gap (m/s)."""
 
 
+# eleven arguments: packed into a named tuple, a call from Python takes 32 us in place of 17
 @scalar_function
 def derivative(effects, n, par, torque_table, load_table, contacts, time, y, work, out, seen):
     """Write dy/dt at `time` since the start of the revolution to `out`, and what the joints show to `seen` (2, 3).

@@ -4,8 +4,10 @@ Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goe
 """
 
 import contextlib
+import functools
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +55,29 @@ _PROGRESS = click.option(
     show_default=True,
     help="How progress is shown.",
 )
+
+
+@dataclass(frozen=True)
+class _How:
+    """How a run is carried out: four options of a command, one argument of its function."""
+
+    fresh: bool
+    time_limit: float | None
+    interval: float
+    progress: Any
+
+
+def _with_how(command: Callable[..., int]) -> Callable[..., int]:
+    @_FRESH
+    @_LIMIT
+    @_INTERVAL
+    @_PROGRESS
+    @functools.wraps(command)
+    def gathered(**values: Any) -> int:
+        how = _How(**{field.name: values.pop(field.name) for field in fields(_How)})
+        return command(how=how, **values)
+
+    return gathered
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -169,10 +194,7 @@ def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None
     type=click.Path(path_type=Path),
     help="With --statistics: directory for the samples themselves.",
 )
-@_FRESH
-@_LIMIT
-@_INTERVAL
-@_PROGRESS
+@_with_how
 def sample(
     file: Path,
     overrides: tuple[str, ...],
@@ -180,10 +202,7 @@ def sample(
     points: Path | None,
     statistics: bool,
     raw: Path | None,
-    fresh: bool,
-    time_limit: float | None,
-    interval: float,
-    progress: Any,
+    how: _How,
 ) -> int:
     """Send the study's points, or a table of yours, through the dynamics.
 
@@ -197,7 +216,7 @@ def sample(
         from hpcclear.ensemble.statistics import run_statistics
 
         scene, place = _scene(file, overrides), _place(output)
-        options = Options(fresh, interval, progress)
+        options = Options(how.fresh, how.interval, how.progress)
         if statistics:
             kept = None if raw is None else _place(raw)
             describe_statistics(run_statistics(scene, place, ranks, raw=kept, options=options))
@@ -205,7 +224,7 @@ def sample(
             describe_samples(run_sample(scene, place, ranks, table=points, options=options))
 
     _check_kind(points, statistics, raw)
-    return _on_ranks(program, time_limit)
+    return _on_ranks(program, how.time_limit)
 
 
 @cli.command(short_help="Carry a whole study.")
