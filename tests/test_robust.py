@@ -245,18 +245,11 @@ def test_a_design_does_not_depend_on_its_batch():
 def test_monte_carlo_objective():
     arguments = (surrogate(), DESIGN, UNIFORM)
     by_chance = [
-        RobustObjective(
-            *arguments, method="monte-carlo", samples=4000, rng=np.random.default_rng(0)
-        )
-        for _ in range(2)
+        RobustObjective(*arguments, draws=(4000, np.random.default_rng(0))) for _ in range(2)
     ]
     places = designs(4)
     assert (by_chance[0](places) == by_chance[1](places)).all()
     np.testing.assert_allclose(by_chance[0](places), RobustObjective(*arguments)(places), rtol=0.1)
-    with pytest.raises(InputError, match="Monte Carlo"):
-        RobustObjective(*arguments, method="monte-carlo")
-    with pytest.raises(InputError, match="unknown"):
-        RobustObjective(*arguments, method="sobol")
 
 
 # Inputs that are derived: trained in r = I / m, tolerances in I and m
@@ -367,8 +360,7 @@ def test_piecewise_with_derived_inputs_takes_monte_carlo():
         DESIGN,
         UNIFORM,
         derived=RATIO,
-        method="monte-carlo",
-        rng=np.random.default_rng(0),
+        draws=(1000, np.random.default_rng(0)),
     )
     assert np.isfinite(objective(designs(3))).all()
 

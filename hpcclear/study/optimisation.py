@@ -83,15 +83,14 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(names))))
     probes = region.lower + np.concatenate([unit, corners]) * (region.upper - region.lower)
     askew = len(model.leaves) > 1 and any(set(one.of) & set(random) for one in derived)
+    by_draws = askew or study.swarm.statistics == "monte-carlo"
     objective = RobustObjective(
         model,
         names,
         [_random_input(study.random_input(name)) for name in random],
         derived=derived,
         probes=to_physical(scene, names, probes),
-        method="monte-carlo" if askew else study.swarm.statistics,
-        samples=study.swarm.monte_carlo_samples,
-        rng=rng,
+        draws=(study.swarm.monte_carlo_samples, rng) if by_draws else None,
     )
     return Problem(names, region, objective, scene)
 

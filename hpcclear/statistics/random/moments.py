@@ -81,7 +81,7 @@ class RobustObjective:
 
     On a `PiecewiseKriging` the rules are split at the borders of the boxes (each piece is smooth);
     this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
-    ``method="monte-carlo"``.
+    `draws`.
 
     Parameters
     ----------
@@ -96,13 +96,11 @@ class RobustObjective:
     probes : (m, k) array, optional
         Designs at which the nodes of derived inputs are chosen; spread them over the design space.
         Needed only where a derived input depends on a random one.
-    method : {"quadrature", "monte-carlo"}
     tolerance : float
         Absolute error allowed in the integral of any kernel (at most 1) over one random input.
-    samples : int
-        Of "monte-carlo"; all designs see the same draws, so that their ranking is not noise.
-    rng : numpy Generator, optional
-        Draws them; needed for "monte-carlo" only.
+    draws : (int, numpy Generator), optional
+        Monte Carlo in place of quadrature: how many draws, and what makes them. All designs see
+        the same ones, so that their ranking is not noise.
 
     Attributes
     ----------
@@ -125,21 +123,15 @@ class RobustObjective:
         fixed: Mapping[str, float] | None = None,
         derived: Sequence[Derived] = (),
         probes: np.ndarray | None = None,
-        method: str = "quadrature",
         tolerance: float = 1e-8,
-        samples: int = 1000,
-        rng: np.random.Generator | None = None,
+        draws: tuple[int, np.random.Generator] | None = None,
     ) -> None:
-        if method not in ("quadrature", "monte-carlo"):
-            raise InputError("method", method, "unknown", "use quadrature or monte-carlo")
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
         self._draws: dict[str, np.ndarray] | None = None
         self._rules: tuple[TensorRule, ...] = ()
-        if method == "monte-carlo":
-            if rng is None:
-                raise InputError("rng", None, "needed for Monte Carlo", "pass a numpy Generator")
-            self._draws = self._wiring.draw(samples, rng)
+        if draws is not None:
+            self._draws = self._wiring.draw(*draws)
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes) for leaf in model.leaves

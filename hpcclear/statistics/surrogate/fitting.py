@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,29 +63,15 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    lengths, signal, noise, alpha = _maximise_likelihood(
-        unit, (outcomes - mean) / scale, rng, restarts
-    )
-    return Kriging(
-        names=labels,
-        lower=lower,
-        upper=upper,
-        length_scales=lengths,
-        signal_variance=signal,
-        noise_variance=noise,
-        mean=mean,
-        scale=scale,
-        inputs=inputs,
-        values=values[valid],
-        alpha=alpha,
-        dropped=int((~valid).sum()),
-    )
+    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts)
+    samples = {"inputs": inputs, "values": values[valid], "dropped": int((~valid).sum())}
+    return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples)
 
 
 def _maximise_likelihood(
     unit: np.ndarray, normalised: np.ndarray, rng: np.random.Generator, restarts: int
-) -> tuple[np.ndarray, float, float, np.ndarray]:
-    """Length scales, signal and noise variance, and alpha, of normalised data in the unit cube."""
+) -> dict[str, Any]:
+    """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
     # Imported here: only fitting needs scikit-learn, and loading it takes a second.
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
@@ -104,12 +91,12 @@ def _maximise_likelihood(
         warnings.simplefilter("ignore", ConvergenceWarning)
         regressor.fit(unit, normalised)
     product, white = regressor.kernel_.k1, regressor.kernel_.k2
-    return (
-        np.atleast_1d(product.k2.length_scale),
-        float(product.k1.constant_value),
-        float(white.noise_level),
-        regressor.alpha_,
-    )
+    return {
+        "length_scales": np.atleast_1d(product.k2.length_scale),
+        "signal_variance": float(product.k1.constant_value),
+        "noise_variance": float(white.noise_level),
+        "alpha": regressor.alpha_,
+    }
 
 
 def _check_shapes(
