@@ -72,6 +72,19 @@ def case(name: str, method: str, rtol: float, revolutions: int = 2):
 # ---- coefficients -----------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", [float, complex])
+def test_coefficients_are_real_whatever_type_the_roots_come_in(monkeypatch, kind):
+    # NumPy 2.5 returns complex roots, earlier ones real ones.
+    roots = lobatto.legendre.legroots
+    expected = lobatto.matrices()
+    monkeypatch.setattr(lobatto.legendre, "legroots", lambda c: roots(c).real.astype(kind))
+    assert lobatto.nodes().dtype == np.float64
+    for matrix, same in zip(lobatto.matrices(), expected, strict=True):
+        assert matrix.dtype == np.float64
+        assert np.array_equal(matrix, same)
+
+
 def test_nodes_are_lobatto_points():
     x = 2.0 * lobatto.nodes() - 1.0
     assert len(x) == lobatto.STAGES + 1

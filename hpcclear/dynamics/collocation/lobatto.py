@@ -61,7 +61,7 @@ MOST_SWEEPS = 12.0
 def nodes() -> Array:
     """The nine Lobatto points on [0, 1]."""
     last = np.eye(_ROWS)[STAGES]
-    inner = legendre.legroots(legendre.legder(last))
+    inner = legendre.legroots(legendre.legder(last)).real  # complex from NumPy 2.5 on
     for _ in range(3):  # Newton: the eigenvalue solver leaves a few units in the last place
         first, second = legendre.legder(last), legendre.legder(last, 2)
         inner -= legendre.legval(inner, first) / legendre.legval(inner, second)
