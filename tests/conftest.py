@@ -1,6 +1,47 @@
-"""One thread for BLAS and Numba before numpy loads: tests share the cores with other processes."""
+"""One thread for BLAS and Numba before numpy loads, and other seeds for the statistical tests."""
 
 import os
 
+import pytest
+
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+    os.environ.setdefault(_name, "1")  # tests share the cores with other processes
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--other-seeds",
+        type=int,
+        default=0,
+        help="only statistical tests, with so many other seeds",
+    )
+
+
+@pytest.fixture(scope="module")
+def shift() -> int:
+    """What a statistical test adds to its seeds: 0, or 100, 200, ... with ``--other-seeds``."""
+    return 0
+
+
+def pytest_generate_tests(metafunc):
+    others = metafunc.config.getoption("--other-seeds")
+    if others and "shift" in metafunc.fixturenames:
+        shifts = [100 * (k + 1) for k in range(others)]
+        metafunc.parametrize("shift", shifts, scope="module", ids=lambda k: f"shift{k}")
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--other-seeds"):
+        items[:] = [item for item in items if "shift" in item.fixturenames]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """What was to spare at each limit of `margins` goes with the report, for repeat_statistical.py."""
+    import margins
+
+    margins.TO_SPARE.clear()
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("to spare", list(margins.TO_SPARE)))

@@ -15,6 +15,21 @@ FALSE_RED = 1e-3
 
 RESAMPLES = 10_000
 
+TO_SPARE: list[float] = []
+"""How far above or below its limit each number of the running test was; `repeat_statistical.py` collects it."""
+
+
+def at_least(value: float, limit: float) -> None:
+    """Assert ``value >= limit``."""
+    TO_SPARE.append(float(value - limit))
+    assert value >= limit, f"{value} is below {limit}"
+
+
+def at_most(value: float, limit: float) -> None:
+    """Assert ``value <= limit``."""
+    TO_SPARE.append(float(limit - value))
+    assert value <= limit, f"{value} is above {limit}"
+
 
 def fewest(trials: int, share: float) -> int:
     """Fewest hits of `trials` that still agree with a true share of at least `share` (binomial)."""

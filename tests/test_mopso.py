@@ -3,6 +3,7 @@
 import moocore
 import numpy as np
 import pytest
+from margins import at_least, at_most
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
@@ -94,23 +95,23 @@ def test_full_budget_hypervolume(name):
     ("name", "least"), [("zdt1", 0.868), ("zdt2", 0.534), ("zdt3", 1.320), ("dtlz2", 0.725)]
 )
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_reduced_budget_hypervolume(name, least, seed):
+def test_reduced_budget_hypervolume(name, least, seed, shift):
     function, dimensions, _ = PROBLEMS[name]
-    front = run(function, dimensions, seed, 100)
-    assert moocore.hypervolume(front.values, 1.1) >= least
+    front = run(function, dimensions, seed + shift, 100)
+    at_least(moocore.hypervolume(front.values, 1.1), least)
 
 
-def test_front_is_the_closed_form():
-    front = run(zdt1, 30, 3, 100)
+def test_front_is_the_closed_form(shift):
+    front = run(zdt1, 30, 3 + shift, 100)
     f1 = np.linspace(0, 1, 500)
     known = np.stack([f1, 1 - np.sqrt(f1)], axis=1)
-    assert moocore.igd_plus(front.values, known) < 4e-3
+    at_most(moocore.igd_plus(front.values, known), 4e-3)
     assert np.allclose(zdt1(front.points), front.values, rtol=0, atol=1e-14)
 
 
-def test_without_mutation_it_is_still_a_swarm():
-    front = run(zdt1, 30, 1, 250, settings=SwarmSettings(mutation_share=0.0))
-    assert moocore.hypervolume(front.values, 1.1) >= 0.8700
+def test_without_mutation_it_is_still_a_swarm(shift):
+    front = run(zdt1, 30, 1 + shift, 250, settings=SwarmSettings(mutation_share=0.0))
+    at_least(moocore.hypervolume(front.values, 1.1), 0.8700)
 
 
 def test_velocity_follows_equations_22_and_23():
@@ -255,8 +256,8 @@ def test_hypervolume_of_known_sets():
     assert relative_gain(np.array([[2.05e-4]]), np.array([[2e-4]])) == pytest.approx(0.025 / 1.1)
 
 
-def test_constrained_front_of_bnh():
-    rng = np.random.default_rng(5)
+def test_constrained_front_of_bnh(shift):
+    rng = np.random.default_rng(5 + shift)
     front = minimise(bnh, [(0, 5), (0, 3)], iterations=100, rng=rng)
     _, violations = bnh(front.points)
     assert violations.max() <= 0.0
@@ -265,25 +266,24 @@ def test_constrained_front_of_bnh():
     along = np.linspace(0, 5, 2000)
     known, _ = bnh(np.stack([along, np.minimum(along, 3)], axis=1))
     scale = known.max(axis=0)
-    assert moocore.igd_plus(front.values / scale, known / scale) < 3e-3
-    assert hypervolume(front.values, np.array([140.0, 50.0])) == pytest.approx(
-        hypervolume(known, np.array([140.0, 50.0])), rel=5e-3
-    )
+    at_most(moocore.igd_plus(front.values / scale, known / scale), 3e-3)
+    worst = np.array([140.0, 50.0])
+    at_most(abs(hypervolume(front.values, worst) / hypervolume(known, worst) - 1.0), 5e-3)
 
 
-def test_swarm_finds_a_narrow_feasible_band():
-    front = run(narrow, 10, 2, 100)
+def test_swarm_finds_a_narrow_feasible_band(shift):
+    front = run(narrow, 10, 2 + shift, 100)
     assert np.all(np.abs(front.points[:, 0] - 0.5) <= 0.1)
     f1 = np.linspace(0.4, 0.6, 300)
     known = np.stack([f1, 1 - np.sqrt(f1)], axis=1)
-    assert moocore.igd_plus(front.values, known) < 1e-3
+    at_most(moocore.igd_plus(front.values, known), 1e-3)
 
 
-def test_violations_lead_to_the_feasible_region_when_none_is_known():
+def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
     def far_corner(x):  # feasible where all ten are at most 0.02: a share of 1e-17 of the box
         return x[:, :2], x - 0.02
 
-    front = run(far_corner, 10, 1, 100)
+    front = run(far_corner, 10, 1 + shift, 100)
     assert len(front.points) >= 1
     assert front.points.max() <= 0.02
 
@@ -454,14 +454,14 @@ def test_generator_state_includes_the_half_used_word():
     )
 
 
-def test_failed_points_never_enter_the_archive():
-    front = run(one_point_nan, 5, 1, 60)
+def test_failed_points_never_enter_the_archive(shift):
+    front = run(one_point_nan, 5, 1 + shift, 60)
     assert front.failed > 0
     assert np.isfinite(front.values).all()
     assert front.points[:, 0].max() <= 0.5
     assert f"{front.failed} of 6000 points failed" in front.remark
     f1 = np.linspace(0, 0.5, 300)
-    assert moocore.igd_plus(front.values, np.stack([f1, 1 - np.sqrt(f1)], axis=1)) < 3e-3
+    at_most(moocore.igd_plus(front.values, np.stack([f1, 1 - np.sqrt(f1)], axis=1)), 3e-3)
 
 
 def test_infinite_values_and_nan_violations_are_infeasible():

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from margins import at_most
 from scipy.special import stdtrit
 from sklearn.linear_model import LinearRegression
 from sklearn.preprocessing import PolynomialFeatures
@@ -199,18 +200,18 @@ def test_leave_one_out_does_not_exist_at_leverage_one() -> None:
     assert errors[1] == pytest.approx(0.4)
 
 
-def test_standard_errors_cover_the_truth_as_often_as_they_say() -> None:
+def test_standard_errors_cover_the_truth_as_often_as_they_say(shift: int) -> None:
     runs, middle = 600, MASSES.mean(axis=1)
     truth = np.array([1e-4, -2e-4]) * 2 / np.ptp(MASSES, axis=1)
-    surfaces = [noisy_fit(seed) for seed in range(runs)]
+    surfaces = [noisy_fit(seed) for seed in range(10 * shift, 10 * shift + runs)]
     slopes, errors = np.moveaxis([s.gradient(middle) for s in surfaces], 1, 0)
     for level in (0.5, 0.8, 0.95):
         t = stdtrit(surfaces[0].degrees_of_freedom, 0.5 + level / 2)
         covered = np.mean(np.abs(slopes - truth) <= t * errors, axis=0)
         limit = 4 * np.sqrt(level * (1 - level) / runs)
-        assert (np.abs(covered - level) < limit).all(), (level, covered)
+        at_most(np.abs(covered - level).max(), limit)
     variances = [s.residual_variance for s in surfaces]
-    assert np.mean(variances) == pytest.approx(4e-10, rel=4 * np.sqrt(2 / 20 / runs))
+    at_most(abs(np.mean(variances) / 4e-10 - 1.0), 4 * np.sqrt(2 / 20 / runs))
 
 
 def test_failed_values_are_dropped_and_counted() -> None:

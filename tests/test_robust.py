@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from margins import at_least, at_most
 from scipy import stats
 from scipy.integrate import quad
 
@@ -162,19 +163,24 @@ def test_bad_distributions_are_refused(make):
 # Standard errors
 
 
-def test_standard_errors_are_honest():
-    """Over 2000 repetitions the estimates scatter as much as their standard errors say."""
-    rng = np.random.default_rng(0)
-    for draw, deviation in [
-        (rng.normal(3.0, 2.0, (2000, 400)), 2.0),
-        (rng.uniform(0.0, 1.0, (2000, 400)), 12**-0.5),
-        (rng.exponential(1.0, (2000, 400)), 1.0),
+def test_standard_errors_are_honest(shift):
+    """Over 2000 repetitions the estimates scatter as much as their standard errors say.
+
+    The ratio itself scatters by 0.016. Of 400 exponential numbers the heavy tail is seldom whole, and the fourth moment
+    comes out too small: the error of the deviation is 5 % too small on average.
+    """
+    rng = np.random.default_rng(shift)
+    for draw, deviation, allowed in [
+        (rng.normal(3.0, 2.0, (2000, 400)), 2.0, 0.08),
+        (rng.uniform(0.0, 1.0, (2000, 400)), 12**-0.5, 0.08),
+        (rng.exponential(1.0, (2000, 400)), 1.0, 0.12),
     ]:
         found = sample_moments(draw)
-        assert found.mean.std() == pytest.approx(found.mean_error.mean(), rel=0.08)
-        assert found.deviation.std() == pytest.approx(found.deviation_error.mean(), rel=0.08)
+        at_most(abs(found.mean.std() / found.mean_error.mean() - 1.0), 0.08)
+        at_most(abs(found.deviation.std() / found.deviation_error.mean() - 1.0), allowed)
         covered = abs(found.deviation - deviation) < 2 * found.deviation_error
-        assert 0.9 < covered.mean() < 0.98
+        at_least(covered.mean(), 0.9)
+        at_most(covered.mean(), 0.98)
 
 
 def test_few_or_equal_samples():

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from margins import at_least, at_most, fewest
 from SALib.test_functions import Ishigami, Sobol_G
 
 from hpcclear.base.errors import InputError
@@ -129,21 +130,21 @@ def test_a_cubic_converges_at_once() -> None:
 
 
 @pytest.mark.parametrize("sigma", [0.0, 1e-6, 1e-5, 5e-5])
-def test_loop_finds_the_interval_and_the_derivative(sigma: float) -> None:
+def test_loop_finds_the_interval_and_the_derivative(sigma: float, shift: int) -> None:
     truth, n_seeds = slopes(CLEARANCES), 30
     score, found, steps = [], [], []
-    for seed in range(n_seeds):
+    for seed in range(shift, shift + n_seeds):
         verdict = convergence_intervals(history(with_noise(curved, sigma, seed), seed))
         found.append(verdict.found)
         score.append((verdict.sensitivity - truth) / verdict.uncertainty)
         steps.append(verdict.interval[verdict.found])
     within = np.abs(np.array(score)[np.array(found)])
-    assert np.mean(found) > 0.93
-    assert np.mean(within <= 2) > 0.93  # 95 % by right, 180 cases
-    assert within.max() < 4.5
+    at_least(np.count_nonzero(found), fewest(np.size(found), 0.95))
+    at_least(np.count_nonzero(within <= 2), fewest(within.size, 0.95))
+    at_most(within.max(), 4.5)
     # short enough for sin(3 u) where f is clean, and no shorter than the noise leaves sense in
     wanted = {0.0: 2.0, 1e-6: 2.0, 1e-5: 1.5, 5e-5: 1.0}[sigma]
-    assert np.concatenate(steps).mean() > wanted
+    at_least(np.concatenate(steps).mean(), wanted)
 
 
 def test_wide_interval_alone_would_be_wrong() -> None:
@@ -399,12 +400,13 @@ def test_known_indices(
     bounds: np.ndarray,
     truth: Callable[[], tuple[np.ndarray, np.ndarray]],
     seed: int,
+    shift: int,
 ) -> None:
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed + shift)
     found = sobol_indices(function, bounds, rng, 2**14, n_resamples=20)
     first, total = truth()
-    np.testing.assert_allclose(found.first, first, atol=0.01, rtol=0)
-    np.testing.assert_allclose(found.total, total, atol=0.01, rtol=0)
+    at_most(np.abs(found.first - first).max(), 0.01)
+    at_most(np.abs(found.total - total).max(), 0.01)
     assert (found.n_rows, found.n_dropped) == (2**14, 0)
 
 
@@ -413,14 +415,14 @@ def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -
     return sobol_indices(function, TORUS, rng, 256, **options)
 
 
-def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say() -> None:
+def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say(shift: int) -> None:
     truth = np.concatenate(ishigami_truth())
     held = []
-    for seed in range(40):
+    for seed in range(shift, shift + 40):
         found = small(seed)
         limits = np.vstack([found.first_limits, found.total_limits])
         held.append((limits[:, 0] <= truth + 1e-12) & (truth - 1e-12 <= limits[:, 1]))
-    assert np.mean(held) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 240)
+    at_least(np.count_nonzero(held), fewest(np.size(held), 0.95))
 
 
 def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
@@ -430,10 +432,10 @@ def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
     assert ((wide.total_limits[:, 0] < wide.total) & (wide.total < wide.total_limits[:, 1])).all()
 
 
-def test_additive_function_on_a_skewed_box_shares_its_variance_exactly() -> None:
+def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: int) -> None:
     bounds = np.array([[0.0, 1.0], [5.0, 7.0], [-1e-3, 1e-3]])
     found = sobol_indices(
-        lambda x: 1e6 + x.sum(axis=1), bounds, np.random.default_rng(0), 4096
+        lambda x: 1e6 + x.sum(axis=1), bounds, np.random.default_rng(shift), 4096
     )  # a large mean must not spoil it
     variances = np.ptp(bounds, axis=1) ** 2 / 12
     np.testing.assert_allclose(found.first, variances / variances.sum(), atol=2e-3)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from margins import bootstrap, fewest, ratio_of_medians
+from margins import at_least, at_most, bootstrap, fewest, ratio_of_medians
 
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.evaluator import evaluate_records
@@ -14,9 +14,9 @@ SCENE = "jobs/quickstart.toml"
 
 
 @pytest.fixture(scope="module")
-def box():
+def box(shift):
     """600 random scenes of Table 3's box, C from 0.3 to 1 mm, each with its uncertainty at two tolerances."""
-    scene = load_scene(SCENE, ["numerics.uncertainty=true", "study.seed=2"])
+    scene = load_scene(SCENE, ["numerics.uncertainty=true", f"study.seed={2 + shift}"])
     points = latin_hypercube(scene, 600)
     return [evaluate_records(scene.with_({"numerics.rtol": rtol}), points) for rtol in (1e-6, 3e-7)]
 
@@ -25,7 +25,7 @@ def test_runs_at_two_tolerances_overlap_within_their_stated_uncertainties(box):
     one, other = box
     apart = np.abs(one["objective"] - other["objective"])
     stated = one["objective_uncertainty"] + other["objective_uncertainty"]
-    assert np.count_nonzero(apart <= stated) >= fewest(len(apart), 0.95)
+    at_least(np.count_nonzero(apart <= stated), fewest(len(apart), 0.95))
 
 
 def test_the_stated_uncertainty_is_no_excuse(box):
@@ -38,33 +38,34 @@ def test_the_stated_uncertainty_is_no_excuse(box):
     apart = np.abs(one["objective"] - other["objective"])
     for records in box:
         stated = records["objective_uncertainty"]
-        assert bootstrap(ratio_of_medians, stated, apart, side="lower") <= 3.0
+        at_most(bootstrap(ratio_of_medians, stated, apart, side="lower"), 3.0)
 
 
-def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box):
-    scene = load_scene(SCENE, ["study.seed=2"])
+def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box, shift):
+    scene = load_scene(SCENE, [f"study.seed={2 + shift}"])
     points = latin_hypercube(scene, 600).take(slice(0, 40))
     plain = evaluate_records(scene, points)
     np.testing.assert_array_equal(plain["objective"], box[0]["objective"][:40])
     assert np.isnan(plain["objective_uncertainty"]).all()
 
 
-def test_well_posed_scenes_state_a_small_uncertainty():
-    scene = load_scene(
-        SCENE, ["numerics.uncertainty=true", 'effects.contact={law="hunt-crossley", damping=0.5}']
-    )
+def test_well_posed_scenes_state_a_small_uncertainty(shift):
+    contact = 'effects.contact={law="hunt-crossley", damping=0.5}'
+    seed = f"study.seed={1 + shift}"
+    scene = load_scene(SCENE, ["numerics.uncertainty=true", contact, seed])
     records = evaluate_records(scene, latin_hypercube(scene, 24))
-    assert np.median(records["objective_uncertainty"] / records["objective"]) < 1e-5
+    at_most(np.median(records["objective_uncertainty"] / records["objective"]), 1e-5)
     assert (records["flags"] & Flag.LATCHED == 0).all()
 
 
-def test_automatic_average_meets_its_target_or_says_that_it_did_not():
+def test_automatic_average_meets_its_target_or_says_that_it_did_not(shift):
     scene = load_scene(
         SCENE,
         [
             "numerics.averaged_revolutions=auto",
             "numerics.objective_tolerance=2e-3",
             "numerics.max_steps=10000000",
+            f"study.seed={1 + shift}",
         ],
     )
     points = latin_hypercube(scene, 96)
@@ -73,13 +74,13 @@ def test_automatic_average_meets_its_target_or_says_that_it_did_not():
     assert np.isfinite(loose["objective"]).all()
     tight = {"numerics.objective_tolerance": 1e-9, "numerics.max_averaged_revolutions": 12}
     capped = evaluate_records(scene.with_(tight), points)
-    assert (capped["status"] == Status.AVERAGE_CAP).sum() > 72
+    at_least((capped["status"] == Status.AVERAGE_CAP).sum(), fewest(len(capped), 0.9))
     assert np.isfinite(capped["objective"]).all()
     # against a long average, few leave four times the standard error that was asked for
     long = evaluate_records(scene.with_({"numerics.averaged_revolutions": 400}), points)
     error = np.abs(loose["objective"] / long["objective"] - 1.0)
     met = error[loose["status"] == Status.OK] < 4 * 2e-3
-    assert np.count_nonzero(met) >= fewest(len(met), 0.9)
+    at_least(np.count_nonzero(met), fewest(len(met), 0.9))
 
 
 def test_penetration_beyond_hertz_is_flagged():
