@@ -142,7 +142,7 @@ def test_sampled_results_alone_make_a_report(tmp_path: Path) -> None:
     (tmp_path / "broken.nc").write_bytes(b"not a NetCDF file")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
     assert [t for t, _ in tree.elements].count("img") == 2
-    for kind in ("sensitivity", "kriging", "front", "verification", "claims", "accuracy"):
+    for kind in ("sensitivity", "kriging", "front", "verification", "accuracy"):
         assert f"{kind}.nc:" in tree.text
     assert "broken.nc was left out" in tree.text
     assert "no animation" in tree.text
@@ -207,7 +207,7 @@ def test_a_solution_knows_its_direct_simulation(page: Path) -> None:
     simulated = {(p["case"], p["name"]) for p in solutions if p["direct"]}
     assert ("robust", "run 0, solution 3") in simulated
     assert ("robust", "run 0, solution 1") not in simulated
-    assert {p["kind"] for p in points} == {"solution", "design", "original", "paper"}
+    assert {p["kind"] for p in points} == {"solution", "design", "original", "printed"}
     assert [p["x"] for p in points] == sorted(p["x"] for p in points)
 
 
@@ -326,7 +326,9 @@ def test_hover_shows_and_click_changes_the_panel(browser: Browser, page: Path) -
         "const s = document.getElementById('front-view'); s.value = 'all'; s.dispatchEvent(new Event('change'));"
     )
     assert browser.run("return document.querySelectorAll('#front .point').length;") == len(points)
-    index = next(k for k, p in enumerate(points) if p["kind"] == "paper" and p["case"] == "robust")
+    index = next(
+        k for k, p in enumerate(points) if p["kind"] == "printed" and p["case"] == "robust"
+    )
     browser.point(f"[data-index='{index}']", press=False)
     browser.wait("document.getElementById('front-panel').innerText.includes('robust paper alpha')")
     assert "By direct simulation" not in _panel(browser)

@@ -281,7 +281,10 @@ def test_stage_defaults_are_the_papers() -> None:
     study = load_scene(content).study
     assert study is not None
     assert written.study is not None
-    assert (study.groups, study.models) == (written.study.groups, written.study.models)
+    assert study.groups == written.study.groups
+    pairs = [model for model in written.study.models if model != written.study.optimisation]
+    assert study.models == (*pairs, study.names)
+    assert study.optimisation == study.names
     assert (study.swarm, study.verification) == (written.study.swarm, written.study.verification)
 
 

@@ -1,8 +1,10 @@
 """The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
 
+import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -17,13 +19,22 @@ from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
+from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
-from hpcclear.study import extent, optimisation, responses, run_study, simulations, surrogates
-from hpcclear.study.paper import claims
-from hpcclear.study.paper import readings as audit
+from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.study import (
+    extent,
+    optimisation,
+    paper,
+    responses,
+    run_study,
+    simulations,
+    surrogates,
+)
+from hpcclear.study.paper import claims, readings
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -232,7 +243,7 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
 
     monkeypatch.setattr(Ranks, "run_points", counted)
     monkeypatch.setattr(responses, "simulate", respond)
-    monkeypatch.setattr(audit, "simulate", respond)
+    monkeypatch.setattr(readings, "simulate", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
     assert dict(made) == said
@@ -402,10 +413,91 @@ def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, m
     assert samples["objective"].attrs["units"] == samples["mean_gap"].attrs["units"] == "m"
     assert not (place / "claims.nc").exists()
     assert not (place / "readings.nc").exists()
-    assert np.isnan(dataset.read(place / "verification.nc")["mean_paper"]).all()
+    assert "mean_paper" not in dataset.read(place / "verification.nc")
     told: list[str] = []
     run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
     assert told == [f"{place} holds the finished study."]
+
+
+OWN_NAMES = {
+    "m1": "crank_mass",
+    "u1": "crank_centre",
+    "I1": "crank_inertia",
+    "m2": "rod_mass",
+    "u2": "rod_centre",
+    "I2": "rod_inertia",
+    "m3": "slider_mass",
+    "C": "play",
+}
+
+
+def own_scene(*overrides: str):
+    """The same study under names of one's own."""
+    text = formula.PHYSICS + formula.STUDY
+    for short, name in OWN_NAMES.items():
+        text = re.sub(rf'"{short}"', f'"{name}"', text)
+        given = json.dumps(list(SHORT_NAMES[short]))
+        text = re.sub(rf"(?m)^{short} = {{ range", f"{name} = {{ paths = {given}, range", text)
+        text = re.sub(rf"(?m)^{short} = {{ ratio", f"{name} = {{ paths = {given}, ratio", text)
+        text = re.sub(rf"(?m)^{short} = {{ distr", f"{name} = {{ distr", text)
+    return load_scene(tomllib.loads(text), overrides)
+
+
+def test_names_decide_nothing():
+    plain, own = scene_of(), own_scene()
+    for theirs, ours in (
+        (plain.study.groups, own.study.groups),
+        (plain.study.models, own.study.models),
+    ):
+        assert [tuple(OWN_NAMES[name] for name in group) for group in theirs] == list(ours)
+    assert own.study.sensitivity.parameter == "play"
+    assert paper.is_the_papers(own)
+    assert paper.own_names(own) == OWN_NAMES
+    names = [choice.name for choice in paper.printed_designs(own)]
+    assert names == [choice.name for choice in paper.printed_designs(plain)]
+    assert paper.printed_designs(own)[0].design["rod_inertia"] == 1.2432e-4
+
+
+@pytest.mark.parametrize(
+    ("entry", "cites", "compares"),
+    [
+        ("numerics.rtol=1e-7", True, True),
+        ("effects.contact.restitution=0.5", True, True),
+        ("drive.speed=3000 rpm", True, False),
+        ("study.objective=peak-contact-force", True, False),
+        ("mechanism.rod.length=0.13", False, False),
+        ("joints.crank_rod.bearing_radius=21 mm", False, False),
+        ("joints.rod_slider.bearing.youngs_modulus=2 GPa", False, False),
+    ],
+)
+def test_the_papers_scene_is_recognised_by_what_it_holds(entry, cites, compares):
+    scene = scene_of(entry)
+    assert bool(scene.references) == cites
+    assert paper.is_the_papers(scene) == compares
+    assert bool(paper.files(scene)) == compares
+    assert bool(paper.printed_designs(scene)) == compares
+
+
+OF_THE_PAPER = re.compile(
+    r"paper|claim|table 4|printed|readings|varying joint clearance", re.IGNORECASE
+)
+
+
+def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path):
+    scene, place = own_scene("mechanism.rod.length=0.13"), tmp_path / "out"
+    run_study(scene, place, alone(), progress_style="quiet")
+    written = {path.name for path in place.glob("*.nc")}
+    kinds = ("samples", "sensitivity", "kriging", "front", "verification", "timing")
+    assert written == {f"{kind}.nc" for kind in kinds}
+    for path in place.rglob("*.nc"):
+        found = dataset.read(path)
+        assert "references" not in found.attrs
+        assert not any(name.endswith("_paper") for name in found.data_vars)
+    assert not any("paper" in name for name in dataset.read(place / "front.nc")["case"].values)
+    shutil.rmtree(place / "responses")  # those of the formula lack what figures draw
+    page = write_report(place).read_text(encoding="utf-8")
+    page = re.sub(r'src="data:[^"]*"', "", page)
+    assert OF_THE_PAPER.findall(page.replace(str(tmp_path), "")) == []
 
 
 OF_THE_OBJECTIVE = {
@@ -518,7 +610,7 @@ def test_differences_count_only_beyond_their_scatter():
     rng = np.random.default_rng(2)
     series = np.ones((3, 10, 3, 4)) + 0.01 * rng.normal(size=(3, 10, 3, 4))
     series[1] *= 0.8
-    found = claims.Responses({"names": np.array(["a", "b", "c"]), "statistics": series})
+    found = claims.ResponseEvidence({"names": np.array(["a", "b", "c"]), "statistics": series})
     quantity = responses.QUANTITIES[0]
     assert found.judged([("b", "a", "peak", quantity, -1)])[0] == claims.HOLDS
     assert found.judged([("b", "a", "peak", quantity, 1)])[0] == claims.FAILS

@@ -70,7 +70,7 @@ def measure(
         coords.update(some_coords)
         data.update(some_data)
     attributes = {
-        **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+        **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
         "profile": profile.name,
         "command": shlex.join(sys.argv),
         "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",

@@ -3,7 +3,7 @@
 from typing import Any
 
 from hpcclear.scene import Scene
-from hpcclear.scene.variables import PAPER_PATHS
+from hpcclear.scene.variables import SHORT_NAMES
 
 CASE = "about_the_scene"
 WIDTH = 0.2
@@ -46,10 +46,10 @@ def _by_quadrature(scene: Scene) -> Scene:
 def _variables(scene: Scene) -> dict[str, Any]:
     """Rod mass, slider mass and the clearances, each about the scene's value."""
     known = set(scene.numeric_paths())
-    clearances = {scene.number(path) for path in PAPER_PATHS["C"] if path in known}
+    clearances = {scene.number(path) for path in SHORT_NAMES["C"] if path in known}
     names = ["m2", "m3", *(["C"] if len(clearances) == 1 else ["C12", "C23"])]
     rows = {}
     for name in names:
-        value = scene.number(next(path for path in PAPER_PATHS[name] if path in known))
+        value = scene.number(next(path for path in SHORT_NAMES[name] if path in known))
         rows[name] = {"range": [(1.0 - WIDTH) * value, (1.0 + WIDTH) * value]}
     return rows

@@ -182,7 +182,7 @@ def simulate(scene: Scene) -> xr.Dataset:
     return dataset.response_dataset(
         times,
         {**data, **outcome},
-        dataset.provenance(named.text or named.to_toml(), named.hash)
+        dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(reason)
         | {"integrator": integrator_of(scene, single=True)},
     )

@@ -13,7 +13,7 @@ from hpcclear.dynamics.target import recorded, resolve
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.variables import PAPER_PATHS
+from hpcclear.scene.variables import SHORT_NAMES
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
@@ -41,12 +41,12 @@ def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
 
 
 def _paths(scene: Scene, name: str) -> tuple[str, ...]:
-    """Scene entries that a name drives: the study's, the paper's, or a path itself."""
+    """Scene entries that a name drives: the study's, a short name's, or a path itself."""
     if scene.study is not None and name in scene.study.names:
         return scene.study.variable(name).paths
-    if name in PAPER_PATHS:
+    if name in SHORT_NAMES:
         known = set(scene.numeric_paths())
-        return tuple(path for path in PAPER_PATHS[name] if path in known)
+        return tuple(path for path in SHORT_NAMES[name] if path in known)
     scene.number(name)  # refuses what is no number of this scene
     return (name,)
 
@@ -58,7 +58,7 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     ----------
     scene : Scene
     points : Points or mapping of str to array
-        Designs: names as in the paper (``m2``, ``C``), of the study, or dotted scene paths; values in SI, shape (n,)
+        Designs: short names (``m2``, ``C``), those of the study, or dotted scene paths; values in SI, shape (n,)
         or scalars.
 
     Returns
@@ -79,5 +79,6 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
         designs.values,
         dict(zip(designs.names, designs.units, strict=True)),
         records,
-        dataset.provenance(scene.text or scene.to_toml(), scene.hash) | recorded(reason),
+        dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
+        | recorded(reason),
     )

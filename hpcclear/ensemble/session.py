@@ -209,7 +209,7 @@ class Session:
             with self.ranks.stage("settings"):
                 chosen, reason = resolve(scene, points)
         self.attributes = {
-            **dataset.provenance(scene.text or scene.to_toml(), scene.hash),
+            **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             **recorded(reason),
             **key_attribute(self.key),
         }

@@ -23,10 +23,6 @@ from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kin
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
-_REFERENCE = (
-    "Robust Optimization of Planar Constrained Mechanical System with Varying Joint Clearance "
-    "Size Based on Sensitivity Analysis"
-)
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
 _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
@@ -239,13 +235,21 @@ def timing_dataset(
     return dataset("timing", coords, {**data, "command": command}, attributes)
 
 
-def provenance(scene: str, scene_hash: str) -> dict[str, str]:
-    """Global attributes that say what made a file; no time in them: equal runs, equal bytes."""
+def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, str]:
+    """Global attributes that say what made a file; no time in them: equal runs, equal bytes.
+
+    Parameters
+    ----------
+    scene, scene_hash : str
+        Its text and the hash of its content.
+    references : str
+        Published work that its numbers are taken from; "" leaves the attribute out.
+    """
     version = metadata.version("hpcclear")
     return {
         "source": f"hpcclear {version}",
         "history": f"written by hpcclear {version}",
-        "references": _REFERENCE,
+        **({"references": references} if references else {}),
         "scene": scene,
         "scene_hash": scene_hash,
         "hpcclear_version": version,

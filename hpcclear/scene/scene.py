@@ -7,7 +7,7 @@ import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene import describing, domain
+from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.fields import invalid
 from hpcclear.scene.paths import PHYSICAL, replace
 from hpcclear.scene.tables import SceneTables, plain
@@ -82,6 +82,11 @@ class Scene(SceneTables):
     def warnings(self) -> tuple[str, ...]:
         """What is allowed and still deserves a look, a sentence each."""
         return tuple(describing.warnings(self))
+
+    @property
+    def references(self) -> str:
+        """Title of the published work the mechanism is taken from, "" for one of its user's own."""
+        return citation.cited_by(self)
 
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""

@@ -1,4 +1,8 @@
-"""Settings of the study's stages; the defaults are the paper's values where it states them."""
+"""Settings of the study's stages.
+
+Sizes and weights default to the values of the paper this program began with where it states
+them; names never decide a default, only what a variable drives does.
+"""
 
 from typing import Annotated, Literal
 
@@ -15,9 +19,11 @@ class Sensitivity(Table):
     """Response surfaces and first-order sensitivities (the paper's sections 4.2 and 5)."""
 
     groups: tuple[Names, ...] | None = None
-    """Inputs fitted together; default the paper's pairs, as far as they are study variables."""
-    parameter: str = "C"
-    """The study variable held fixed for each surface."""
+    """Inputs fitted together; default the masses, mass centres and inertias of each two links that are
+    joined, as far as they are study variables."""
+    parameter: str | None = None
+    """The study variable held fixed for each surface; default the one that drives clearances, if
+    there is just one."""
     levels: Annotated[int, Count(1, 1000)] = 8
     """Values of the parameter, evenly over its range."""
     samples: Annotated[int, Count(1, 10**6)] = 45
@@ -61,10 +67,9 @@ class Surrogate(Table):
     """Kriging models (the paper's section 4.2)."""
 
     models: tuple[Names, ...] | None = None
-    """Inputs of each model; default the paper's five, as far as they are study variables."""
+    """Inputs of each model; default each group of the sensitivity with its parameter."""
     optimisation: Names | None = None
-    """The model the swarm searches; default m2, m3, u2, I2, C as far as they are study variables,
-    else all."""
+    """The model the swarm searches; default all study variables."""
     r2: Accuracy = 0.99
     """Least 1 - SSE/SST on the test points."""
     rmae: Positive = 0.4

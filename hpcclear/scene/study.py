@@ -1,5 +1,6 @@
 """The [study] table: what is varied, how it is sampled, and the settings of each stage."""
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
@@ -8,16 +9,10 @@ from pydantic import model_validator
 
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
-from hpcclear.scene.variables import Case, RandomInput, Variable
+from hpcclear.scene.variables import SHORT_NAMES, Case, RandomInput, Variable
 
-PAPER_GROUPS = (("m1", "m2"), ("m2", "m3"), ("u1", "u2"), ("I1", "I2"))
-PAPER_MODELS = (
-    ("m1", "m2", "C"),
-    ("m2", "m3", "C"),
-    ("u1", "u2", "C"),
-    ("I1", "I2", "C"),
-    ("m2", "m3", "u2", "I2", "C"),
-)
+_LINKS = ("crank", "rod", "slider")  # in the order they are joined
+_LINK_NUMBERS = ("mass", "mass_center", "inertia")
 
 
 class Study(Table):
@@ -50,8 +45,8 @@ class Study(Table):
     @model_validator(mode="before")
     @classmethod
     def _fill_in(cls, data: Any) -> Any:
-        """Cases as plain lists of names, and random inputs with the paths of the variable of that
-        name."""
+        """Cases as plain lists of names, random inputs with the paths of the variable of that name,
+        and the sensitivity's parameter."""
         if not isinstance(data, Mapping):
             return data
         data = dict(data)
@@ -65,6 +60,9 @@ class Study(Table):
             data["random"] = {
                 name: _with_paths(row, variables.get(name)) for name, row in random.items()
             }
+        stage = data.get("sensitivity", {})
+        if isinstance(variables, Mapping) and isinstance(stage, Mapping):
+            data["sensitivity"] = {"parameter": _only_clearance(variables), **stage}
         return data
 
     @model_validator(mode="after")
@@ -188,6 +186,13 @@ class Study(Table):
                 key="surrogate.models",
             )
         if self.sensitivity.groups:
+            if self.sensitivity.parameter is None:
+                raise invalid(
+                    "no study variable, or more than one, drives a clearance, "
+                    "so what is held fixed for each surface is not known",
+                    f"Name one of {', '.join(self.names)}",
+                    key="sensitivity.parameter",
+                )
             if self.sensitivity.parameter not in self.names:
                 raise invalid(
                     f"{self.sensitivity.parameter!r} is not a study variable",
@@ -246,23 +251,30 @@ class Study(Table):
         """Inputs of the response surfaces, fitted at each level of the sensitivity's parameter."""
         if self.sensitivity.groups is not None:
             return self.sensitivity.groups
-        usable = self.sensitivity.parameter in self.names
-        return tuple(group for group in PAPER_GROUPS if usable and set(group) <= set(self.names))
+        if self.sensitivity.parameter not in self.names:
+            return ()
+        owner = {row.paths[0]: row.name for row in self.variables if len(row.paths) == 1}
+        pairs = (
+            (owner.get(f"mechanism.{one}.{number}"), owner.get(f"mechanism.{other}.{number}"))
+            for number in _LINK_NUMBERS
+            for one, other in itertools.pairwise(_LINKS)
+        )
+        return tuple((one, other) for one, other in pairs if one is not None and other is not None)
 
     @property
     def models(self) -> tuple[Names, ...]:
         """Inputs of the Kriging models; the last one, `optimisation`, is always among them."""
         models = self.surrogate.models
         if models is None:
-            models = tuple(model for model in PAPER_MODELS if set(model) <= set(self.names))
+            parameter = self.sensitivity.parameter
+            models = tuple((*group, parameter) for group in self.groups if parameter is not None)
         return (*(model for model in models if model != self.optimisation), self.optimisation)
 
     @property
     def optimisation(self) -> Names:
         """Inputs of the model the swarm searches."""
-        if self.surrogate.optimisation is not None:
-            return self.surrogate.optimisation
-        return tuple(name for name in PAPER_MODELS[-1] if name in self.names) or self.names
+        chosen = self.surrogate.optimisation
+        return self.names if chosen is None else chosen
 
     def design_variables(self, case: str) -> Names:
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""
@@ -281,6 +293,21 @@ def _with_paths(row: Any, variable: Any) -> Any:
     if "path" in row or "paths" in row:
         return row
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
+
+
+def _only_clearance(variables: Mapping[str, Any]) -> str | None:
+    """Name of the only study variable that drives clearances; None if there is none or another."""
+    found = []
+    for name, row in variables.items():
+        own = row if isinstance(row, Mapping) else {}
+        paths = own.get("paths", own.get("path", SHORT_NAMES.get(name, ())))
+        paths = (paths,) if isinstance(paths, str) else paths
+        clear = isinstance(paths, (list, tuple)) and {
+            str(path).endswith(".clearance") for path in paths
+        }
+        if clear == {True}:
+            found.append(name)
+    return found[0] if len(found) == 1 else None
 
 
 def _enough(inputs: int, order: int, samples: int, key: str) -> None:

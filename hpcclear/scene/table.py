@@ -13,13 +13,13 @@ from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.units import UnitError, decimal, factor, to_si
-from hpcclear.scene.variables import PAPER_PATHS
+from hpcclear.scene.variables import SHORT_NAMES
 
 
 def read_points(path: str | Path, scene: Scene) -> Points:
     """A user's table of designs, a CSV file.
 
-    The first row names the columns: study variables, the paper's names (m2, C, ...), or dotted
+    The first row names the columns: study variables, short names (m2, C, ...), or dotted
     scene paths, each with an optional unit, as in ``C [mm]``. Every further row is a design; lines
     that are empty or begin with # are left out.
 
@@ -117,7 +117,7 @@ def _column(cell: str, scene: Scene, key: str) -> _Column:
     name, unit = found.group(1), found.group(2) or ""
     numbers = scene.numeric_paths()
     of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
-    named = {**PAPER_PATHS, **of_study}
+    named = {**SHORT_NAMES, **of_study}
     paths = tuple(path for path in named.get(name, (name,)) if path in numbers)
     if not paths:
         remedy = nearest(name, (*named, *numbers))

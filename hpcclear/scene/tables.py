@@ -15,7 +15,7 @@ from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.study import Study
-from hpcclear.scene.variables import PAPER_PATHS
+from hpcclear.scene.variables import SHORT_NAMES
 
 
 class SceneTables(Table):
@@ -62,7 +62,7 @@ class SceneTables(Table):
             return data  # the models below say what is wrong with it
         if len(ideal) != 1:
             return data
-        paths = [path for path in PAPER_PATHS["C"] if f".{ideal[0]}." not in path]
+        paths = [path for path in SHORT_NAMES["C"] if f".{ideal[0]}." not in path]
         for key, table in tables.items():
             row = table.get("C") if isinstance(table, Mapping) else None
             if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
@@ -138,7 +138,7 @@ class SceneTables(Table):
         open_paths = [f"joints.{name}.clearance" for name in self.clearance_joints()]
         for table in ("variables", "random"):
             for name, row in content.get("study", {}).get(table, {}).items():
-                paths = PAPER_PATHS.get(name, ())
+                paths = SHORT_NAMES.get(name, ())
                 own = [p for p in paths if p in open_paths or not p.startswith("joints.")]
                 if row["paths"] == own:
                     del row["paths"]

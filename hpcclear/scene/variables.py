@@ -12,7 +12,7 @@ from hpcclear.base.outcome import ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, invalid, nearest
 from hpcclear.scene.paths import quantities
 
-PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
+SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
     "m1": ("mechanism.crank.mass",),
     "u1": ("mechanism.crank.mass_center",),
     "I1": ("mechanism.crank.inertia",),
@@ -24,7 +24,9 @@ PAPER_PATHS: Mapping[str, tuple[str, ...]] = {
     "C12": ("joints.crank_rod.clearance",),
     "C23": ("joints.rod_slider.clearance",),
 }
-"""The paper's names (Table 3), and one name for each clearance."""
+"""Names that stand for scene entries where no path is given; nothing else depends on a name."""
+
+LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 
 RESERVED = frozenset(
     (
@@ -52,12 +54,12 @@ def _resolve_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
     given = data.get("paths", data.get("path"))
     key = "path" if "path" in data else "paths"
     if given is None:
-        if name not in PAPER_PATHS:
+        if name not in SHORT_NAMES:
             raise invalid(
                 "is not one of the known names, so it needs a path",
-                f'Add path = "drive.speed", say; known names are {", ".join(PAPER_PATHS)}',
+                f'Add path = "drive.speed", say; known names are {", ".join(SHORT_NAMES)}',
             )
-        return PAPER_PATHS[name]
+        return SHORT_NAMES[name]
     paths = (given,) if isinstance(given, str) else given
     if (
         not isinstance(paths, (list, tuple))
@@ -167,7 +169,7 @@ class Variable(NamedInput):
 
 def is_link_inertia(path: str) -> bool:
     """Whether the path is the inertia of crank or rod, which scales with m L^2/12."""
-    return path in (*PAPER_PATHS["I1"], *PAPER_PATHS["I2"])
+    return path in LINK_INERTIAS
 
 
 class RandomInput(NamedInput):

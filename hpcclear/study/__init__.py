@@ -1,4 +1,4 @@
-"""The study, from a scene to verified designs (the paper's Fig. 4): read this after the README.
+"""The study, from a scene to verified designs: read this after the README.
 
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
@@ -7,8 +7,8 @@
    mean, beta the least deviation.
 4. Verification: these designs back through the true dynamics by direct Monte Carlo. Where the
    surrogate's mean is off, it gets more points there and the swarm starts again.
-5. Findings: responses of the optimised designs, the paper's claims tested on them, and the paper's
-   own designs under the possible readings of its text.
+5. Findings: responses of the optimised designs; for the scene of a publication also what it prints
+   and claims, beside ours (`hpcclear.study.paper`).
 
 Root tells this story; every simulation in it goes to all ranks. Each stage is kept on disk when it
 is done, and each finished sample within seconds, so that the same command goes on where it stopped
@@ -32,12 +32,9 @@ from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study import optimisation, responses, sensitivities, surrogates, verification
+from hpcclear.study import optimisation, paper, responses, sensitivities, surrogates, verification
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.paper import claims
-from hpcclear.study.paper import printed as paper
-from hpcclear.study.paper import readings as audit
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.simulations import Simulations
 
 __all__ = ["run_study"]
@@ -108,10 +105,12 @@ def _carry_out(scene: Scene, session: Session) -> None:
     compile_ahead(scene, session.ranks, points, style)
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
-    _tell_the_story(Run(scene, directory, session.ranks, checkpoint, simulations, session.tell))
+    _tell_the_story(
+        StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell)
+    )
 
 
-def _tell_the_story(run: Run) -> None:
+def _tell_the_story(run: StudyRun) -> None:
     sensitivity: Result | None = None
     if run.study.groups:
         sensitivity = run.stage("sensitivity", sensitivities.analyse)
@@ -130,14 +129,12 @@ def _tell_the_story(run: Run) -> None:
     true = {name: np.concatenate([found.true[name], rest[name]]) for name in rest}
     designs = [*found.designs, *designs]
     optimisation.write(run, found.fronts, designs)
-    verification.write(run, designs, true, found.model, found.remarks)
+    printed = paper.printed_moments(run.scene, designs)
+    verification.write(run, designs, true, found.model, found.remarks, printed)
 
     series = run.stage("responses", responses.simulate_all, designs)
     responses.write(run, designs)
-    if audit.applies(run.scene):
-        audit.write(run, run.stage("readings", audit.evaluate))
-    if paper.is_comparable(run.scene):
-        claims.write(run, claims.judge(run, sensitivity, found.kriging, series))
+    paper.write_findings(run, sensitivity, found.kriging, series)
 
 
 @dataclass(frozen=True)
@@ -156,7 +153,7 @@ class _Found:
         return surrogates.models_of(self.kriging)[-1]
 
 
-def _search_until_true(run: Run, kriging: Result) -> _Found:
+def _search_until_true(run: StudyRun, kriging: Result) -> _Found:
     """Optimise and verify alpha and beta; add points where the surrogate fails, until it holds."""
     remarks: list[str] = []
     round_ = 0
@@ -180,7 +177,7 @@ def _search_until_true(run: Run, kriging: Result) -> _Found:
         round_ += 1
 
 
-def _write_samples(run: Run) -> None:
+def _write_samples(run: StudyRun) -> None:
     """Write samples.nc: all simulations so far, the points that surfaces and models are made of."""
     with run.ranks.writing():
         run.checkpoint.flush()
@@ -194,6 +191,5 @@ def _write_samples(run: Run) -> None:
 def _results(scene: Scene) -> list[str]:
     """Files of a study that is finished."""
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
-    names += ["claims.nc"] if paper.is_comparable(scene) else []
     names += ["sensitivity.nc"] if scene.required_study.groups else []
-    return names + (["readings.nc"] if audit.applies(scene) else [])
+    return names + paper.files(scene)

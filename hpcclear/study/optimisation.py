@@ -21,7 +21,7 @@ from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
 
 PROBES = 64
@@ -130,7 +130,7 @@ def _ratio(scene: Scene, inertia: str) -> Derived:
     return Derived(coordinate(study.variable(variable[inertia])), tuple(of), function)
 
 
-def optimise(run: Run, model: PiecewiseKriging) -> Result:
+def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
     """All runs of the swarm on all cases.
 
     Returns
@@ -161,7 +161,7 @@ def optimise(run: Run, model: PiecewiseKriging) -> Result:
     return result
 
 
-def _search(run: Run, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
     settings = run.study.swarm
 
     def function(coordinates: Array) -> Array:
@@ -194,16 +194,13 @@ class Choice:
     design : dict of str to float
         SI.
     place : (int, int) or None
-        Run and solution, for one that stands on a front.
-    printed : (float, float) or None
-        Mean and deviation printed in the paper.
+        Run of the swarm and solution, for one that stands on a front.
     """
 
     name: str
     case: str
     design: Mapping[str, float]
     place: tuple[int, int] | None = None
-    printed: tuple[float, float] | None = None
 
 
 _ENDS = ((-2, "alpha"), (-1, "beta"))
@@ -215,7 +212,7 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
     return 2 * len(_ENDS) * len(study.cases), study.verification.designs * len(study.cases)
 
 
-def extremes(run: Run, fronts: Result) -> list[Choice]:
+def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
     """Alpha (least mean) and beta (least deviation) of each case.
 
     Averaged over the runs, as the paper does it, in sampling coordinates, so that the average keeps
@@ -238,7 +235,7 @@ def extremes(run: Run, fronts: Result) -> list[Choice]:
     return chosen
 
 
-def spread(run: Run, fronts: Result) -> list[Choice]:
+def spread(run: StudyRun, fronts: Result) -> list[Choice]:
     """Points spread along the joint front of each case's runs, without its two ends."""
     chosen = []
     for index, case in enumerate(run.study.cases):
@@ -264,13 +261,13 @@ def _nondominated(values: Array) -> NDArray[np.intp]:
     return np.sort(order[values[order, 1] < lowest])
 
 
-def _design(run: Run, case: str, coordinates: Array) -> dict[str, float]:
+def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
     names = run.study.design_variables(case)
     values = to_physical(run.scene, names, coordinates[None])[0]
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def write(run: Run, fronts: Result, verified: Sequence[Choice]) -> None:
+def write(run: StudyRun, fronts: Result, verified: Sequence[Choice]) -> None:
     """Write front.nc: every run's front of every case, and which solutions were simulated."""
     cases = [case.name for case in run.study.cases]
     names = run.study.optimisation

@@ -12,7 +12,7 @@ from hpcclear.results.dataset import variable_name
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 
 QUANTITIES = ("contact force 1", "contact force 2", "crank moment", "slider acceleration")
 """O12, O23, the reaction moment on the crank, and the slider."""
@@ -21,7 +21,7 @@ STATISTICS = ("mean", "fluctuation", "peak")
 """Mean of the magnitude, standard deviation, largest magnitude."""
 
 
-def compared(run: Run, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
+def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
     """Names and designs whose responses are compared: the original, alpha and beta of each case."""
     known = {choice.name: choice for choice in designs}
     cases = [case.name for case in run.study.cases]
@@ -34,7 +34,7 @@ def simulations(study: Study) -> int:
     return 2 * (1 + 2 * len(study.cases))
 
 
-def scene_of(run: Run, choice: Choice, revolutions: int) -> Scene:
+def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
     """The scene of one design, at the clearance of the comparison, without a study."""
     settings = run.study.verification
     changes: dict[str, object] = {"study": None, "numerics.averaged_revolutions": revolutions}
@@ -45,7 +45,7 @@ def scene_of(run: Run, choice: Choice, revolutions: int) -> Scene:
     return run.scene.with_(changes)
 
 
-def simulate_all(run: Run, designs: Sequence[Choice]) -> Result:
+def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """Statistics of each design's steady response, stretch by stretch.
 
     Returns
@@ -68,7 +68,7 @@ def simulate_all(run: Run, designs: Sequence[Choice]) -> Result:
     return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
 
 
-def write(run: Run, designs: Sequence[Choice]) -> None:
+def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10."""
     folder = run.directory / "responses"
     folder.mkdir(exist_ok=True)

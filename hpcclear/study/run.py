@@ -21,7 +21,7 @@ Result = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Run:
+class StudyRun:
     """What every stage needs.
 
     Attributes

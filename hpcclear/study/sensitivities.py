@@ -23,7 +23,7 @@ from hpcclear.statistics.sensitivity import (
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
 from hpcclear.statistics.surrogate.surface_search import SearchSettings, fit_until_accepted
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 
 STAGE = "sensitivity"
 _NORMAL_95 = 1.959963984540054
@@ -45,7 +45,14 @@ def simulations(study: Study) -> int:
     return study.sensitivity.levels * each + _sobol_rows(study) * (len(study.names) + 2)
 
 
-def analyse(run: Run) -> Result:
+def parameter(run: StudyRun) -> str:
+    """The study variable that is held fixed for each surface."""
+    name = run.study.sensitivity.parameter
+    assert name is not None  # by validation, where there are surfaces
+    return name
+
+
+def analyse(run: StudyRun) -> Result:
     """Simulate all surfaces' points as one batch, then fit, differentiate and rank.
 
     Returns
@@ -55,9 +62,8 @@ def analyse(run: Run) -> Result:
     """
     designs = _designs(run)
     inputs = surfaces(run.study)
-    parameter = run.study.sensitivity.parameter
     batches = [
-        run.simulations.designs((*names, parameter), design.points).values
+        run.simulations.designs((*names, parameter(run)), design.points).values
         for names, design in zip(inputs, designs, strict=True)
     ]
     sobol = _sobol_points(run)
@@ -73,7 +79,7 @@ def analyse(run: Run) -> Result:
     return result
 
 
-def write(run: Run, result: Result) -> None:
+def write(run: StudyRun, result: Result) -> None:
     """Write sensitivity.nc."""
     data = {k: v for k, v in result.items() if k not in ("interval", "clearance", "failed")}
     coords = {
@@ -90,9 +96,9 @@ def write(run: Run, result: Result) -> None:
     run.write(content, "sensitivity.nc")
 
 
-def _designs(run: Run) -> list[IntervalDesign]:
+def _designs(run: StudyRun) -> list[IntervalDesign]:
     settings = run.study.sensitivity
-    lower, upper = run.study.variable(settings.parameter).bounds
+    lower, upper = run.study.variable(parameter(run)).bounds
     clearances = np.linspace(lower, upper, settings.levels)
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
@@ -117,17 +123,17 @@ def _layouts(study: Study) -> list[IntervalSettings]:
     ]
 
 
-def _bounds(run: Run, names: Sequence[str]) -> Array:
+def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
     region = box(run.scene, names)
     return np.column_stack([region.lower, region.upper])
 
 
-def _columns(run: Run, names: Sequence[str]) -> list[int]:
+def _columns(run: StudyRun, names: Sequence[str]) -> list[int]:
     return [run.study.names.index(name) for name in names]
 
 
 def _first_order(
-    run: Run,
+    run: StudyRun,
     inputs: Sequence[Sequence[str]],
     designs: Sequence[IntervalDesign],
     values: Sequence[Array],
@@ -181,7 +187,7 @@ def _levels(design: IntervalDesign, values: Array) -> Result:
     return {"mean_objective": found[0], "mean_objective_error": found[1]}
 
 
-def _ranked(run: Run, inputs: Sequence[Sequence[str]], result: Result) -> Result:
+def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> Result:
     """Ranking and X_G-I; each variable in each surface is a column of its own."""
     where = [(k, name) for k, names in enumerate(inputs) for name in names]
     names = [name for _, name in where]
@@ -205,7 +211,7 @@ def _ranked(run: Run, inputs: Sequence[Sequence[str]], result: Result) -> Result
 
 
 def _accepted(
-    run: Run,
+    run: StudyRun,
     inputs: Sequence[Sequence[str]],
     designs: Sequence[IntervalDesign],
     values: Sequence[Array],
@@ -230,7 +236,7 @@ def _accepted(
 
 
 def _surface(
-    run: Run, names: Sequence[str], design: IntervalDesign, values: Array, level: int
+    run: StudyRun, names: Sequence[str], design: IntervalDesign, values: Array, level: int
 ) -> tuple[Accuracy | None, int, int, bool]:
     """Accuracy, order and points of a surface, and whether it was accepted."""
     settings, laid_out = run.study.sensitivity, design.settings
@@ -252,7 +258,7 @@ def _surface(
     def evaluate(at: Array) -> Array:
         column = np.full(len(at), clearance)
         where = np.column_stack([at, column])
-        return run.simulations.values((*names, settings.parameter), where, STAGE)
+        return run.simulations.values((*names, parameter(run)), where, STAGE)
 
     search = fit_until_accepted(
         evaluate,
@@ -270,7 +276,7 @@ def _surface(
     return search.accuracy, search.surface.order, search.surface.n_points, search.accepted
 
 
-def _sobol_points(run: Run) -> Array:
+def _sobol_points(run: StudyRun) -> Array:
     rows = _sobol_rows(run.study)
     if rows == 0:
         return np.empty((0, len(run.study.names)))
@@ -283,7 +289,7 @@ def _sobol_rows(study: Study) -> int:
     return rows if rows >= 2 else 0
 
 
-def _global(run: Run, values: Array | None) -> Result:
+def _global(run: StudyRun, values: Array | None) -> Result:
     """Sobol indices over the whole box, the clearance among the inputs."""
     count = len(run.study.names)
     if values is None:

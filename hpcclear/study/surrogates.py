@@ -17,7 +17,7 @@ from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
 from hpcclear.statistics.surrogate.stored import SCALARS, models_in
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 
 STAGE = "kriging"
 _CHECKS = ("r2", "rmae", "r2_explained", "rmae_mean", "rmse")
@@ -28,13 +28,13 @@ def coordinate(variable: Variable) -> str:
     return variable.name if variable.ratio is None else f"{variable.name}_ratio"
 
 
-def domain(run: Run, names: Sequence[str]) -> Box:
+def domain(run: StudyRun, names: Sequence[str]) -> Box:
     """Where a model holds; the optimisation's is widened so that no random input leaves it."""
     widen = {name for case in run.study.cases for name in case.random}
     return box(run.scene, names, sorted(widen) if tuple(names) == run.study.optimisation else ())
 
 
-def fit_all(run: Run) -> Result:
+def fit_all(run: StudyRun) -> Result:
     """Fit every model of the study (method: `hpcclear.statistics.surrogate.subintervals`), and check each.
 
     Returns
@@ -85,7 +85,7 @@ def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
     return found
 
 
-def grow(run: Run, before: Result, coordinates: Array, stage: str) -> Result:
+def grow(run: StudyRun, before: Result, coordinates: Array, stage: str) -> Result:
     """The last model, the optimisation's, with further training points (adaptive infill).
 
     Parameters
@@ -111,7 +111,7 @@ def grow(run: Run, before: Result, coordinates: Array, stage: str) -> Result:
 
 
 def _refitted(
-    run: Run, leaf: Kriging, points: Array, values: Array, rng: np.random.Generator
+    run: StudyRun, leaf: Kriging, points: Array, values: Array, rng: np.random.Generator
 ) -> Kriging:
     if len(points) == 0:
         return leaf
@@ -129,7 +129,7 @@ def _packed(k: int, model: PiecewiseKriging) -> Result:
     return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
 
 
-def _checked(run: Run, k: int, model: PiecewiseKriging, stage: str) -> Result:
+def _checked(run: StudyRun, k: int, model: PiecewiseKriging, stage: str) -> Result:
     """Accuracy over the whole domain on fresh points, which decided nothing."""
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
@@ -140,7 +140,7 @@ def _checked(run: Run, k: int, model: PiecewiseKriging, stage: str) -> Result:
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
 
 
-def write(run: Run, result: Result) -> None:
+def write(run: StudyRun, result: Result) -> None:
     """Write kriging.nc: a row for each subinterval's model."""
     models = models_of(result)
     leaves = [(k, leaf) for k, model in enumerate(models) for leaf in model.leaves]
@@ -188,7 +188,7 @@ def _label(model: PiecewiseKriging, family: str, leaf: Kriging) -> str:
     return family if len(model.leaves) == 1 else f"{family} {model.leaves.index(leaf) + 1}"
 
 
-def _units(run: Run) -> dict[str, str]:
+def _units(run: StudyRun) -> dict[str, str]:
     """Units of sampling coordinates, "1" for ratios."""
     return {
         coordinate(variable): "1"

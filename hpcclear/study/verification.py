@@ -1,6 +1,6 @@
 """Chosen designs back through the true dynamics: direct Monte Carlo, and what the surrogate missed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.special import ndtri
@@ -14,12 +14,12 @@ from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.study import surrogates
 from hpcclear.study.optimisation import Choice, problem_of
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 
 _COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
 
 
-def original(run: Run) -> list[Choice]:
+def original(run: StudyRun) -> list[Choice]:
     """The design in the scene file, in each case."""
     found = []
     for case in run.study.cases:
@@ -29,7 +29,7 @@ def original(run: Run) -> list[Choice]:
     return found
 
 
-def samples_of(run: Run, choice: Choice, count: int, purpose: str = "verification") -> Points:
+def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
     """Monte Carlo samples of a design in all study variables.
 
     Every design of a case meets the same scatter, so that differences between designs are not
@@ -42,7 +42,7 @@ def samples_of(run: Run, choice: Choice, count: int, purpose: str = "verificatio
     return run.simulations.filled(points.names, points.values)
 
 
-def simulate(run: Run, choices: Sequence[Choice], stage: str) -> Result:
+def simulate(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
     """True mean and deviation of designs with standard errors, arrays over the designs.
 
     Raises
@@ -74,7 +74,7 @@ def moments(values: Array) -> tuple[float, float, float, float, int]:
     return mean, mean_error, float(found.deviation[0]), float(found.deviation_error[0]), failed
 
 
-def predicted(run: Run, choices: Sequence[Choice], model: PiecewiseKriging) -> Array:
+def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging) -> Array:
     """Mean and deviation by the surrogate, (n, 2); NaN outside its domain."""
     problems = {case.name: problem_of(run.scene, case.name, model) for case in run.study.cases}
     found = [
@@ -87,7 +87,7 @@ def predicted(run: Run, choices: Sequence[Choice], model: PiecewiseKriging) -> A
 
 
 def misses(
-    run: Run, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
+    run: StudyRun, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
 ) -> tuple[list[Choice], list[str]]:
     """Designs at which the surrogate is further from the truth than the study allows; in words."""
     settings, missed, texts = run.study.verification, [], []
@@ -104,7 +104,7 @@ def misses(
     return missed, texts
 
 
-def infill_points(run: Run, choices: Sequence[Choice], label: str) -> Array:
+def infill_points(run: StudyRun, choices: Sequence[Choice], label: str) -> Array:
     """Where the surrogate needs more points: over the scatter of the designs it missed, (n, d).
 
     In sampling coordinates of the optimisation's model.
@@ -122,13 +122,28 @@ def infill_points(run: Run, choices: Sequence[Choice], label: str) -> Array:
 
 
 def write(
-    run: Run,
+    run: StudyRun,
     choices: Sequence[Choice],
     true: Result,
     model: PiecewiseKriging,
     remarks: Sequence[str],
+    printed: Mapping[str, Array],
 ) -> None:
-    """Write verification.nc."""
+    """Write verification.nc.
+
+    Parameters
+    ----------
+    run : StudyRun
+    choices : sequence of Choice
+    true : dict of arrays, shape (n,)
+        Of `simulate`, over the same designs.
+    model : PiecewiseKriging
+        The surrogate that was searched.
+    remarks : sequence of str
+        What a reader should know, a sentence each.
+    printed : mapping of str to array, shape (n,)
+        ``mean`` and ``deviation`` of the same designs in a publication, to stand beside ours.
+    """
     study, surrogate = run.study, predicted(run, choices, model)
     z = float(ndtri(0.5 + study.verification.confidence / 2.0))
     used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]
@@ -142,9 +157,8 @@ def write(
         data[f"{name}_upper"] = true[name] + z * true[f"{name}_error"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
-        data[f"{name}_paper"] = np.array(
-            [np.nan if choice.printed is None else choice.printed[column] for choice in choices]
-        )
+        if name in printed:
+            data[f"{name}_paper"] = printed[name]
     data["failed"] = true["failed"].astype(np.int64)
     data["samples"] = np.full(len(choices), study.verification.samples)
     units = {name: study.variable(name).unit or "1" for name in used}

@@ -17,8 +17,8 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.study import responses, run_study
-from hpcclear.study.paper import readings as audit
-from hpcclear.study.run import Run
+from hpcclear.study.paper import readings
+from hpcclear.study.run import StudyRun
 
 PHYSICS = """
 format_version = 1
@@ -79,6 +79,7 @@ sobol_samples = 16
 resamplings = 1
 [study.surrogate]
 models = [["m2", "m3", "C"]]
+optimisation = ["m2", "m3", "u2", "I2", "C"]
 r2 = 0.9
 restarts = 0
 cuts = 0
@@ -180,21 +181,21 @@ def replace_dynamics(set_attribute: Callable[[object, str, object], None] = seta
     set_attribute(simulate, "make_evaluator", make_formula)
     set_attribute(compiling, "compile_share", compile_nothing)
     set_attribute(responses, "simulate", respond)
-    set_attribute(audit, "simulate", respond)
+    set_attribute(readings, "simulate", respond)
 
 
 def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
-    """Run a study that is stopped after every stage it completes; how many stages that took."""
-    stages, go_on = 0, Run.stage
+    """StudyRun a study that is stopped after every stage it completes; how many stages that took."""
+    stages, go_on = 0, StudyRun.stage
 
-    def stop_after(run: Run, name: str, work, *arguments: object):  # type: ignore[no-untyped-def]
+    def stop_after(run: StudyRun, name: str, work, *arguments: object):  # type: ignore[no-untyped-def]
         known = run.checkpoint.load_stage(name) is not None
         found = go_on(run, name, work, *arguments)
         if not known:
             raise Stopped(f"after {name}")
         return found
 
-    Run.stage = stop_after  # type: ignore[method-assign]
+    StudyRun.stage = stop_after  # type: ignore[method-assign]
     try:
         while True:
             try:
@@ -203,7 +204,7 @@ def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
             except Stopped:
                 stages += 1
     finally:
-        Run.stage = go_on  # type: ignore[method-assign]
+        StudyRun.stage = go_on  # type: ignore[method-assign]
 
 
 if __name__ == "__main__":

@@ -19,13 +19,6 @@ _QUANTITIES = (
     ("slider_acceleration", "", "slider acceleration\n"),
 )
 
-_MARKS = (
-    ("paper", "the paper's, directly", "D"),
-    ("original", "the original, directly", "s"),
-    ("", "ours, directly simulated", "o"),
-)
-"""Words in a design's name, what such a design is called, and its mark."""
-
 
 @style.drawn
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
@@ -90,7 +83,7 @@ def _verified(
         if cases[k] != case:
             continue
         one = verification.isel(design=k)
-        label, marker = next(row[1:] for row in _MARKS if row[0] in name)
+        label, marker = _mark(one)
         if marker != "o" and not all_designs:
             continue
         at = float(one["mean_true"]) * x.factor, float(one["deviation_true"]) * y.factor
@@ -122,6 +115,15 @@ def _verified(
         if greek is not None and not all_designs:
             options = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": style.SMALL}
             panel.annotate(greek, at, **options)
+
+
+def _mark(one: xr.Dataset) -> tuple[str, str]:
+    """What a design is called in the legend, and its mark."""
+    if labels.is_printed(one):
+        return "the paper's, directly", "D"
+    if str(one["design"].item()).rpartition(" ")[2] == "original":
+        return "the original, directly", "s"
+    return "ours, directly simulated", "o"
 
 
 def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:

@@ -86,3 +86,8 @@ def clearance(content: xr.Dataset) -> xr.DataArray | None:
 def literal(text: str) -> str:
     """Text from a file so that matplotlib prints it as it is, without reading formulas into it."""
     return text.replace("$", r"\$")
+
+
+def is_printed(one: xr.Dataset) -> bool:
+    """Whether one design of a dataset of kind ``verification`` is one that a publication prints."""
+    return "mean_paper" in one and bool(np.isfinite(one["mean_paper"]))

@@ -36,6 +36,11 @@ class Content:
         """The dataset of a kind, or None."""
         return self.files.get(kind)
 
+    @property
+    def is_compared(self) -> bool:
+        """Whether values that a publication prints stand beside our designs."""
+        return "mean_paper" in self.files.get("verification", ())
+
     def attribute(self, name: str) -> str:
         """A global attribute of the first file that has it."""
         every = [*self.files.values(), *self.responses.values()]

@@ -70,7 +70,7 @@
     if (point.kind === "original") {
       return draw(svg, "rect", { x: x - size, y: y - size, width: 2 * size, height: 2 * size, ...shared });
     }
-    if (point.kind === "paper") {
+    if (point.kind === "printed") {
       const d = `M${x},${y - size * 1.3}L${x + size * 1.3},${y}L${x},${y + size * 1.3}L${x - size * 1.3},${y}Z`;
       return draw(svg, "path", { d, ...shared });
     }
@@ -136,7 +136,7 @@
     const place = byId("front");
     if (!place || !content.front.points.length) return;
     const view = byId("front-view");
-    const far = (p) => p.kind === "paper" || p.kind === "original";
+    const far = (p) => p.kind === "printed" || p.kind === "original";
     const near = content.front.points.filter((p) => !far(p));
     legend(byId("front-legend"));
     view.addEventListener("change", () => build(place, view.value === "all" ? content.front.points : near));
@@ -219,9 +219,8 @@
     for (const name of content.front.cases) {
       if (kinds.has("solution")) entry({ kind: "solution", case: name, direct: [1] }, `${name || "case"}, by the surrogate`);
     }
-    const words = { design: "simulated directly", original: "original design", paper: "the paper’s design" };
-    for (const kind of Object.keys(words)) {
-      if (kinds.has(kind)) entry({ kind, case: content.front.cases[0], direct: [] }, words[kind]);
+    for (const [kind, words] of Object.entries(content.front.legend)) {
+      entry({ kind, case: content.front.cases[0], direct: [] }, words);
     }
   }
 

@@ -18,8 +18,7 @@ _MISSING = {
     "sensitivity": "sensitivity.nc: no sensitivities (`hpcclear run`)",
     "kriging": "kriging.nc: no surrogate (`hpcclear run`)",
     "front": "front.nc: nothing was optimised (`hpcclear run`)",
-    "verification": "verification.nc: no design was verified, so there is no table beside the paper's (`hpcclear run`)",
-    "claims": "claims.nc: the paper's claims were not tested (`hpcclear run`)",
+    "verification": "verification.nc: no design was verified (`hpcclear run`)",
     "accuracy": "accuracy.nc: what accuracy costs was not measured (`hpcclear accuracy`)",
     "timing": "timing.nc: how the ranks spent their time is not known",
 }
@@ -110,7 +109,8 @@ def _section(name: str, title: str, body: Html) -> Html:
 def _sections(content: Content) -> Iterator[tuple[str, str, Html | None]]:
     """Names, titles and bodies in the page's order; None for what cannot be shown."""
     yield "summary", "Summary", sections.summary(content)
-    yield "designs", "Optimised designs beside the paper's", sections.designs(content)
+    beside = " beside the paper's" if content.is_compared else ""
+    yield "designs", f"Optimised designs{beside}", sections.designs(content)
     yield "pareto", "Pareto front", _front(content)
     yield "claims", "Claims of the paper", sections.claims(content)
     yield "readings", "How the paper can be read", sections.readings(content)

@@ -9,6 +9,11 @@ from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 
+_LEGEND = {
+    "design": "simulated directly",
+    "original": "original design",
+    "printed": "the paper’s design",
+}
 FRAMES = 180  # of a revolution
 _SERIES = (
     ("contact_force", "crank_rod", "contact force 1 (O12)"),
@@ -53,6 +58,9 @@ def front(content: Content) -> dict[str, Any]:
         "y": axes[1].label("deviation of f"),
         "cases": sorted({point["case"] for point in points}),
         "points": points,
+        "legend": {
+            kind: text for kind, text in _LEGEND.items() if kind in {p["kind"] for p in points}
+        },
     }
 
 
@@ -99,11 +107,12 @@ def _same(
 def _design(one: xr.Dataset) -> dict[str, Any]:
     """A design that was simulated directly."""
     name = str(one["design"].item())
+    is_original = name.rpartition(" ")[2] == "original"
     surrogate = (
         _moments(one, "mean_surrogate", "deviation_surrogate") if "mean_surrogate" in one else []
     )
     return {
-        "kind": "paper" if "paper" in name else "original" if "original" in name else "design",
+        "kind": "printed" if labels.is_printed(one) else "original" if is_original else "design",
         "name": name,
         "case": str(one["case"].item()) if "case" in one else "",
         "x": float(one["mean_true"]),
@@ -111,7 +120,7 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
         "design": _values(one),
         "surrogate": surrogate,
         "direct": _direct(one),
-        "response": "original" if "original" in name else name,
+        "response": "original" if is_original else name,
     }
 
 

@@ -131,7 +131,8 @@ def _facts(content: Content) -> Html:
 
 
 def designs(content: Content) -> Html | None:
-    """Optimised designs beside the paper's Table 4; the spread along the fronts apart."""
+    """Optimised designs, beside what a publication prints if it is about them; the spread along the
+    fronts apart."""
     verified = content.get("verification")
     if verified is None:
         return None
@@ -140,16 +141,20 @@ def designs(content: Content) -> Html | None:
     main = sorted(
         (k for k in range(len(names)) if k not in spread), key=lambda k: _place(verified, k)
     )
-    words = (
-        "Mean and deviation of f by direct simulation, with confidence limits; by the surrogate; and as the paper "
-        "prints them in its Table 4. The printed deviations are neither deviation nor variance of f as the model here "
-        "gives it; nothing was fitted to them."
-    )
+    words = "Mean and deviation of f by direct simulation, with confidence limits; and by the surrogate."
+    caption = "The original and the optimised designs"
+    if content.is_compared:
+        words = (
+            "Mean and deviation of f by direct simulation, with confidence limits; by the surrogate; and as the paper "
+            "prints them in its Table 4. The printed deviations are neither deviation nor variance of f as the model "
+            "here gives it; nothing was fitted to them."
+        )
+        caption = "Table 4, ours and the paper's"
     remarks = str(verified.attrs.get("remarks", "none"))
     parts = [tag("p", words)]
     if remarks != "none":
         parts.append(tag("p", remarks, class_="note"))
-    parts.append(_designs_table(verified.isel(design=main), "Table 4, ours and the paper's"))
+    parts.append(_designs_table(verified.isel(design=main), caption))
     if spread:
         more = _designs_table(verified.isel(design=spread), "Designs along the fronts")
         parts.append(
@@ -159,21 +164,22 @@ def designs(content: Content) -> Html | None:
 
 
 def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
-    """Case by case: the original, then each of ours before the paper's."""
+    """Case by case: the original, then each of ours before the printed one."""
     name = str(verified["design"].to_numpy()[k])
     case = str(verified["case"].to_numpy()[k]) if "case" in verified else ""
-    order = ("original", "paper alpha", "paper beta", "best alpha", "best beta", "alpha", "beta")
-    kind = next((word for word in order if name.endswith(word)), "")
-    ranks = {
-        "original": 0,
-        "alpha": 1,
-        "best alpha": 2,
-        "paper alpha": 3,
-        "beta": 4,
-        "best beta": 5,
-        "paper beta": 6,
-    }
-    return case, ranks.get(kind, 7)
+    order = (
+        "original",
+        "alpha",
+        "best alpha",
+        "printed alpha",
+        "beta",
+        "best beta",
+        "printed beta",
+    )
+    if labels.is_printed(verified.isel(design=k)):
+        name = f"printed {name.rpartition(' ')[2]}"
+    own = name.removeprefix(f"{case} ")
+    return case, order.index(own) if own in order else len(order)
 
 
 _MOMENTS = (

@@ -13,8 +13,9 @@ from scipy.special import chdtri
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.study.paper.printed import CLAIMS, case_names
+from hpcclear.study.paper.recognition import own_names
 from hpcclear.study.responses import QUANTITIES, STATISTICS
-from hpcclear.study.run import Result, Run
+from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.sensitivities import surfaces
 
 SURE = 2.5758293035489004
@@ -33,19 +34,22 @@ def verdict(supported: Iterable[bool], refuted: Iterable[bool]) -> str:
     return HOLDS if parts and all(parts) else OPEN
 
 
-class Sensitivities:
+class SensitivityEvidence:
     """First-order sensitivities as evidence: effects over the ranges, by surface and clearance.
+
+    Variables go by the paper's symbols where it has one, else by the study's own names.
 
     Parameters
     ----------
-    run : Run
+    run : StudyRun
     result : dict
         Of `hpcclear.study.sensitivities.analyse`.
     """
 
-    def __init__(self, run: Run, result: Result) -> None:
-        self.names = run.study.names
-        self.inputs = surfaces(run.study)
+    def __init__(self, run: StudyRun, result: Result) -> None:
+        symbols = {name: symbol for symbol, name in own_names(run.scene).items()}
+        self.names = [symbols.get(name, name) for name in run.study.names]
+        self.inputs = [[symbols.get(n, n) for n in inputs] for inputs in surfaces(run.study)]
         self.result = result
         self.settings = run.study.sensitivity
 
@@ -86,7 +90,7 @@ class Sensitivities:
         return verdict((part[0] for part in parts), (part[1] for part in parts)), text
 
 
-def _grows_with_clearance(found: Sensitivities) -> Finding:
+def _grows_with_clearance(found: SensitivityEvidence) -> Finding:
     mean, error = found.result["mean_objective"], found.result["mean_objective_error"]
     step = np.diff(mean)
     allowed = SURE * np.hypot(error[1:], error[:-1])
@@ -97,7 +101,7 @@ def _grows_with_clearance(found: Sensitivities) -> Finding:
     return verdict(step > allowed, step < -allowed), text
 
 
-def _hardly_moves(found: Sensitivities) -> Finding:
+def _hardly_moves(found: SensitivityEvidence) -> Finding:
     names = [name for name in ("m1", "u1", "I1") if found.has(name)]
     if len(names) < 3:
         return OPEN, "m1, u1 and I1 are not all among the study's surfaces"
@@ -114,7 +118,7 @@ def _hardly_moves(found: Sensitivities) -> Finding:
     return verdict((u < limit for u in upper), (low > limit for low in lower)), text
 
 
-def _order_is_kept(found: Sensitivities) -> Finding:
+def _order_is_kept(found: SensitivityEvidence) -> Finding:
     names = found.influential()
     kept: list[str] = []
     changed: list[str] = []
@@ -143,7 +147,7 @@ def _order_is_kept(found: Sensitivities) -> Finding:
     return verdict(supported, [True] * len(changed)), text
 
 
-def _size_varies(found: Sensitivities) -> Finding:
+def _size_varies(found: SensitivityEvidence) -> Finding:
     parts, texts = [], []
     for name in found.influential():
         effects, errors = found.of(name)
@@ -165,7 +169,7 @@ def _size_varies(found: Sensitivities) -> Finding:
     return verdict((p[0] for p in parts), (p[1] for p in parts)), text
 
 
-def _global_for_masses(found: Sensitivities) -> Finding:
+def _global_for_masses(found: SensitivityEvidence) -> Finding:
     masses, others = {"m1", "m2", "m3"}, {"u1", "u2", "I1", "I2"}
     fit, target = found.result["leave_one_out_r2"], found.settings.r2
     supported, refuted, texts = [], [], []
@@ -191,7 +195,7 @@ def _global_for_masses(found: Sensitivities) -> Finding:
     return verdict(supported, refuted), text
 
 
-class Responses:
+class ResponseEvidence:
     """Responses at one clearance as evidence: differences between designs and their scatter."""
 
     def __init__(self, series: Result) -> None:
@@ -221,7 +225,7 @@ class Responses:
         return verdict(supported, refuted), text
 
 
-def _peaks_cut(run: Run, found: Responses) -> Finding:
+def _peaks_cut(run: StudyRun, found: ResponseEvidence) -> Finding:
     wanted = [
         (name, "original", "peak", quantity, -1)
         for name in found.names
@@ -231,7 +235,7 @@ def _peaks_cut(run: Run, found: Responses) -> Finding:
     return found.judged(wanted)
 
 
-def _alpha_lower_beta_calmer(run: Run, found: Responses) -> Finding:
+def _alpha_lower_beta_calmer(run: StudyRun, found: ResponseEvidence) -> Finding:
     wanted = []
     for case in run.study.cases:
         alpha, beta = f"{case.name} alpha", f"{case.name} beta"
@@ -241,7 +245,7 @@ def _alpha_lower_beta_calmer(run: Run, found: Responses) -> Finding:
     return found.judged(wanted)
 
 
-def _case_2_cuts_more(run: Run, found: Responses) -> Finding:
+def _case_2_cuts_more(run: StudyRun, found: ResponseEvidence) -> Finding:
     first, second = case_names(run.scene)
     if first is None or second is None:
         return OPEN, "the study has not both of the paper's cases"
@@ -255,7 +259,7 @@ def _case_2_cuts_more(run: Run, found: Responses) -> Finding:
     return found.judged(wanted)
 
 
-def _beta_of_case_2(run: Run, found: Responses) -> Finding:
+def _beta_of_case_2(run: StudyRun, found: ResponseEvidence) -> Finding:
     case = case_names(run.scene)[1]
     if case is None:
         return OPEN, "the study has not the paper's case 2"
@@ -264,7 +268,7 @@ def _beta_of_case_2(run: Run, found: Responses) -> Finding:
     return found.judged([*wanted, (beta, alpha, "fluctuation", QUANTITIES[0], -1)])
 
 
-def _kriging_accurate(run: Run, kriging: Result) -> Finding:
+def _kriging_accurate(run: StudyRun, kriging: Result) -> Finding:
     checks = np.array([kriging[f"model{k}_check"] for k in range(len(run.study.models))])
     r2, rmse = checks[:, 0], checks[:, 4]
     texts = [
@@ -276,12 +280,14 @@ def _kriging_accurate(run: Run, kriging: Result) -> Finding:
     return verdict(passed, r2 < 0.9), text + "; ".join(texts)
 
 
-def judge(run: Run, sensitivity: Result | None, kriging: Result, series: Result) -> list[Finding]:
+def judge(
+    run: StudyRun, sensitivity: Result | None, kriging: Result, series: Result
+) -> list[Finding]:
     """A verdict and its numbers for each of `CLAIMS`."""
-    effects = None if sensitivity is None else Sensitivities(run, sensitivity)
-    responses = Responses(series)
+    effects = None if sensitivity is None else SensitivityEvidence(run, sensitivity)
+    responses = ResponseEvidence(series)
 
-    def on_effects(rule: Callable[[Sensitivities], Finding]) -> Finding:
+    def on_effects(rule: Callable[[SensitivityEvidence], Finding]) -> Finding:
         return (OPEN, "the study has no response surfaces") if effects is None else rule(effects)
 
     return [
@@ -300,7 +306,7 @@ def judge(run: Run, sensitivity: Result | None, kriging: Result, series: Result)
     ]
 
 
-def write(run: Run, findings: Sequence[Finding]) -> None:
+def write(run: StudyRun, findings: Sequence[Finding]) -> None:
     """Write claims.nc."""
     data = {
         "text": np.array(CLAIMS),

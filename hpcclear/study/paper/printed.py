@@ -1,7 +1,13 @@
 """What the paper prints: its Table 4 and the claims that are tested (its sections 5 and 6)."""
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
 from hpcclear.scene import Scene
 from hpcclear.study.optimisation import Choice
+from hpcclear.study.paper.recognition import is_the_papers, own_names
 
 TABLE_4 = {
     ("case 1", "alpha"): ((0.105, 0.0715, 0.0451, 1.2432e-4), (1.7787e-4, 3.6658e-8)),
@@ -9,9 +15,9 @@ TABLE_4 = {
     ("case 2", "alpha"): ((0.1053, 0.07, 0.0118, 1.4054e-4), (1.8544e-4, 9.6491e-7)),
     ("case 2", "beta"): ((0.2128, 0.0734, 0.0031, 6.3581e-4), (2.6217e-4, 8.3406e-8)),
 }
-"""Designs m2 (kg), m3 (kg), u2 (m), I2 (kg m2), and their printed mean and deviation."""
+"""Values of `DESIGN`, and their printed mean and deviation of f (m)."""
 
-DESIGN = ("m2", "m3", "u2", "I2")
+DESIGN = ("m2", "m3", "u2", "I2")  # kg, kg, m, kg m2
 
 CLAIMS = (
     "f grows with the clearance",
@@ -34,28 +40,44 @@ def case_names(scene: Scene) -> tuple[str | None, str | None]:
 
     Both have the paper's four design variables.
     """
-    study = scene.required_study
+    study, own = scene.required_study, own_names(scene)
     found: list[str | None] = [None, None]
     for case in study.cases:
-        if set(study.design_variables(case.name)) != set(DESIGN):
+        if set(study.design_variables(case.name)) != {own.get(symbol) for symbol in DESIGN}:
             continue
         absolute = all(study.random_input(name).absolute for name in case.random)
         found[0 if absolute else 1] = case.name
     return found[0], found[1]
 
 
-def is_comparable(scene: Scene) -> bool:
-    """Whether the study's objective is the paper's: what it prints and claims says nothing of another one."""
-    return scene.required_study.objective == "mean-gap"
+def _table_4(scene: Scene) -> list[tuple[Choice, tuple[float, float]]]:
+    """Designs and printed moments of Table 4, each in its case, as far as the study has the cases."""
+    if not is_the_papers(scene):
+        return []
+    own = own_names(scene)
+    cases = dict(zip(("case 1", "case 2"), case_names(scene), strict=True))
+    found = []
+    for (case, letter), (values, printed) in TABLE_4.items():
+        name = cases[case]
+        if name is not None:
+            design = {own[symbol]: value for symbol, value in zip(DESIGN, values, strict=True)}
+            found.append((Choice(f"{name} paper {letter}", name, design), printed))
+    return found
 
 
 def printed_designs(scene: Scene) -> list[Choice]:
-    """The designs of Table 4, each in its case, as far as the study has these cases; none for another objective."""
-    if not is_comparable(scene):
-        return []
-    names = dict(zip(("case 1", "case 2"), case_names(scene), strict=True))
-    return [
-        Choice(f"{own} paper {letter}", own, dict(zip(DESIGN, design, strict=True)), None, printed)
-        for (case, letter), (design, printed) in TABLE_4.items()
-        if (own := names[case]) is not None
-    ]
+    """The designs of Table 4, each in its case; none if the scene is not the paper's."""
+    return [choice for choice, _ in _table_4(scene)]
+
+
+def printed_moments(scene: Scene, choices: Sequence[Choice]) -> dict[str, Array]:
+    """``mean`` and ``deviation`` (m) of each design as printed, NaN for those that are not.
+
+    Empty when none is printed.
+    """
+    known = {choice.name: printed for choice, printed in _table_4(scene)}
+    if not known:
+        return {}
+    none = (np.nan, np.nan)
+    table = np.array([known.get(choice.name, none) for choice in choices])
+    return {"mean": table[:, 0], "deviation": table[:, 1]}

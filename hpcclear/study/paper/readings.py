@@ -21,8 +21,9 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.paper.printed import printed_designs
-from hpcclear.study.run import Result, Run
+from hpcclear.study.paper.printed import printed_designs, printed_moments
+from hpcclear.study.paper.recognition import own_names
+from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verification import moments, samples_of
 
 STAGE = "readings"
@@ -56,13 +57,12 @@ class Reading:
 
 
 def applies(scene: Scene) -> bool:
-    """Whether the scene is near enough to the paper's for the comparison to mean something."""
+    """Whether the scene is the paper's and asks for the comparison."""
     contact = scene.effects.contact
     return (
         scene.required_study.verification.audit_samples > 0
         and contact is not None
         and contact.law == "lankarani-nikravesh"
-        and scene.clearance_joints() == JOINTS
         and bool(printed_designs(scene))
     )
 
@@ -85,7 +85,7 @@ def readings(scene: Scene) -> list[Reading]:
     return [*(Reading(*one) for one in combinations), Reading(own, True, True, True)]
 
 
-def evaluate(run: Run) -> Result:
+def evaluate(run: StudyRun) -> Result:
     """Mean, deviation and f at the smallest clearance for each reading and printed design.
 
     Returns
@@ -103,21 +103,21 @@ def evaluate(run: Run) -> Result:
     return result
 
 
-def write(run: Run, result: Result) -> None:
+def write(run: StudyRun, result: Result) -> None:
     """Write readings.nc; `distance` says how far a reading is from the printed means."""
     designs = printed_designs(run.scene)
-    printed = np.array([choice.printed for choice in designs])
+    printed = printed_moments(run.scene, designs)
     coords = {
         "reading": np.array([reading.text for reading in readings(run.scene)]),
         "design": np.array([choice.name for choice in designs]),
     }
-    data = {**result, "mean_paper": printed[:, 0], "deviation_paper": printed[:, 1]}
+    data = {**result, "mean_paper": printed["mean"], "deviation_paper": printed["deviation"]}
     data["case"] = np.array([choice.case for choice in designs])
-    data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed[:, 0]) ** 2, axis=1))
+    data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed["mean"]) ** 2, axis=1))
     run.write(dataset.dataset("readings", coords, data), "readings.nc")
 
 
-def _row(run: Run, reading: Reading) -> dict[str, Array]:
+def _row(run: StudyRun, reading: Reading) -> dict[str, Array]:
     """Moments and f at the smallest clearance of all printed designs in one reading."""
     designs = printed_designs(run.scene)
     if reading.over_steps:
@@ -125,7 +125,9 @@ def _row(run: Run, reading: Reading) -> dict[str, Array]:
     return {"row": np.array(_over_time(run, reading, designs))}
 
 
-def _over_time(run: Run, reading: Reading, designs: Sequence[Choice]) -> list[tuple[float, ...]]:
+def _over_time(
+    run: StudyRun, reading: Reading, designs: Sequence[Choice]
+) -> list[tuple[float, ...]]:
     """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
     count = run.study.verification.audit_samples
     batches = [
@@ -146,7 +148,7 @@ def _over_time(run: Run, reading: Reading, designs: Sequence[Choice]) -> list[tu
     return [(*moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
 
 
-def _over_steps(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]:
+def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float, ...]:
     sampled = samples_of(run, choice, STEP_SAMPLES)
     scene = _scene(run, reading)
     values = [
@@ -156,7 +158,7 @@ def _over_steps(run: Run, reading: Reading, choice: Choice) -> tuple[float, ...]
     return (*moments(np.array(values[:-1])), values[-1])
 
 
-def _mean_over_steps(run: Run, scene: Scene, names: Sequence[str], row: Array) -> float:
+def _mean_over_steps(run: StudyRun, scene: Scene, names: Sequence[str], row: Array) -> float:
     """f of one sample, the mean of eq. 13 taken over the accepted steps; NaN if it failed."""
     run.ranks.raise_if_stopped()
     changes: dict[str, object] = {"output.instants_per_revolution": 0}
@@ -170,24 +172,30 @@ def _mean_over_steps(run: Run, scene: Scene, names: Sequence[str], row: Array) -
     distance = np.hypot(
         response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy()
     )[steady]
-    clearance = [row[list(names).index("C")]] * len(JOINTS)
+    clearance = [row[list(names).index(_clearance(run))]] * len(JOINTS)
     return float(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
 
 
-def _smallest(run: Run, choice: Choice) -> Points:
+def _smallest(run: StudyRun, choice: Choice) -> Points:
     """The design itself at the smallest clearance."""
-    names = (*choice.design, "C")
-    lowest = run.study.variable("C").bounds[0]
+    clearance = _clearance(run)
+    names = (*choice.design, clearance)
+    lowest = run.study.variable(clearance).bounds[0]
     return run.simulations.filled(names, np.array([[*choice.design.values(), lowest]]))
 
 
-def _scene(run: Run, reading: Reading) -> Scene:
+def _clearance(run: StudyRun) -> str:
+    """The study's name of the variable that drives both clearances."""
+    return own_names(run.scene)["C"]
+
+
+def _scene(run: StudyRun, reading: Reading) -> Scene:
     return run.scene.with_({"study": None, "effects.contact.restitution": reading.restitution})
 
 
-def _read(run: Run, reading: Reading, points: Points) -> Points:
+def _read(run: StudyRun, reading: Reading, points: Points) -> Points:
     """Samples with the further columns that a reading moves."""
-    clearance = points.column("C")
+    clearance = points.column(_clearance(run))
     built = {joint: run.scene.number(f"joints.{joint}.bearing_radius") for joint in JOINTS}
     names, columns, paths = list(points.names), [points.values], list(points.paths)
 
