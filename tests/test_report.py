@@ -223,9 +223,17 @@ def test_the_crank_is_found_from_the_motion() -> None:
 
 
 def test_data_for_the_script_cannot_end_its_element() -> None:
-    made = markup.data({"a": "</script><script>alert(1)</script>&"}, "x")
-    assert made.count("<") == 2
-    assert json.loads(re.sub(r"<.*?>", "", made)) == {"a": "</script><script>alert(1)</script>&"}
+    hostile = {"z": "</script><script>alert(1)</script>&", "a": ""}
+    names = ("title", "policy", "style", "script", "source")
+    made = markup.render("page.html", **dict.fromkeys(names, ""), sections=[], picture=hostile)
+    tree = Tree(made)
+    assert [t for t, _ in tree.elements].count("script") == 2
+    assert list(json.loads(tree.content["content"]).items()) == list(hostile.items())
+
+
+def test_control_characters_are_left_out_and_text_is_escaped() -> None:
+    made = markup.render("list.html", content=["a\x00\x1b<b>\n&\x7f"])
+    assert made == "<ul><li>a&lt;b&gt;\n&amp;</li></ul>"
 
 
 def test_drawing_needs_neither_kernel_nor_mpi() -> None:

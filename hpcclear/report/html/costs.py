@@ -4,26 +4,26 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Html, Number, join, table, tag
+from hpcclear.report.html.markup import Number, Table
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
 
-def accuracy(content: Content) -> Html | None:
+def accuracy(content: Content) -> list[object] | None:
     """The cheapest way to each error of f, and the errors of everything that follows."""
     found = content.get("accuracy")
     if found is None:
         return None
     header = ["relative error of f", "integrator", "tolerance or step", "time of a revolution (ms)"]
-    cheapest = table(
+    cheapest = Table(
         header, _cheapest(found), "The cheapest way to an error of f over one revolution"
     )
     rows = [*_averaging(found), *_surrogates(found), *_moments(found)]
-    others = table(
+    others = Table(
         ["what", "relative error", "cost"], rows, "Errors of what comes after, and their price"
     )
     words = "Errors are against references far tighter than what is measured; times are of one core, on this machine."
-    return join([tag("p", words), cheapest, others])
+    return [words, cheapest, others]
 
 
 def _cheapest(found: xr.Dataset) -> list[list[object]]:

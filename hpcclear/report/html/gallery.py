@@ -1,5 +1,6 @@
 """Every figure that a directory of results allows, with its caption."""
 
+import base64
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
@@ -7,9 +8,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
-    accuracy as accuracy_figures,
-)
-from hpcclear.report.figures import (
+    accuracy,
     designs,
     portraits,
     response,
@@ -19,14 +18,13 @@ from hpcclear.report.figures import (
     timing,
 )
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Html, image, tag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Plan = tuple[str, "Callable[[xr.Dataset], Figure]", str]
+Drawing = tuple[str, "Callable[[xr.Dataset], Figure]", str]
 
-_RESULTS: tuple[Plan, ...] = (
+_RESULTS: tuple[Drawing, ...] = (
     (
         "samples",
         samples.samples_figure,
@@ -73,17 +71,13 @@ _RESPONSE = (
 )
 
 
-def figures(content: Content) -> Html | None:
-    """All figures as elements of the page."""
+def figures(content: Content) -> list[dict[str, str]] | None:
+    """All figures: their pictures (PNG, base64) and captions."""
     made = [
-        tag(
-            "figure",
-            image(style.render(figure, dpi=220), caption, 368),
-            tag("figcaption", caption),
-        )
+        {"png": base64.b64encode(style.render(figure, dpi=220)).decode("ascii"), "caption": caption}
         for figure, caption in _drawn(content)
     ]
-    return tag("div", *made, class_="figures") if made else None
+    return made or None
 
 
 def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
@@ -95,7 +89,7 @@ def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
         yield designs.front_figure(front, content.get("verification")), caption
     costs = content.get("accuracy")
     if costs is not None:
-        for name, draw in accuracy_figures.FIGURES.items():
+        for name, draw in accuracy.FIGURES.items():
             yield from _tried(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
     found = content.responses
     if len(found) > 1:

@@ -1,70 +1,95 @@
-"""HTML that is safe by construction: every text is escaped unless it was built here."""
+"""What templates are filled with: tables, sections, numbers made readable. Every text is escaped.
 
-import base64
-import html
-import json
+Sections of the page are plain content; how it looks is in the folder ``templates`` (jinja2).
+"""
+
+import functools
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import resources
 from typing import Any
 
+import jinja2
 import numpy as np
 
 from hpcclear.report.figures import labels
 
-_VOID = frozenset({"img", "input", "meta", "br", "hr"})
-
-
-class Html(str):
-    """Finished markup; plain strings are text."""
-
-
-def text(content: object) -> Html:
-    """A text as markup: escaped, without control characters."""
-    if isinstance(content, Html):
-        return content
-    plain = "".join(c for c in str(content) if c in "\n\t" or (c >= " " and c != "\x7f"))
-    return Html(html.escape(plain, quote=True))
-
-
-def join(parts: Iterable[object]) -> Html:
-    """Several pieces one after the other."""
-    return Html("".join(text(part) for part in parts))
-
-
-def tag(name: str, /, *content: object, **attributes: object) -> Html:
-    """An element; attribute names as keywords (``class_``, ``aria_label``), None leaves one out."""
-    words = [name]
-    for key, value in attributes.items():
-        if value is not None and value is not False:
-            plain = key.rstrip("_").replace("_", "-")
-            words.append(plain if value is True else f'{plain}="{text(value)}"')
-    start = f"<{' '.join(words)}>"
-    return Html(start if name in _VOID else f"{start}{join(content)}</{name}>")
-
-
-def table(header: Sequence[object], rows: Iterable[Sequence[object]], caption: str) -> Html:
-    """A table that scrolls by itself when the page is narrow; numbers (`Number`) are aligned right."""
-    head = tag("tr", *(tag("th", cell, scope="col") for cell in header))
-    body = []
-    for row in rows:
-        first = tag("th", row[0], scope="row")
-        rest = (
-            tag("td", cell, class_="number" if isinstance(cell, Number) else None)
-            for cell in row[1:]
-        )
-        body.append(tag("tr", first, *rest))
-    content = (tag("caption", caption), tag("thead", head), tag("tbody", *body))
-    return tag(
-        "div",
-        tag("table", *content),
-        class_="scroll",
-        tabindex="0",
-        role="region",
-        aria_label=caption,
-    )
-
 
 class Number(str):
-    """A number made readable."""
+    """A number made readable; tables align it right."""
+
+
+class Table:
+    """A table: texts, `Number` and badges (``kind``, ``words``) in rows, the first a heading."""
+
+    def __init__(
+        self, header: Sequence[object], rows: Iterable[Sequence[object]], caption: str
+    ) -> None:
+        self.header = list(header)
+        self.rows = [list(row) for row in rows]
+        self.caption = caption
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the page.
+
+    Attributes
+    ----------
+    name, title : str
+        Its anchor, and its heading.
+    template : str
+        File in ``templates`` that shows its content.
+    content : object
+        For the template; None where there is nothing to show.
+    """
+
+    name: str
+    title: str
+    template: str
+    content: Any
+
+
+def preformatted(text: str, summary: str = "") -> dict[str, str]:
+    """Text whose lines stay as they are; with a summary it is folded away."""
+    return {"text": text, "summary": summary}
+
+
+def render(template: str, **content: object) -> str:
+    """A template filled with content; all text in it is escaped."""
+    return _templates().get_template(template).render(**content)
+
+
+@functools.cache
+def _templates() -> jinja2.Environment:
+    made = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_source),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_without_controls,
+    )
+    made.tests["number_text"] = lambda value: isinstance(value, Number)
+    # the page's script relies on the order of entries, and NaN is no JSON
+    made.policies["json.dumps_kwargs"] = {
+        "ensure_ascii": True,
+        "allow_nan": False,
+        "separators": (",", ":"),
+    }
+    return made
+
+
+def _source(name: str) -> str:
+    folder = resources.files(__package__).joinpath("templates")
+    return folder.joinpath(name).read_text(encoding="utf-8")
+
+
+def _without_controls(value: object) -> object:
+    """A text without control characters, which no page may hold; finished markup as it is."""
+    if hasattr(value, "__html__"):
+        return value
+    return "".join(c for c in str(value) if c in "\n\t" or (c >= " " and c != "\x7f"))
 
 
 def number(value: float, digits: int = 4) -> Number:
@@ -79,16 +104,3 @@ def quantity(value: float, units: str, digits: int = 4) -> Number:
     scale = labels.scale(units, value)
     unit = "" if scale.unit == "–" else f" {scale.unit}"
     return Number(f"{value * scale.factor:.{digits}g}{unit}")
-
-
-def image(png: bytes, words: str, width: int) -> Html:
-    """A figure, inside the page."""
-    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-    return tag("img", src=source, alt=words, width=width, loading="lazy")
-
-
-def data(content: Any, name: str) -> Html:
-    """Content for the page's script: JSON that cannot end its element."""
-    plain = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    safe = plain.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    return Html(f'<script type="application/json" id="{name}">{safe}</script>')

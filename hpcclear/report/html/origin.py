@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Html, Number, join, table, tag
+from hpcclear.report.html.markup import Number, Table, preformatted
 
 
-def effects(content: Content) -> Html | None:
+def effects(content: Content) -> list[object] | None:
     """Which effects the scene has on, and the scene itself."""
     scene = content.attribute("scene")
     if not scene:
@@ -16,20 +16,15 @@ def effects(content: Content) -> Html | None:
     try:
         entries = tomllib.loads(scene)
     except tomllib.TOMLDecodeError:
-        first = tag(
-            "p", "The scene stored with the results is not readable as TOML; it is shown as it is."
-        )
+        first: list[object] = [
+            "The scene stored with the results is not readable as TOML; it is shown as it is."
+        ]
     else:
         shown = ("drive", "joints", "effects", "numerics")
         rows = [row for name in shown for row in _flat(entries.get(name), name)]
         words = "An effect that is not listed was off, and not even compiled."
-        first = join([tag("p", words), table(["entry", "value"], rows, "What was simulated")])
-    return join(
-        [
-            first,
-            tag("details", tag("summary", "The whole scene file"), tag("pre", scene, tabindex="0")),
-        ]
-    )
+        first = [words, Table(["entry", "value"], rows, "What was simulated")]
+    return [*first, preformatted(scene, "The whole scene file")]
 
 
 def _flat(value: Any, path: str) -> Iterator[list[object]]:
@@ -41,7 +36,7 @@ def _flat(value: Any, path: str) -> Iterator[list[object]]:
         yield [path, str(value)]
 
 
-def timing(content: Content) -> Html | None:
+def timing(content: Content) -> list[object] | None:
     """How every rank spent its time."""
     found = content.get("timing")
     if found is None:
@@ -61,16 +56,16 @@ def timing(content: Content) -> Html | None:
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
-    return table(header, rows, "Where the ranks' time went, all stages")
+    return [Table(header, rows, "Where the ranks' time went, all stages")]
 
 
-def reproduce(content: Content) -> Html:
+def reproduce(content: Content) -> list[object]:
     """Command, versions and hash of the scene."""
     found = content.get("timing")
     steps: list[object] = []
     if found is not None:
-        steps += [tag("p", "The command that made these results:")]
-        steps += [tag("pre", str(found["command"].item()), tabindex="0")]
+        steps += ["The command that made these results:"]
+        steps += [preformatted(str(found["command"].item()))]
     words = (
         "The same scene, seed and versions on the same type of processor give the same numbers to the last bit, on "
         "any number of ranks."
@@ -87,5 +82,5 @@ def reproduce(content: Content) -> Html:
         if content.attribute(name)
     ]
     if rows:
-        steps += [tag("p", words), table(["what", "value"], rows, "What made these files")]
-    return join(steps)
+        steps += [words, Table(["what", "value"], rows, "What made these files")]
+    return steps

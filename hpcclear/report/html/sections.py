@@ -6,7 +6,7 @@ import xarray as xr
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Html, Number, join, number, quantity, table, tag
+from hpcclear.report.html.markup import Number, Table, number, quantity
 
 _FLAGS = {
     Flag.LATCHED: "a joint stayed in contact with the impact speed frozen: f may depend on the tolerance",
@@ -17,7 +17,7 @@ _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot 
 LISTED = 40  # samples listed by number before the rest is only counted
 
 
-def summary(content: Content) -> Html:
+def summary(content: Content) -> dict[str, object]:
     """What was done and found, in plain words."""
     words = [
         *_samples_words(content),
@@ -27,8 +27,7 @@ def summary(content: Content) -> Html:
     ]
     if not words:
         words = ["These are responses of single designs; nothing was sampled or optimised."]
-    rest = tag("ul", *(tag("li", word) for word in words[1:])) if words[1:] else Html("")
-    return join([tag("p", words[0], class_="lead"), rest, _facts(content)])
+    return {"words": words, "facts": _facts(content)}
 
 
 def _samples_words(content: Content) -> list[str]:
@@ -97,7 +96,7 @@ def _none(count: int) -> str:
     return "none" if count == 0 else str(count)
 
 
-def _facts(content: Content) -> Html:
+def _facts(content: Content) -> list[tuple[str, object]]:
     """Key numbers as tiles."""
     facts: list[tuple[str, object]] = []
     samples, verified = content.get("samples"), content.get("verification")
@@ -123,14 +122,10 @@ def _facts(content: Content) -> Html:
             facts.append(("samples a second and core", f"{rate:.3g}"))
     if verified is not None:
         facts.append(("designs verified", verified.sizes["design"]))
-    return (
-        tag("dl", *(tag("div", tag("dt", k), tag("dd", v)) for k, v in facts), class_="facts")
-        if facts
-        else Html("")
-    )
+    return facts
 
 
-def designs(content: Content) -> Html | None:
+def designs(content: Content) -> dict[str, object] | None:
     """Optimised designs, beside what a publication prints if it is about them; the spread along the
     fronts apart."""
     verified = content.get("verification")
@@ -151,16 +146,14 @@ def designs(content: Content) -> Html | None:
         )
         caption = "Table 4, ours and the paper's"
     remarks = str(verified.attrs.get("remarks", "none"))
-    parts = [tag("p", words)]
-    if remarks != "none":
-        parts.append(tag("p", remarks, class_="note"))
-    parts.append(_designs_table(verified.isel(design=main), caption))
-    if spread:
-        more = _designs_table(verified.isel(design=spread), "Designs along the fronts")
-        parts.append(
-            tag("details", tag("summary", f"{len(spread)} more designs, along the fronts"), more)
-        )
-    return join(parts)
+    return {
+        "words": words,
+        "remarks": "" if remarks == "none" else remarks,
+        "table": _designs_table(verified.isel(design=main), caption),
+        "spread": _designs_table(verified.isel(design=spread), "Designs along the fronts")
+        if spread
+        else None,
+    }
 
 
 def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
@@ -192,7 +185,7 @@ _MOMENTS = (
 )
 
 
-def _designs_table(verified: xr.Dataset, caption: str) -> Html:
+def _designs_table(verified: xr.Dataset, caption: str) -> Table:
     """A row for each design; each column in one unit."""
     columns = [(v, labels.words(v)) for v in labels.design_variables(verified)]
     columns += [(verified[name], words) for name, words in _MOMENTS if name in verified]
@@ -207,7 +200,7 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Html:
                 Number(shown + _half_width(verified.isel(design=k), str(variable.name), scale))
             )
         rows.append(row)
-    return table(header, rows, caption)
+    return Table(header, rows, caption)
 
 
 def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
@@ -219,7 +212,7 @@ def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
     return f" ± {half:.2g}" if np.isfinite(half) else ""
 
 
-def readings(content: Content) -> Html | None:
+def readings(content: Content) -> list[object] | None:
     """The paper's designs under the possible readings of its text."""
     found = content.get("readings")
     if found is None:
@@ -240,10 +233,10 @@ def readings(content: Content) -> Html | None:
         "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
         "ln(mean / printed mean)."
     )
-    return join([tag("p", words), table(header, rows, "Readings of the paper")])
+    return [words, Table(header, rows, "Readings of the paper")]
 
 
-def claims(content: Content) -> Html | None:
+def claims(content: Content) -> list[object] | None:
     """The paper's claims with our verdicts."""
     found = content.get("claims")
     if found is None:
@@ -253,16 +246,13 @@ def claims(content: Content) -> Html | None:
         one = found.isel(claim=k)
         verdict = str(one["verdict"].item())
         mark, kind = _MARKS.get(verdict, ("", "open"))
-        badge = tag("span", f"{mark} {verdict}", class_=f"verdict {kind}")
+        badge = {"words": f"{mark} {verdict}", "kind": kind}
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
-    return table(
-        ["claim", "verdict", "the numbers that decide"],
-        rows,
-        "Claims of the paper, tested on this data",
-    )
+    header = ["claim", "verdict", "the numbers that decide"]
+    return [Table(header, rows, "Claims of the paper, tested on this data")]
 
 
-def trust(content: Content) -> Html | None:
+def trust(content: Content) -> list[object] | None:
     """Samples that failed, and those to be read with care."""
     samples = content.get("samples")
     if samples is None:
@@ -279,9 +269,9 @@ def trust(content: Content) -> Html | None:
             )
     if rows:
         header = ["outcome", "samples", "what happened", "what to change", "which"]
-        parts.append(table(header, rows, "Samples that failed; their numbers are missing, never 0"))
+        parts.append(Table(header, rows, "Samples that failed; their numbers are missing, never 0"))
     else:
-        parts.append(tag("p", "No sample failed."))
+        parts.append("No sample failed.")
     rows = []
     flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(numbers), int)
     for flag, words in _FLAGS.items():
@@ -290,11 +280,11 @@ def trust(content: Content) -> Html | None:
             rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit)])
     if rows:
         parts.append(
-            table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
+            Table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
         )
     else:
-        parts.append(tag("p", "No sample carries a warning."))
-    return join(parts)
+        parts.append("No sample carries a warning.")
+    return parts
 
 
 def _listed(numbers: np.ndarray) -> str:
