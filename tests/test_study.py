@@ -10,7 +10,6 @@ import sys
 import tomllib
 from collections import Counter
 
-import moocore
 import numpy as np
 import pytest
 from patience import crowded
@@ -556,16 +555,6 @@ def test_of_contact_forces_the_larger_is_the_objective():
 
 
 # -- parts ------------------------------------------------------------------------------------------
-
-
-def test_nondominated_rows():
-    values = np.random.default_rng(1).integers(0, 12, size=(200, 2)).astype(float)
-    kept = optimisation._nondominated(values)
-    expected = np.flatnonzero(moocore.is_nondominated(values))
-    np.testing.assert_array_equal(
-        np.unique(values[kept], axis=0), np.unique(values[expected], axis=0)
-    )
-    assert len(kept) == len(np.unique(values[kept], axis=0))
 
 
 def test_the_swarm_sees_the_exact_moments():

@@ -4,8 +4,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import moocore
 import numpy as np
-from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -242,23 +242,16 @@ def spread(run: StudyRun, fronts: Result) -> list[Choice]:
         padded = fronts[f"front_{index}"]
         places = np.argwhere(np.isfinite(padded[..., -1]))
         points = padded[places[:, 0], places[:, 1]]
-        kept = _nondominated(points[:, -2:])
+        kept = moocore.is_nondominated(points[:, -2:])  # of equal ones the first
         points, places = points[kept], places[kept]
         points_wanted = cut(points[:, -2:], run.study.verification.designs + 2)
         inner = points_wanted[np.argsort(points[points_wanted, -2], kind="stable")][1:-1]
         for number, row in enumerate(inner):
-            run_, solution = (int(index) for index in places[row])
+            number_of_run, solution = (int(index) for index in places[row])
             design = _design(run, case.name, points[row, :-2])
             name = f"{case.name} front {number + 1}"
-            chosen.append(Choice(name, case.name, design, (run_, solution)))
+            chosen.append(Choice(name, case.name, design, (number_of_run, solution)))
     return chosen
-
-
-def _nondominated(values: Array) -> NDArray[np.intp]:
-    """Rows that no other row dominates; of equal rows the first."""
-    order = np.lexsort((values[:, 1], values[:, 0]))
-    lowest = np.minimum.accumulate(np.append(np.inf, values[order, 1]))[:-1]
-    return np.sort(order[values[order, 1] < lowest])
 
 
 def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
