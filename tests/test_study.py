@@ -496,7 +496,7 @@ def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
     assert not any("paper" in name for name in dataset.read(place / "front.nc")["case"].values)
     shutil.rmtree(place / "responses")  # those of the formula lack what figures draw
     page = write_report(place).read_text(encoding="utf-8")
-    page = re.sub(r'src="data:[^"]*"', "", page)
+    page = re.sub(r'(?s)src="data:[^"]*"|<style>.*?</style>|<script>.*?</script>', "", page)
     assert OF_THE_PAPER.findall(page.replace(str(tmp_path), "")) == []
 
 
