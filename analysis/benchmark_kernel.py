@@ -26,6 +26,7 @@ from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.views import Outcome
 from hpcclear.results.dataset import provenance
 
 WIDTHS = (1, 16, 32)
@@ -33,17 +34,9 @@ YARDSTICK = "plain loop"
 REVOLUTIONS = (5, 5)  # transient, averaged
 
 
-def run_lanes(setup: Setup, width: int) -> np.ndarray:
-    """Simulate a setup on lanes; outcome rows in the order of the samples, shape (m, OUT)."""
-    lanes = Lanes(setup.problem, width)
-    lanes.queue(setup.par, setup.state, np.arange(len(setup.par)))
-    labels, rows = [], []
-    while lanes.pending:
-        lanes.advance(10.0)
-        finished = lanes.collect()
-        labels.append(finished[0])
-        rows.append(finished[1])
-    return np.concatenate(rows)[np.argsort(np.concatenate(labels))]
+def run_lanes(setup: Setup, width: int) -> Outcome:
+    """Simulate a setup on lanes; outcomes in the order of the samples."""
+    return Lanes(setup.problem, width).run(setup.par, setup.start)
 
 
 def run_plain(setup: Setup) -> np.ndarray:
@@ -51,7 +44,13 @@ def run_plain(setup: Setup) -> np.ndarray:
     p = setup.problem
     latched = p.effects.latched is not None
     return plain_loop.run(
-        setup.par, setup.state, p.rtol, p.atol, (p.transient, p.averaged), latched, p.impact_floor
+        setup.par,
+        setup.start.rows,
+        p.rtol,
+        p.atol,
+        (p.transient, p.averaged),
+        latched,
+        p.impact_floor,
     )
 
 
@@ -94,7 +93,7 @@ def _plain_force_loop(y, p, latched, count):
 def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
     """Force evaluations in contact, `count` a lane, compiled already."""
     tasks: dict[str, Callable[[], Any]] = {}
-    q, v = setup.state[0, :4].copy(), setup.state[0, at.MAX_COORDINATES :][:4]
+    q, v = setup.start[0].coordinates(4).copy(), setup.start[0].velocities(4)
     q[3] += 4e-4  # O23 well in contact
     for width in WIDTHS:
         repeat = _force_loop(width)
@@ -197,11 +196,11 @@ def measure(samples: int, rounds: int) -> xr.Dataset:
     force = paired_rounds(force_tasks(setup, count), rounds)
     lanes = [*WIDTHS, 1]
     found = [assembly_of(setup, width) for width in WIDTHS]
-    agreement = np.abs(results[YARDSTICK][:, 0] / results["W = 1"][:, at.OUT_OBJECTIVE] - 1.0)
+    agreement = np.abs(results[YARDSTICK][:, 0] / results["W = 1"].objective - 1.0)
     table = np.array([seconds[name] for name in tasks])
     ns = np.array([force[name] for name in tasks]) / (np.array(lanes)[:, None] * count) * 1e9
     plain_evaluations = results[YARDSTICK][:, 3].sum()
-    evaluations = [results[f"W = {w}"][:, at.OUT_EVALUATIONS].sum() for w in WIDTHS]
+    evaluations = [results[f"W = {w}"].evaluations.sum() for w in WIDTHS]
     divider, multipliers = floor_of(found[-1], throughput())
     unit = {"units": "1"}
     return xr.Dataset(

@@ -133,7 +133,7 @@ def fastest(runs: xr.Dataset) -> xr.DataArray:
 
 def first_of(setup: Setup, samples: int) -> Setup:
     """The first samples of a setup."""
-    return setup._replace(par=setup.par[:samples], state=setup.state[:samples])
+    return setup._replace(par=setup.par[:samples], start=setup.start[:samples])
 
 
 def batches_of(modules: list[Any], law: str) -> dict[str, tuple[Callable, int]]:

@@ -30,8 +30,9 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters
+from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.results.dataset import provenance
 from hpcclear.scene import load_scene
 
@@ -74,32 +75,19 @@ def scene_of(name: str, method: str, rtol: float):
 
 
 def ends(lanes: Lanes, given: Setup) -> Array:
-    """Outcome rows (revolutions, OUT) of one revolution from each start state."""
-    count = len(given.state)
-    lanes.queue(given.par[:count], given.state, np.arange(count))
-    found = np.empty((count, at.OUT))
-    while lanes.pending:
-        lanes.advance(10.0)
-        labels, out, _ = lanes.collect()
-        found[labels] = out
-    return found
-
-
-def state_after(row: Array) -> Array:
-    """Start state of the next revolution from an outcome row."""
-    n = at.MAX_COORDINATES
-    contacts = row[at.OUT_ACTIVE_12 : at.OUT_INVERSE_IMPACT_23 + 1]
-    return np.concatenate([row[at.OUT_STATE : at.OUT_STATE + 2 * n], contacts])
+    """Slider positions (revolutions,) after one revolution from each start."""
+    outcome = lanes.run(given.par[: len(given.start)], given.start)
+    return outcome.coordinates(4)[:, SLIDER]
 
 
 def impacts(given: Setup, row: int) -> list[tuple[float, Array]]:
     """Pieces of one revolution between impacts, from a recorded tight run."""
     lanes = Lanes(given.problem, 1, np.zeros((1 << 20, rec.columns(4))))
-    lanes.queue(given.par[:1], given.state[row : row + 1], np.zeros(1, np.int64))
+    lanes.queue(given.par[:1], given.start[row : row + 1], np.zeros(1, np.int64))
     while lanes.pending:
         lanes.advance(10.0)
     rows = lanes.take_record()
-    inverse = given.state[row, -2:].copy()
+    inverse = given.start[row].inverse_impact.copy()
     pieces = [(0.0, inverse)]
     for after in rows[1:]:
         new = (after[rec.ACTIVE_12 : rec.ACTIVE_23 + 1] == 1.0) & (
@@ -120,19 +108,19 @@ def prepare(name: str, revolutions: int, rtols: Array) -> Case:
 
     tight = at_tolerance("dormand-prince", 1e-11)
     lanes = Lanes(tight.problem, 1)
-    state, states = tight.state, []
+    start, starts = tight.start, []
     for k in range(SETTLED + revolutions):
         if k >= SETTLED:
-            states.append(state[0])
-        state = state_after(ends(lanes, tight._replace(state=state))[0])[None]
-    start = np.array(states)
+            starts.append(start.rows)
+        start = lanes.run(tight.par, start).end()
+    start = Start(np.concatenate(starts))
     par = np.repeat(tight.par, revolutions, axis=0)
 
     def with_start(given: Setup) -> Setup:
-        return given._replace(par=par, state=start)
+        return given._replace(par=par, start=start)
 
     sharp = with_start(at_tolerance("dormand-prince", 1e-12))
-    exact = ends(Lanes(sharp.problem, 1), sharp)[:, at.OUT_STATE + SLIDER]
+    exact = ends(Lanes(sharp.problem, 1), sharp)
     latched = sharp.problem.effects.latched is not None
     none = [(0.0, np.zeros(2))]
     pieces = [impacts(sharp, k) if latched else none for k in range(revolutions)]
@@ -163,8 +151,7 @@ def mechanics(latched: bool):
 def lsoda_solver(case: Case, given: Setup, rtol: float) -> Callable[[], Array]:
     """All revolutions by LSODA: slider positions at their ends."""
     address = mechanics(given.problem.effects.latched is not None).address
-    n = at.MAX_COORDINATES
-    period = float(given.par[0, at.PERIOD])
+    period = float(Parameters(given.par[0]).period)
     work = []
     for k, pieces in enumerate(case.pieces):
         times = [piece[0] for piece in pieces[1:]] + [period]
@@ -172,7 +159,7 @@ def lsoda_solver(case: Case, given: Setup, rtol: float) -> Callable[[], Array]:
             (np.array([a, b]), np.concatenate([given.par[k], inverse]))
             for (a, inverse), b in zip(pieces, times, strict=True)
         ]
-        work.append((np.concatenate([given.state[k, :4], given.state[k, n : n + 4]]), spans))
+        work.append((given.start[k].state(4), spans))
 
     def solve() -> Array:
         found = np.full(len(work), np.nan)
@@ -197,7 +184,7 @@ def lsoda_solver(case: Case, given: Setup, rtol: float) -> Callable[[], Array]:
 def own_solver(given: Setup) -> Callable[[], Array]:
     """All revolutions by this package, one lane."""
     lanes = Lanes(given.problem, 1)
-    return lambda: ends(lanes, given)[:, at.OUT_STATE + SLIDER]
+    return lambda: ends(lanes, given)
 
 
 def seconds_of(call: Callable[[], Array], repeats: int) -> float:

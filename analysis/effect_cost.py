@@ -15,10 +15,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage.ideal import ideal_response
-from hpcclear.dynamics.lowering import effects_of, parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import effects_of, problem_of
+from hpcclear.dynamics.start import start_states
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
@@ -77,20 +79,16 @@ class Ensemble:
 
     def __init__(self, scene: Scene, samples: int, width: int) -> None:
         self.par = parameters(scene, latin_hypercube(scene, samples))
-        self.state = start_states(scene, self.par)
+        self.start = start_states(scene, self.par)
         self.lanes = Lanes(problem_of(scene), width)
 
     def run(self) -> tuple[float, float]:
         """Seconds (of processor time: other work on the machine counts less) and force evaluations of a revolution."""
-        labels = np.arange(len(self.par))
-        start = time.process_time()
-        self.lanes.queue(self.par, self.state, labels)
-        while self.lanes.pending:
-            self.lanes.advance(1.0)
-        seconds = time.process_time() - start
-        out = self.lanes.collect()[1]
-        revolutions = out[:, at.OUT_REVOLUTIONS].sum()
-        return seconds / revolutions, out[:, at.OUT_EVALUATIONS].sum() / revolutions
+        started = time.process_time()
+        outcome = self.lanes.run(self.par, self.start)
+        seconds = time.process_time() - started
+        revolutions = outcome.revolutions.sum()
+        return seconds / revolutions, outcome.evaluations.sum() / revolutions
 
 
 def scene(entries: list[str], revolutions: int) -> Scene:
@@ -120,7 +118,7 @@ def closed_form(options: argparse.Namespace) -> np.ndarray:
     content = load_scene(JOB, entries[2:]).resolved()
     content.pop("study")  # no clearance is left to vary
     bare = load_scene(content, entries)
-    par, angles = parameters(bare)[0], np.linspace(0.0, at.TURN, 720)
+    par, angles = parameters(bare)[0], np.linspace(0.0, TURN, 720)
     times = []
     for _ in range(options.pairs + 1):
         start = time.process_time()

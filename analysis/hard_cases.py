@@ -24,12 +24,13 @@ import xarray as xr
 from hpcclear import __version__
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.energy import energies
 from hpcclear.dynamics.evaluator import evaluate_records, outcome_records
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -105,15 +106,13 @@ def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
     problem = problem_of(scene, ledger=True, series=True)
     n, par = problem.coordinates, parameters(scene)
-    state = start_states(scene, par)
+    start = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))
-    lanes.queue(par, state, np.zeros(1, np.int64))
-    start = np.zeros((1, rec.columns(n)))
-    start[0, rec.STATE : rec.STATE + 2 * n] = np.r_[
-        state[0, :n], state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n]
-    ]
-    start[0, rec.ACTIVE_12 : rec.ACTIVE_23 + 1] = state[0, 2 * at.MAX_COORDINATES :][:2]
-    return lanes, par, start
+    lanes.queue(par, start, np.zeros(1, np.int64))
+    row = np.zeros((1, rec.columns(n)))
+    row[:, rec.STATE : rec.STATE + 2 * n] = start.state(n)
+    row[:, rec.ACTIVE_12 : rec.ACTIVE_23 + 1] = start.active
+    return lanes, par, row
 
 
 def run(scene: Scene) -> Run:
@@ -130,11 +129,11 @@ def run(scene: Scene) -> Run:
             total, largest = balance(scene, par[0], rows, n)
             off = max(off, float(np.abs(total - first).max()))
             size = max(size, float(largest.max()))
-    labels, out, finished = lanes.collect()
+    labels, outcome, finished = lanes.collect()
     return Run(
-        outcome_records(labels, out, finished)[0],
+        outcome_records(labels, outcome, finished)[0],
         off / size,
-        out[0, at.OUT_STIFF_STEPS] / max(out[0, at.OUT_ATTEMPTS], 1.0),
+        float(outcome.stiff_steps[0] / max(outcome.attempts[0], 1.0)),
         time.perf_counter() - began,
     )
 

@@ -19,9 +19,8 @@ import xarray as xr
 from hard_cases import balance, chunks, recorded
 
 from hpcclear import __version__
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import baumgarte
-from hpcclear.dynamics.lowering import topology
+from hpcclear.dynamics.parameters import topology
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 
@@ -45,7 +44,7 @@ def largest_by_revolution(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         sizes = np.maximum.accumulate(np.r_[size, sizes])[1:]
         size = sizes[-1]
         np.maximum.at(residual, turn, np.abs(total - begun) / sizes)
-        if n == at.MAX_COORDINATES:
+        if scene.numerics.formulation == "baumgarte":
             q = rows[:, rec.STATE : rec.STATE + n].T
             unmet = baumgarte.constraint_violation(first, second, par[0], q)
             violation[turn] = np.fmax(violation[turn], 0.0)

@@ -208,7 +208,7 @@ def run(
     latched: bool,
     floor: float = 1e-3,
 ) -> Array:
-    """Samples as `hpcclear.dynamics.lowering` describes them (parameters, start states), one row of `OUTPUTS` each.
+    """Samples as the kernel reads them (rows of parameters and of starts), one row of `OUTPUTS` each.
 
     Parameters
     ----------

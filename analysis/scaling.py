@@ -44,12 +44,10 @@ def sample_costs(samples: int) -> np.ndarray:
     from benchmark_kernel import run_lanes
     from scenes import ensemble, scene
 
-    from hpcclear.dynamics import layout as at
-
     setup = ensemble(scene("lankarani-nikravesh", 1e-6, 5, 5), samples)
     run_lanes(setup, LANES)
     started = time.process_time()
-    evaluations = run_lanes(setup, LANES)[:, at.OUT_EVALUATIONS]
+    evaluations = run_lanes(setup, LANES).evaluations
     return evaluations * (time.process_time() - started) / evaluations.sum()
 
 

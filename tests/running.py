@@ -8,8 +8,11 @@ from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.views import Outcome
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -20,9 +23,9 @@ KERNEL_ORDER = [X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI]
 
 @dataclass
 class Run:
-    """Outcome row, parameters, and every accepted step."""
+    """Outcome, parameters, and every accepted step."""
 
-    out: np.ndarray
+    out: Outcome
     par: np.ndarray
     start: np.ndarray  # (2 n,)
     time: np.ndarray
@@ -32,7 +35,7 @@ class Run:
 
     @property
     def evaluations(self) -> float:
-        return self.out[at.OUT_EVALUATIONS]
+        return float(self.out.evaluations)
 
 
 def scene_with(changes=None, revolutions=1, rtol=1e-8) -> Scene:
@@ -53,22 +56,21 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
     par = parameters(scene)
     for row, value in (par_changes or {}).items():
         par[:, row] = value
-    state = start_states(scene, par)
+    start = start_states(scene, par)
     n = problem.coordinates
     if shift is not None:
-        state[0, :n] += shift[0]
-        state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n] += shift[1]
+        start.coordinates(n)[0] += shift[0]
+        start.velocities(n)[0] += shift[1]
     lanes = Lanes(problem, 1, np.zeros((4096, rec.columns(n))))
-    lanes.queue(par, state, np.zeros(1, np.int64))
+    lanes.queue(par, start, np.zeros(1, np.int64))
     chunks = []
     while lanes.pending:
         lanes.advance(1.0)
         chunks.append(lanes.take_record())
     rows = np.concatenate(chunks)
     s = rec.STATE
-    start = np.concatenate([state[0, :n], state[0, at.MAX_COORDINATES : at.MAX_COORDINATES + n]])
     return Run(
-        lanes.collect()[1][0], par[0], start, rows[:, rec.TIME], rows[:, s : s + n],
+        lanes.collect()[1][0], par[0], start[0].state(n), rows[:, rec.TIME], rows[:, s : s + n],
         rows[:, s + n : s + 2 * n], rows[:, [rec.ACTIVE_12, rec.ACTIVE_23]],
     )  # fmt: skip
 
@@ -150,9 +152,9 @@ def energy_residual(scene: Scene, result: Run) -> tuple[float, float]:
     touching = np.zeros(2)
     before = energy(scene, result.par, result.start[:n], result.start[n:], touching)
     after = energy(scene, result.par, result.q[-1], result.v[-1], result.contacts[-1])
-    drive, passed, lost, load = out[
-        [at.OUT_DRIVE_WORK, at.OUT_ABS_DRIVE_WORK, at.OUT_DISSIPATED, at.OUT_LOAD_WORK]
-    ]
+    drive, passed, lost, load = (
+        float(x) for x in (out.drive_work, out.absolute_drive_work, out.dissipated, out.load_work)
+    )
     return after - before - drive - load + lost, passed + abs(lost) + abs(load) + abs(
         after - before
     )

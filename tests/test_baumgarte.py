@@ -5,10 +5,9 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, run, scene_with
 from scipy.interpolate import CubicHermiteSpline
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.linkage.baumgarte import PHI1, X3, Y3, constraint_violation
-from hpcclear.dynamics.lowering import effects_of
+from hpcclear.dynamics.problem import effects_of
 
 IDEAL = {"joints.crank_rod": {"kind": "ideal"}, "joints.rod_slider": {"kind": "ideal"}}
 TORQUE = {"kind": "torque", "torque": 5.0, "initial_speed": "5000 rpm", "flywheel_inertia": 1e-2}
@@ -36,7 +35,7 @@ def test_formulations_agree(contact, revolutions):
     path = CubicHermiteSpline(nine.time, nine.q[:, X3], nine.v[:, X3])
     assert np.abs(path(minimal.time[1:-1]) - minimal.q[1:-1, 3]).max() < 1e-7
     assert largest_violation(("crank_rod", "rod_slider"), nine) < 1e-9
-    assert nine.out[at.OUT_OBJECTIVE] == pytest.approx(minimal.out[at.OUT_OBJECTIVE], rel=1e-6)
+    assert nine.out.objective == pytest.approx(minimal.out.objective, rel=1e-6)
 
 
 @pytest.mark.full
@@ -63,7 +62,7 @@ def test_formulation_follows_the_closed_form_without_clearance():
     assert np.abs(nine.q[:-1, X3] - exact[ideal.SLIDER_X]).max() < 1e-8
     assert np.abs(nine.v[:-1, X3] - exact[ideal.SLIDER_V]).max() < 1e-5
     assert largest_violation((), nine) < 1e-9
-    assert nine.out[at.OUT_OBJECTIVE] == 0.0
+    assert nine.out.objective == 0.0
 
 
 @pytest.mark.parametrize("b", [250.0, 100.0, 0.0])

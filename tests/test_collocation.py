@@ -14,9 +14,12 @@ from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import integrate
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record
+from hpcclear.dynamics.views import Outcome, Start
 from hpcclear.scene.points import Points
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"
@@ -138,8 +141,8 @@ def test_order_on_an_oscillator():
 # ---- results ----------------------------------------------------------------------------------------
 
 
-def outcome(scene) -> np.ndarray:
-    """Outcome row of one sample; with its record, so that every test runs the same compiled stepper."""
+def outcome(scene) -> Outcome:
+    """Outcome of one sample; with its record, so that every test runs the same compiled stepper."""
     return run(scene).out
 
 
@@ -148,27 +151,25 @@ def test_collocation_agrees_with_the_pair(name: str):
     """Two methods that share no coefficient, at tolerances where both have converged."""
     ours = outcome(case(name, "lobatto", 1e-10, 1))
     pair = outcome(case(name, "dormand-prince", 1e-11, 1))
-    assert ours[at.OUT_STATUS] == pair[at.OUT_STATUS] == 0
-    assert ours[at.OUT_ATTEMPTS] < 0.5 * pair[at.OUT_ATTEMPTS]
-    columns = [
-        at.OUT_OBJECTIVE, at.OUT_GAP_12, at.OUT_GAP_23, at.OUT_DRIVE_WORK, at.OUT_DISSIPATED,
-        at.OUT_LOAD_WORK, at.OUT_TIME, at.OUT_LATCHED_12, at.OUT_LATCHED_23,
-    ]  # fmt: skip
+    assert ours.status == pair.status == 0
+    assert ours.attempts < 0.5 * pair.attempts
+    names = ["objective", "mean_gap", "drive_work", "dissipated", "load_work", "time", "latched"]
     if name == "everything":
-        columns += [at.OUT_FORCE_12, at.OUT_FORCE_23, at.OUT_ACCELERATION]
-    np.testing.assert_allclose(ours[columns], pair[columns], rtol=3e-8)
+        names += ["mean_force", "acceleration_deviation"]
+    for which in names:
+        np.testing.assert_allclose(
+            getattr(ours, which), getattr(pair, which), rtol=3e-8, err_msg=which
+        )
     # |power| has a kink at each zero, which no method steps to: long steps feel it more; it is a scale and no result
-    absolute = at.OUT_ABS_DRIVE_WORK
-    assert ours[absolute] == pytest.approx(pair[absolute], rel=1e-4)
-    state = slice(at.OUT_STATE, at.OUT)
-    np.testing.assert_allclose(ours[state], pair[state], rtol=1e-7, atol=1e-9)
+    assert ours.absolute_drive_work == pytest.approx(pair.absolute_drive_work, rel=1e-4)
+    np.testing.assert_allclose(ours.moving, pair.moving, rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_tighter_tolerance_is_nearer(name: str):
-    exact = outcome(case(name, "lobatto", 1e-12, 1))[at.OUT_OBJECTIVE]
+    exact = outcome(case(name, "lobatto", 1e-12, 1)).objective
     errors = [
-        abs(outcome(case(name, "lobatto", rtol, 1))[at.OUT_OBJECTIVE] / exact - 1.0)
+        abs(outcome(case(name, "lobatto", rtol, 1)).objective / exact - 1.0)
         for rtol in (1e-4, 1e-7, 1e-10)
     ]
     assert errors[0] < 1e-3
@@ -196,7 +197,7 @@ def test_interruptions_do_not_change_one_bit(name: str):
         lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
         while lanes.pending:
             lanes.step(budget)
-        return lanes.collect()[1].tobytes()
+        return lanes.collect()[1].rows.tobytes()
 
     assert finished(1) == finished(1_000_000)
 
@@ -206,19 +207,13 @@ def test_samples_one_after_the_other_do_not_know_of_each_other():
     clearances = np.array([[0.2e-3], [0.5e-3], [0.3e-3]])
     points = Points(["c"], clearances, [["joints.crank_rod.clearance"]])
     par = parameters(scene, points)
-    state = start_states(scene, par)
+    start = start_states(scene, par)
     lanes = Lanes(problem_of(scene), 32)
     assert lanes.width == 1
-    lanes.queue(par, state, np.arange(3))
-    while lanes.pending:
-        lanes.advance(1.0)
-    labels, rows, _ = lanes.collect()
+    together = lanes.run(par, start)
     for k in range(3):
-        alone = Lanes(problem_of(scene), 1)
-        alone.queue(par[k : k + 1], state[k : k + 1], np.zeros(1, np.int64))
-        while alone.pending:
-            alone.advance(1.0)
-        assert alone.collect()[1][0].tobytes() == rows[list(labels).index(k)].tobytes()
+        alone = Lanes(problem_of(scene), 1).run(par[k : k + 1], start[k : k + 1])
+        assert alone[0].rows.tobytes() == together[k].rows.tobytes()
 
 
 def test_the_record_holds_every_node_and_a_small_one_changes_no_step():
@@ -243,9 +238,9 @@ def test_the_record_holds_every_node_and_a_small_one_changes_no_step():
 
 def test_a_lost_cause_ends_with_a_status():
     scene = case("dry", "lobatto", 1e-6).with_({"numerics.max_steps": 20})
-    row = outcome(scene)
-    assert row[at.OUT_STATUS] == 1
-    assert row[at.OUT_ATTEMPTS] == 20
+    lost = outcome(scene)
+    assert lost.status == 1
+    assert lost.attempts == 20
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
@@ -256,12 +251,10 @@ def test_a_response_is_the_ensemble_s_sample(name: str, rtol: float):
     _, alone, _ = integrate(scene)
     par = parameters(scene)
     lanes = Lanes(problem_of(scene), 32)
-    lanes.queue(np.repeat(par, 3, 0), np.repeat(start_states(scene, par), 3, 0), np.arange(3))
-    while lanes.pending:
-        lanes.advance(1.0)
-    rows = lanes.collect()[1]
+    starts = Start(np.repeat(start_states(scene, par).rows, 3, 0))
+    outcomes = lanes.run(np.repeat(par, 3, 0), starts)
     assert lanes.problem.tableau.name == "dormand-prince"
-    np.testing.assert_allclose(alone["objective"][0], rows[:, at.OUT_OBJECTIVE], rtol=1e-9)
+    np.testing.assert_allclose(alone["objective"][0], outcomes.objective, rtol=1e-9)
 
 
 def test_who_takes_collocation():
@@ -293,7 +286,7 @@ def test_a_sweep_is_packed(law: str):
     @numba.njit(error_model="numpy", fastmath=FASTMATH)
     def sweep(effects, m, work, table):
         lobatto.set_stages(m, work, 4, 1e-6)
-        lobatto.accelerations_of_stages(effects, m, table, table)
+        lobatto.accelerations_of_stages(effects, m, at.Tables(table, table))
         lobatto.guess(m, 4, 1e-6)
 
     effects = replace(single(scene(law, 1e-6, 1, 1)).problem).effects

@@ -14,10 +14,11 @@ from hard_case_runs import hard_cases, long_run
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.stepping.lifecycle import STATE
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points, check_points
 
@@ -165,14 +166,14 @@ def test_every_number_that_is_not_finite_is_refused(latched: Scene, bad: float):
 def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: float):
     """Behind the validation: each parameter and each part of the start state in turn, one sample each."""
     problem = problem_of(latched, ledger=True, series=True)
-    par = np.repeat(parameters(latched), at.PARAMETERS + STATE, axis=0)
-    state = start_states(latched, par)
-    for k in range(at.PARAMETERS):
+    par = np.repeat(parameters(latched), Parameters.size + Start.size, axis=0)
+    start = start_states(latched, par)
+    for k in range(Parameters.size):
         par[k, k] = bad
-    for k in range(STATE):
-        state[at.PARAMETERS + k, k] = bad
+    for k in range(Start.size):
+        start.rows[Parameters.size + k, k] = bad
     lanes = Lanes(problem, 1, np.zeros((4096, hard_cases.rec.columns(problem.coordinates))))
-    lanes.queue(par, state, np.arange(len(par)))
+    lanes.queue(par, start, np.arange(len(par)))
     for _ in hard_cases.chunks(lanes):
         pass
     outcomes = hard_cases.outcome_records(*lanes.collect())

@@ -9,7 +9,10 @@ from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_o
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.linkage import ideal
-from hpcclear.dynamics.lowering import parameters, periodic_cells, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import periodic_cells, problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Outcome
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
 ZERO = np.zeros(2)
@@ -164,12 +167,11 @@ def test_tabulated_load_is_taken_at_the_crank_angle():
 def test_outcomes_have_no_gap():
     par = np.tile(row_of_parameters(set(), None), (3, 1))
     par[:, at.PERIOD] = at.TURN / SPEED
-    rows = ideal.ideal_outcomes(at.Effects(), par, None, 5, 4)
-    assert (
-        rows[:, [at.OUT_STATUS, at.OUT_OBJECTIVE, at.OUT_SPREAD, at.OUT_EVALUATIONS]] == 0
-    ).all()
-    np.testing.assert_allclose(rows[:, at.OUT_TIME], 9 * at.TURN / SPEED)
-    assert np.isnan(ideal.ideal_outcomes(at.Effects(), par, None, 5, 1)[:, at.OUT_SPREAD]).all()
+    seen = Outcome(ideal.ideal_outcomes(at.Effects(), par, None, 5, 4))
+    for column in (seen.status, seen.objective, seen.spread, seen.evaluations):
+        np.testing.assert_array_equal(column, 0.0)
+    np.testing.assert_allclose(seen.time, 9 * at.TURN / SPEED)
+    assert np.isnan(Outcome(ideal.ideal_outcomes(at.Effects(), par, None, 5, 1)).spread).all()
 
 
 BARE = {
@@ -187,10 +189,10 @@ def test_a_queue_of_scenes_without_clearance_is_done_at_once():
     lanes.queue(par[3:], start_states(scene, par[3:]), np.array([2]))
     assert lanes.pending == 4
     lanes.advance(0.1)
-    labels, rows, seen = lanes.collect()
+    labels, outcome, seen = lanes.collect()
     assert lanes.pending == 0
     np.testing.assert_array_equal(labels, [5, 6, 7, 2])
-    np.testing.assert_array_equal(rows[:, at.OUT_OBJECTIVE], 0.0)
+    np.testing.assert_array_equal(outcome.objective, 0.0)
     np.testing.assert_array_equal(seen, par)
     assert len(lanes.collect()[0]) == 0
 

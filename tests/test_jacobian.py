@@ -10,10 +10,11 @@ from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
 from hpcclear.dynamics.implicit.radau import new_memory
 from hpcclear.dynamics.implicit.stiff import fit_to_ramp
-from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.stepping.lifecycle import ATOL, RTOL
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.start import start_states
 from hpcclear.scene import load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -36,8 +37,8 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     })  # fmt: skip
     problem = problem_of(scene)
     n, par = problem.coordinates, parameters(scene)
-    state = start_states(scene, par)[0]
-    q, v = state[:n].copy(), state[at.MAX_COORDINATES :][:n].copy()
+    start = start_states(scene, par)[0]
+    q, v = start.coordinates(n).copy(), start.velocities(n).copy()
     q += 1e-3 * np.random.default_rng(n).uniform(-1.0, 1.0, n)  # |e| above the clearance
     m = new_memory(1)[0]
     rows = m[: mem.JACOBIAN].reshape(-1, mem.LANES)
@@ -46,18 +47,15 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
         bank[at.STAGE_TIME] = 1e-4
     rows[at.QS : at.QS + n], rows[at.VS : at.VS + n] = q[:, None], v[:, None]
     settings = problem.settings()
-    m[mem.LEAST : mem.LEAST + n] = settings[ATOL : ATOL + n] / settings[RTOL]
-    m[mem.LEAST + n : mem.LEAST + 2 * n] = (
-        settings[ATOL + at.MAX_COORDINATES :][:n] / settings[RTOL]
-    )
-    fit_to_ramp(m, settings)
+    m[mem.LEAST : mem.LEAST + n] = settings.atol_coordinates[:n] / settings.rtol
+    m[mem.LEAST + n : mem.LEAST + 2 * n] = settings.atol_velocities[:n] / settings.rtol
+    fit_to_ramp(m, settings.rows)
     return problem, m
 
 
 def effects_and_tables(problem: Problem) -> tuple:
     """As the stepper of lanes hands them on."""
-    lanes = Lanes(problem, 1)
-    return lanes._effects, lanes._tables
+    return Lanes(problem, 1)._effects, problem.tables
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)
@@ -73,18 +71,18 @@ def test_columns_are_the_derivatives(name: str):
         out = np.zeros((len(states), n + at.RATES))
         contacts = rows[at.ACTIVE_12 : at.INVERSE_IMPACT_23 + 1, mem.MIDDLE]
         observe(
-            effects, n, rows[mem.PAR : mem.SECOND, 0].copy(), *tables, states,
+            effects, rows[mem.PAR : mem.SECOND, 0].copy(), tables, states,
             np.tile(contacts, (len(states), 1)),
             np.full(len(states), rows[at.STAGE_TIME, mem.MIDDLE]), out,
         )  # fmt: skip
         return out[:, :n]
 
-    evaluate_bank(effects, m, *tables)
+    evaluate_bank(effects, m, tables)
     found = rows[at.ACC : at.ACC + n, mem.MIDDLE]
     here = accelerations(state[None])[0]
     assert found == pytest.approx(here, rel=1e-13, abs=1e-12 * abs(here).max())
     m[mem.BASE : mem.BASE + n] = found
-    difference_jacobian(effects, (0,) * n, m, *tables)
+    difference_jacobian(effects, (0,) * n, m, tables)
     columns = m[mem.JACOBIAN : mem.JACOBIAN + n * mem.COLUMNS].reshape(n, mem.COLUMNS)[:, : 2 * n]
 
     least = m[mem.LEAST : mem.LEAST + 2 * n]

@@ -162,7 +162,8 @@ def seen_by_kernel(effects, par, q, v, contacts, t):
     out = np.zeros((1, len(q) + at.RATES))
     table = np.zeros(4)
     states = np.concatenate([q, v])[None]
-    observe(flags, len(q), par, table, table, states, contacts[None], np.array([t]), out)
+    tables = at.Tables(table, table)
+    observe(flags, par, tables, states, contacts[None], np.array([t]), out)
     return out[0, : len(q)], out[0, len(q) :]
 
 

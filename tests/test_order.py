@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, Tableau
-from hpcclear.dynamics.lanes import Lanes, Problem
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.stepping import lifecycle as cycle
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Parameters, Settings
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -25,13 +26,10 @@ SCALES = np.array([1e-3, 1e-3, 1e-2, 1e-3, 1.0, 1.0, 50.0, 1.0])  # m, rad; m/s,
 class ConstantSteps(Problem):
     """A step-size controller that accepts every step and asks for the same again."""
 
-    def settings(self) -> np.ndarray:
+    def settings(self) -> Settings:
         s = super().settings()
-        s[cycle.RTOL] = s[cycle.ATOL :] = 1e300  # the error is 0, its rough logarithm -1023
-        s[cycle.EXPONENT], s[cycle.BETA] = (
-            0.152003 / (0.5 * 1023.0),
-            0.0,
-        )  # cancels the safety factor
+        s.rtol = s.atol = 1e300  # the error is 0, its rough logarithm -1023
+        s.exponent, s.beta = 0.152003 / (0.5 * 1023.0), 0.0  # cancels the safety factor
         return s
 
 
@@ -59,20 +57,16 @@ def state_after(scene: Scene, tableau: Tableau, steps: int) -> np.ndarray:
     problem = replace(problem_of(scene, ledger=True), tableau=tableau)
     problem = ConstantSteps(**vars(problem))
     par = parameters(scene)
-    par[:, at.PERIOD] *= STRETCH
-    par[:, at.FIRST_STEP] = par[:, at.PERIOD] / steps
-    lanes = Lanes(problem, 1)
-    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    while lanes.step(1000):
-        pass
-    row = lanes.collect()[1][0]
-    assert row[at.OUT_STATUS] == 0
-    assert row[at.OUT_ATTEMPTS] == steps
+    p = Parameters(par)
+    p.period *= STRETCH
+    p.first_step = p.period / steps
+    out = Lanes(problem, 1).run(par, start_states(scene, par))[0]
+    assert out.status == 0
+    assert out.attempts == steps
     n = problem.coordinates
-    q = row[at.OUT_STATE : at.OUT_STATE + n]
-    v = row[at.OUT_STATE + at.MAX_COORDINATES : at.OUT_STATE + at.MAX_COORDINATES + n]
-    works = row[[at.OUT_DRIVE_WORK, at.OUT_DISSIPATED]]
-    return np.concatenate([q, v, row[[at.OUT_GAP_12, at.OUT_GAP_23]], works])
+    return np.r_[
+        out.coordinates(n), out.velocities(n), out.mean_gap, out.drive_work, out.dissipated
+    ]
 
 
 @pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=lambda t: t.name)

@@ -8,12 +8,14 @@ import pytest
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import evaluator
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, evaluate_records
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import integrate
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record
+from hpcclear.dynamics.views import Outcome
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -155,12 +157,12 @@ def test_interruptions_do_not_change_one_bit(budgets: tuple[int, ...]):
     def outcomes(budgets: tuple[int, ...]) -> np.ndarray:
         lanes = Lanes(problem_of(scene), DEFAULT_LANES)
         lanes.queue(par, start_states(scene, par), np.arange(len(points)))
-        out = np.empty((len(points), at.OUT))
+        out = np.empty((len(points), Outcome.size))
         count = 0
         while lanes.pending:
             lanes.step(budgets[count % len(budgets)])
-            labels, rows, _ = lanes.collect()
-            out[labels] = rows
+            labels, finished, _ = lanes.collect()
+            out[labels] = finished.rows
             count += 1
         return out
 

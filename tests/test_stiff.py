@@ -2,16 +2,17 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import implicit_method, parameters, problem_of, start_states
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import implicit_method, problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Outcome, Start
 from hpcclear.scene import Scene, load_scene
 
 ROOT = Path(__file__).parent.parent
-SLIDER = at.OUT_STATE + 3
+SLIDER = 3
 STIFF = {
     "friction, latched": (
         {"law": "lankarani-nikravesh", "restitution": 0.9},
@@ -41,25 +42,18 @@ def scene_of(name: str, method: str, rtol: float) -> Scene:
     return load_scene(ROOT / "jobs" / "slider_crank.toml").with_(changes)
 
 
-def one_turn(scene: Scene, state: np.ndarray) -> np.ndarray:
-    """Outcome row of one revolution from a start state (1, STATE)."""
-    lanes = Lanes(problem_of(scene), 1)
-    lanes.queue(parameters(scene), state, np.zeros(1, np.int64))
-    while lanes.pending:
-        lanes.advance(10.0)
-    return lanes.collect()[1][0]
+def one_turn(scene: Scene, start: Start) -> Outcome:
+    """Outcome of one revolution from one start."""
+    return Lanes(problem_of(scene), 1).run(parameters(scene), start)
 
 
-def settled(name: str) -> np.ndarray:
+def settled(name: str) -> Start:
     """A state three revolutions after the start, from a tight run: from rest these scenes are ill-posed."""
     scene = scene_of(name, "dormand-prince", 1e-9)
-    state = start_states(scene, parameters(scene))
+    start = start_states(scene, parameters(scene))
     for _ in range(3):
-        row = one_turn(scene, state)
-        contacts = row[at.OUT_ACTIVE_12 : at.OUT_INVERSE_IMPACT_23 + 1]
-        moving = row[at.OUT_STATE : at.OUT_STATE + 2 * at.MAX_COORDINATES]
-        state = np.concatenate([moving, contacts])[None]
-    return state
+        start = one_turn(scene, start).end()
+    return start
 
 
 @pytest.mark.parametrize("name", STIFF)
@@ -68,13 +62,14 @@ def test_automatic_choice_is_right_and_cheaper(name: str):
     exact = one_turn(scene_of(name, "dormand-prince", 1e-12), state)
     chosen = one_turn(scene_of(name, "auto", 1e-7), state)
     explicit = one_turn(scene_of(name, "dormand-prince", 1e-7), state)
-    assert chosen[at.OUT_STATUS] == exact[at.OUT_STATUS] == 0.0
+    assert chosen.status == exact.status == 0.0
     # it takes implicit steps, and not only those
-    assert 0.0 < chosen[at.OUT_STIFF_STEPS] < chosen[at.OUT_ATTEMPTS]
-    assert abs(chosen[SLIDER] - exact[SLIDER]) < 1e-7
+    assert 0.0 < chosen.stiff_steps < chosen.attempts
+    missed = chosen.coordinates(4) - exact.coordinates(4)
+    assert abs(missed[0, SLIDER]) < 1e-7
     # an implicit step takes the time of two explicit ones; evaluations do not tell, it has eight of them at a time
-    weighted = chosen[at.OUT_ATTEMPTS] + chosen[at.OUT_STIFF_STEPS]
-    assert weighted < 0.6 * explicit[at.OUT_ATTEMPTS]
+    weighted = chosen.attempts + chosen.stiff_steps
+    assert weighted < 0.6 * explicit.attempts
 
 
 def test_scenes_that_are_not_stiff_do_not_pay():

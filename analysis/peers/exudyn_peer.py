@@ -64,9 +64,9 @@ def _contact(mbs, p, joint: int, floor: float, journal, bearing) -> None:
 
 
 def _model(setup: Setup, sample: int):
-    p, state = setup.par[sample], setup.state[sample]
+    p, start = setup.par[sample], setup.start[sample]
     floor = setup.problem.impact_floor
-    velocity = state[at.MAX_COORDINATES :]
+    state, velocity = start.coordinates(4), start.velocities(4)
     system = exu.SystemContainer()
     mbs = system.AddSystem()
     _, crank = _body(mbs, 1.0, _HUGE, [0, 0, 0], [0, 0, p[at.SPEED]], (0, 1))

@@ -4,16 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import plain_loop
 from scenes import Setup
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TABLEAUS
-from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.problem import Problem
 from peers.system import SLIDER, Array
 
-POSITION = at.OUT_STATE + SLIDER
 WIDTH = 32
 
 
@@ -24,13 +22,7 @@ def lanes_positions(setup: Setup, width: int) -> Array:
 
 
 def _collected(lanes: Lanes, setup: Setup) -> Array:
-    lanes.queue(setup.par, setup.state, np.arange(len(setup.par)))
-    found = np.empty(len(setup.par))
-    while lanes.pending:
-        lanes.advance(10.0)
-        finished = lanes.collect()
-        found[finished[0]] = finished[1][:, POSITION]
-    return found
+    return lanes.run(setup.par, setup.start).coordinates(4)[:, SLIDER]
 
 
 @cache
@@ -53,7 +45,7 @@ def _solver(name: str) -> Callable[[Setup, int], float]:
         key = (problem.effects, name, problem.rtol, problem.atol)
         _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
-            par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
+            par=setup.par[sample : sample + 1], start=setup.start[sample : sample + 1]
         )
         return float(_collected(_one_lane(key), one)[0])
 
@@ -63,7 +55,7 @@ def _solver(name: str) -> Callable[[Setup, int], float]:
 def plain(setup: Setup, sample: int = 0) -> float:
     """The yardstick, one sample."""
     return float(plain_positions(setup._replace(
-        par=setup.par[sample : sample + 1], state=setup.state[sample : sample + 1]
+        par=setup.par[sample : sample + 1], start=setup.start[sample : sample + 1]
     ))[0])  # fmt: skip
 
 
@@ -73,7 +65,7 @@ def plain_positions(setup: Setup) -> Array:
     latched = p.effects.latched is not None
     revolutions = (p.transient, p.averaged)
     found = plain_loop.run(
-        setup.par, setup.state, p.rtol, p.atol, revolutions, latched, p.impact_floor
+        setup.par, setup.start.rows, p.rtol, p.atol, revolutions, latched, p.impact_floor
     )
     return found[:, 1]
 

@@ -7,7 +7,7 @@ from scenes import Setup
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
-from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.views import Parameters
 
 STATES = 8
 SLIDER = 3  # index of the slider's position
@@ -22,14 +22,13 @@ def right_hand_side(t, y, dy, p):
 
 def start(setup: Setup, sample: int = 0) -> Array:
     """Start state of one sample, shape (8,)."""
-    state = setup.state[sample]
-    return np.concatenate([state[:4], state[at.MAX_COORDINATES :][:4]])
+    return setup.start[sample].state(4)
 
 
 def end_time(setup: Setup, sample: int = 0) -> float:
     """Seconds of all revolutions."""
     p = setup.problem
-    return float(setup.par[sample, at.PERIOD]) * (p.transient + p.averaged)
+    return float(Parameters(setup.par[sample]).period) * (p.transient + p.averaged)
 
 
 def tolerances(setup: Setup) -> Array:

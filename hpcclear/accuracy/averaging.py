@@ -16,11 +16,13 @@ import numpy as np
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.revolutions import objective, turn_by_turn
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.revolutions import gaps_of_revolutions, objective
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 
 KICK = 1e-10
@@ -87,14 +89,12 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
     here = one_turn(scene)
     problem = problem_of(here)
     par = np.repeat(parameters(here), copies, axis=0)
-    par[1::2, at.STRICTNESS] = STRICTER**2  # squared, as the kernel keeps it
-    state = np.repeat(start_states(here, parameters(here)), copies, axis=0)
-    n = 2 * at.MAX_COORDINATES
-    kicks = np.random.default_rng(0).uniform(-KICK, KICK, (copies, n))
-    state[:, :n] *= 1.0 + kicks
+    Parameters(par[1::2]).strictness = STRICTER**2  # squared, as the kernel keeps it
+    start = Start(np.repeat(start_states(here, parameters(here)).rows, copies, axis=0))
+    start.moving *= 1.0 + np.random.default_rng(0).uniform(-KICK, KICK, start.moving.shape)
     lanes = Lanes(problem, DEFAULT_LANES)
     lanes.step(1)  # without samples it only compiles
     started = time.perf_counter()
-    gaps = turn_by_turn(lanes, par, state, revolutions)
+    gaps = gaps_of_revolutions(lanes, par, start, revolutions)
     seconds = (time.perf_counter() - started) / (revolutions * copies)
     return gaps[:, np.isfinite(gaps[-1]).all(axis=1)], seconds

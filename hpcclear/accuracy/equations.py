@@ -9,37 +9,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
-from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Problem
-from hpcclear.dynamics.linkage.rhs import accelerations
-
-OPEN, FORCE, RATE = 0, 1, 2
-"""Columns of what `seen` holds at each joint: gap (m), contact force (N), rate of the gap (m/s)."""
-
-
-# eleven arguments: packed into a named tuple, a call from Python takes 32 us in place of 17
-@scalar_function
-def derivative(effects, n, par, torque_table, load_table, contacts, time, y, work, out, seen):
-    """Write dy/dt at `time` since the start of the revolution to `out`, and what the joints show to `seen` (2, 3).
-
-    `contacts`: whether each joint is latched, then 1/d'_0 of each. `work` holds the kernel's rows of one lane.
-    """
-    for k in range(n):
-        work[at.QS + k] = y[k]
-        work[at.VS + k] = y[n + k]
-    work[at.ACTIVE_12] = contacts[0]
-    work[at.ACTIVE_23] = contacts[1]
-    work[at.INVERSE_IMPACT_12] = contacts[2]
-    work[at.INVERSE_IMPACT_23] = contacts[3]
-    work[at.STAGE_TIME] = time
-    accelerations(effects, work, par, torque_table, load_table, 1)
-    for k in range(n):
-        out[k] = y[n + k]
-        out[n + k] = work[at.ACC + k]
-    for j, gap in ((0, at.GAP_12), (1, at.GAP_23)):
-        for m in range(3):
-            seen[j, m] = work[at.RATE_NOW + gap + m]
-        out[2 * n + j] = abs(seen[j, OPEN])
+from hpcclear.dynamics.layout import TURN
+from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
+from hpcclear.dynamics.problem import Problem
+from hpcclear.dynamics.views import Parameters, Start
 
 
 @scalar_function
@@ -58,38 +31,30 @@ def latch(contacts, seen, floor):
 
 
 @scalar_function
-def classical_turn(
-    effects, n, par, torque_table, load_table, latched, free, floor, steps, y, contacts
-):
+def classical_turn(effects, par, tables, rule, steps, y, contacts, seen):
     """Integrate `y` over one revolution by the classical Runge-Kutta method of order 4, in equal steps.
 
-    Contacts start and end between steps, as they come. Returns duration, largest contact force at a step's end, and
-    evaluations; `free`: the last of the n coordinates is the crank angle, and the last step is cut at a full turn.
+    Contacts start and end between steps, as they come. `rule`: whether contacts latch, whether the last coordinate is the
+    crank angle (then the last step is cut at a full turn), least impact speed, period. Returns duration, largest contact
+    force at a step's end, and evaluations.
     """
-    work, out, seen = np.zeros(at.WORK), np.empty(len(y)), np.zeros((2, 3))
+    latched, free, floor, period = rule
+    n = len(y) // 2 - 1
+    out, joints = seen.rates, seen.joints
     stage, total = y.copy(), np.empty(len(y))
-    h = par[at.PERIOD] / steps
+    h = period / steps
     time, peak, count, step, corrections, s, last = 0.0, 0.0, 0, 0, 0, 0, False
     while True:
         c = 0.0 if s == 0 else (1.0 if s == 3 else 0.5)
         derivative(
-            effects,
-            n,
-            par,
-            torque_table,
-            load_table,
-            contacts,
-            time + c * h,
-            stage,
-            work,
-            out,
-            seen,
-        )
+            effects, par, tables.torque, tables.load, contacts, time + c * h, stage,
+            out, joints, seen.work,
+        )  # fmt: skip
         count += 1
         if s == 0:
-            if latched and latch(contacts, seen, floor):
+            if latched and latch(contacts, joints, floor):
                 continue  # the force has jumped: the first stage anew
-            peak = max(peak, max(seen[0, FORCE], seen[1, FORCE]))
+            peak = max(peak, max(joints[0, FORCE], joints[1, FORCE]))
             if last or step >= 1000 * steps or not np.isfinite(out[n]):
                 return time, peak, count
             total[:] = 0.0
@@ -102,9 +67,9 @@ def classical_turn(
             s = 0
             for k in range(len(y)):
                 stage[k] = y[k] + h / 6.0 * total[k]
-            beyond = free and (corrections > 0 or stage[n - 1] > at.TURN)
+            beyond = free and (corrections > 0 or stage[n - 1] > TURN)
             if beyond and corrections < 6:
-                h += (at.TURN - stage[n - 1]) / stage[2 * n - 1]
+                h += (TURN - stage[n - 1]) / stage[2 * n - 1]
                 corrections += 1
                 stage[:] = y
             else:
@@ -121,44 +86,52 @@ class Equations:
     ----------
     problem : Problem
     par : ndarray, shape (PARAMETERS,)
-    start : ndarray, shape (STATE,)
-        As `hpcclear.dynamics.lowering` makes them.
+    start : Start
+        Of this design alone, as `hpcclear.dynamics.start` makes it.
     """
 
-    def __init__(self, problem: Problem, par: Array, start: Array) -> None:
+    def __init__(self, problem: Problem, par: Array, start: Start) -> None:
         n = problem.coordinates
-        none = np.zeros(4)
-        tables = [none if t is None else t for t in (problem.torque_table, problem.load_table)]
         self.n = n
         self.problem = problem
         self.par = par
+        self.named = Parameters(par)
         self.latched = problem.effects.latched is not None
         self.free = problem.effects.torque is not None
-        velocities = start[at.MAX_COORDINATES : at.MAX_COORDINATES + n]
-        self.start = np.concatenate([start[:n], velocities, np.zeros(2)])
-        self.contacts = start[2 * at.MAX_COORDINATES :][:4].copy()
-        self.seen = np.zeros((2, 3))
+        self.start = np.concatenate([start.state(n), np.zeros(2)])
+        self.contacts = start.contacts.copy()
+        self._origin = start
         self.calls = 0
-        self._head: tuple[Any, ...] = (problem.effects, n, par, *tables)
-        self._work = np.zeros(at.WORK)
+        self._head: tuple[Any, ...] = (problem.effects, par, *problem.tables)
+        self._seen = new_seen(n)
+
+    def anew(self) -> "Equations":
+        """The same design at its start."""
+        return Equations(self.problem, self.par, self._origin)
 
     def __call__(self, time: float, y: Array) -> Array:
         """dy/dt, shape (2 n + 2,)."""
-        out = np.empty_like(y)
         self.calls += 1
-        derivative(*self._head, self.contacts, time, y, self._work, out, self.seen)
-        return out
+        derivative(*self._head, self.contacts, time, y, *self._seen)
+        return self._seen.rates.copy()
 
     def joints(self, time: float, y: Array) -> Array:
         """Gap, contact force and rate of the gap at both joints, shape (2, 3)."""
-        derivative(*self._head, self.contacts, time, y, self._work, np.empty_like(y), self.seen)
-        return self.seen
+        derivative(*self._head, self.contacts, time, y, *self._seen)
+        return self._seen.joints
 
     def classical(self, steps: int) -> tuple[Array, float, float, int]:
         """State after one revolution in `steps` classical steps, its duration, largest force, evaluations."""
         y, contacts = self.start.copy(), self.contacts.copy()
-        floor = self.problem.impact_floor
+        rule = (self.latched, self.free, self.problem.impact_floor, float(self.named.period))
         time, peak, count = classical_turn(
-            *self._head, self.latched, self.free, floor, steps, y, contacts
+            self.problem.effects,
+            self.par,
+            self.problem.tables,
+            rule,
+            steps,
+            y,
+            contacts,
+            self._seen,
         )
         return y, time, peak, count

@@ -12,11 +12,14 @@ from scipy.optimize import minimize_scalar
 from hpcclear.accuracy.equations import FORCE, OPEN, RATE, Equations
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import layout as at
+from hpcclear.dynamics import views
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import geometry
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states, topology
+from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.start import start_states
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -84,13 +87,13 @@ def neighbours(scene: Scene, count: int) -> Points:
 
 
 def slider_of(
-    scene: Scene, par: Array, q: Array, v: Array, phi: float = at.TURN
+    scene: Scene, par: Array, q: Array, v: Array, phi: float = TURN
 ) -> tuple[float, float]:
     """Slider position (m) and velocity (m/s) at the end of a revolution, from coordinates and velocities of shape (n,)."""
     first, second, free = topology(scene)
     if scene.numerics.formulation == "baumgarte":
         return float(q[_SLIDER_9]), float(v[_SLIDER_9])
-    omega = v[-1] if free else par[at.SPEED]
+    omega = v[-1] if free else float(views.Parameters(par).speed)
     if free:
         phi, q, v = q[-1], q[:-1], v[:-1]
     angle, speed = np.array([phi]), np.array([omega])
@@ -115,38 +118,27 @@ def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics:
         here = one_turn(scene, rtol, **numerics)
         problem = problem_of(here)
         par = parameters(here, neighbours(here, designs))
-        state = start_states(here, par)
+        start = start_states(here, par)
         copies = -(-2 * width // designs) if width > 1 else 1
-        par, state = (np.tile(x, (copies, 1)) for x in (par, state))
+        par, start = np.tile(par, (copies, 1)), views.Start(np.tile(start.rows, (copies, 1)))
         Lanes(problem, width).step(1)  # without samples it only compiles
-        return (lambda: _kernel_outcome(here, problem, width, par, state, designs)), 1.0 / len(par)
+        return (lambda: _kernel_outcome(here, problem, width, par, start, designs)), 1.0 / len(par)
 
     return Method(name, prepare)
 
 
-def kernel_rows(problem: Problem, width: int, par: Array, state: Array) -> Array:
-    """Outcome rows (m, OUT) of designs in their order."""
-    lanes = Lanes(problem, width)
-    lanes.queue(par, state, np.arange(len(par)))
-    while lanes.step(1 << 40):
-        pass
-    labels, rows, *_ = lanes.collect()
-    return rows[np.argsort(labels)]
-
-
 def _kernel_outcome(
-    scene: Scene, problem: Problem, width: int, par: Array, state: Array, designs: int
+    scene: Scene, problem: Problem, width: int, par: Array, start: views.Start, designs: int
 ) -> Outcome:
-    rows = kernel_rows(problem, width, par, state)[:designs]
+    outcome = Lanes(problem, width).run(par, start)[:designs]
     n = problem.coordinates
     values = np.full((designs, len(QUANTITIES)), np.nan)
-    for k, row in enumerate(rows):
-        if row[at.OUT_STATUS] == 0:
-            q = row[at.OUT_STATE : at.OUT_STATE + n]
-            v = row[at.OUT_STATE + at.MAX_COORDINATES :][:n]
-            peak = max(row[at.OUT_PEAK_12], row[at.OUT_PEAK_23])
-            values[k] = *slider_of(scene, par[k], q, v), peak, row[at.OUT_OBJECTIVE]
-    return Outcome(values, rows[:, at.OUT_EVALUATIONS])
+    for k in range(designs):
+        one = outcome[k]
+        if one.status == 0:
+            slider = slider_of(scene, par[k], one.coordinates(n), one.velocities(n))
+            values[k] = *slider, one.peak_force.max(), one.objective
+    return Outcome(values, outcome.evaluations)
 
 
 # ---- methods that are not the kernel's ----------------------------------------------------------
@@ -157,8 +149,8 @@ def systems(scene: Scene, designs: int) -> list[Equations]:
     here = one_turn(scene, formulation="minimal", method="auto")
     problem = problem_of(here)
     par = parameters(here, neighbours(here, designs))
-    state = start_states(here, par)
-    return [Equations(problem, p, s) for p, s in zip(par, state, strict=True)]
+    start = start_states(here, par)
+    return [Equations(problem, own, start[k]) for k, own in enumerate(par)]
 
 
 def classical_method(scene: Scene, designs: int) -> Method:
@@ -211,15 +203,14 @@ def solve_turn(
     scene: Scene, one: Equations, solver: str, rtol: float
 ) -> tuple[tuple[float, ...], int]:
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
-    here, start = Equations(one.problem, one.par, np.zeros(at.WORK)), one.start.copy()
-    here.contacts[:] = one.contacts
+    here, start, period = one.anew(), one.start.copy(), float(one.named.period)
     effects = one.problem.effects
     joints = [j for j, on in enumerate((effects.crank_rod, effects.rod_slider)) if on is not None]
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
-    end = np.inf if one.free else one.par[at.PERIOD]
-    limit = 20.0 * one.par[at.PERIOD] if one.free else end
+    end = np.inf if one.free else period
+    limit = 20.0 * period if one.free else end
     atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
-    atol = np.append(atol, 2 * [rtol * 1e-3 * one.par[at.PERIOD]])
+    atol = np.append(atol, 2 * [rtol * 1e-3 * period])
     t, y, peak, count = 0.0, start, 0.0, 0
     for _ in range(100_000):
         gaps = here.joints(t, y)[:, OPEN].copy()
@@ -228,7 +219,7 @@ def solve_turn(
             events.append(_full_turn(one.n))
         piece = solve_ivp(
             here, (t, limit), y, solver, rtol=rtol, atol=atol, events=events, dense_output=True,
-            max_step=one.par[at.PERIOD] / 64.0,  # a whole contact inside a step would go unnoticed
+            max_step=period / 64.0,  # a whole contact inside a step would go unnoticed
         )  # fmt: skip
         count += piece.nfev
         peak = max(peak, _largest_force(here, piece))
@@ -256,7 +247,7 @@ def _crossing(one: Equations, joint: int, side: float, at_start: float) -> Event
 
 
 def _full_turn(n: int) -> Event:
-    return _event(lambda time, y: float(y[n - 1] - at.TURN), 1.0)
+    return _event(lambda time, y: float(y[n - 1] - TURN), 1.0)
 
 
 def _event(value: Event, direction: float) -> Event:

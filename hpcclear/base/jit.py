@@ -27,7 +27,7 @@ def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
     parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
     parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
-    return sorted(parts | {root / "base" / "outcome.py"})
+    return sorted(parts | {root / "base" / name for name in ("outcome.py", "unrolled.py")})
 
 
 def source_key() -> str:

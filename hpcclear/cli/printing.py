@@ -46,7 +46,7 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 def describe_scene(scene: Scene, cost: bool) -> None:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
     out = console()
-    from hpcclear.dynamics.lowering import coordinate_count, integrator_of, problem_of
+    from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
     states = 2 * coordinate_count(scene)

@@ -3,17 +3,18 @@
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Problem
+from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import ideal
-from hpcclear.dynamics.lowering import parameters, problem_of
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
 
 _CONTACT = ("eccentricity_x", "eccentricity_y", "penetration", "contact_force", "friction_force")
 
 
 class ClosedForm:
-    """Stands in for `kernel.lanes.Lanes` where no coordinate is left to integrate: every sample is done when queued."""
+    """Stands in for `lanes.Lanes` where no coordinate is left to integrate: every sample is done when queued."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
@@ -25,25 +26,25 @@ class ClosedForm:
         """Samples queued and not collected."""
         return sum(map(len, self._labels))
 
-    def queue(self, par: Array, state: Array, labels: Integers) -> None:
-        """Add samples: parameters (m, PARAMETERS), labels (m,); there is no start state to heed."""
+    def queue(self, par: Array, start: Start, labels: Integers) -> None:
+        """Add samples: parameters (m, PARAMETERS), labels (m,); there is no start to heed."""
         self._par.append(par)
         self._labels.append(labels)
 
     def advance(self, seconds: float) -> None:
         """Nothing takes time."""
 
-    def collect(self) -> tuple[Integers, Array, Array]:
-        """Labels (m,), outcome rows (m, OUT) and parameters (m, PARAMETERS) since the last call."""
+    def collect(self) -> tuple[Integers, Outcome, Array]:
+        """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
         labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
-        par = np.concatenate([np.zeros((0, at.PARAMETERS)), *self._par])
+        par = np.concatenate([np.zeros((0, Parameters.size)), *self._par])
         self._labels, self._par = [], []
+        return labels, self.run(par), par
+
+    def run(self, par: Array, start: Start | None = None) -> Outcome:
+        """Outcomes of samples, in their order: parameters (m, PARAMETERS); there is no start to heed."""
         p = self._problem
-        return (
-            labels,
-            ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged),
-            par,
-        )
+        return Outcome(ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged))
 
 
 def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
@@ -66,23 +67,24 @@ def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     """
     problem = problem_of(scene, ledger=True, series=True)
     par = parameters(scene)[0]
+    p = Parameters(par)
     turns = problem.transient + problem.averaged
     count = scene.output.instants_per_revolution or 720
-    angle = np.linspace(0.0, turns * at.TURN, turns * count + 1)
+    angle = np.linspace(0.0, turns * TURN, turns * count + 1)
     seen = ideal.ideal_response(problem.effects, par, problem.load_table, angle)
     drive, _, lost, load = ideal.ideal_works(problem.effects, par, problem.load_table, angle)
-    omega = np.full_like(angle, par[at.SPEED])
+    omega = np.full_like(angle, p.speed)
     kinetic = 0.5 * (
-        par[at.ROD_MASS] * (seen[ideal.ROD_VX] ** 2 + seen[ideal.ROD_VY] ** 2)
-        + par[at.ROD_INERTIA] * seen[ideal.ROD_SPIN] ** 2
-        + par[at.SLIDER_MASS] * seen[ideal.SLIDER_V] ** 2
-        + par[at.CRANK_INERTIA] * omega**2
+        p.rod_mass * (seen[ideal.ROD_VX] ** 2 + seen[ideal.ROD_VY] ** 2)
+        + p.rod_inertia * seen[ideal.ROD_SPIN] ** 2
+        + p.slider_mass * seen[ideal.SLIDER_V] ** 2
+        + p.crank_inertia * omega**2
     )
-    height = par[at.CRANK_MOMENT] * np.sin(angle) + par[at.ROD_MASS] * seen[ideal.ROD_Y]
+    height = p.crank_moment * np.sin(angle) + p.rod_mass * seen[ideal.ROD_Y]
     potential = scene.effects.gravity * height
     total = kinetic + potential
     none = np.zeros((len(angle), 2))
-    return angle / par[at.SPEED], {
+    return angle / p.speed, {
         "crank_angle": angle,
         "slider_position": seen[ideal.SLIDER_X],
         "slider_velocity": seen[ideal.SLIDER_V],

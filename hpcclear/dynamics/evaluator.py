@@ -9,11 +9,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.outcome import OUTCOME, RESPONSES, Flag, Status
 from hpcclear.dynamics import energy
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.stepping.lifecycle import STATE
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -103,23 +104,23 @@ class Evaluator:
     def submit(self, index: Integers, points: Array) -> None:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
-        state = start_states(self.scene, par)
+        start = start_states(self.scene, par)
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
-            par, state, labels = with_copies(par, state, labels)
+            par, start, labels = with_copies(par, start, labels)
         if self._problem.effects.ledger and self._problem.coordinates:
-            before = energy.of_starts(self.scene, par, state, self._problem.coordinates)
+            before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
-        self._lanes.queue(par, state, labels)
+        self._lanes.queue(par, start, labels)
 
     def advance(self, seconds: float) -> Records:
         """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
         self._lanes.advance(seconds)
-        labels, rows, par = self._lanes.collect()
-        records = outcome_records(labels, rows, par, bool(self._problem.effects.responses))
+        labels, outcome, par = self._lanes.collect()
+        records = outcome_records(labels, outcome, par, bool(self._problem.effects.responses))
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
-            off = energy.errors(self.scene, par, before, rows, self._problem.coordinates)
+            off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
             valid = np.isfinite(records["objective"])
             records["energy_error"] = np.where(valid, off, np.nan)
         return records if self._copies == 1 else self._join(records)
@@ -140,18 +141,18 @@ class Evaluator:
 _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
 
 
-def with_copies(par: Array, state: Array, labels: Integers) -> tuple[Array, Array, Integers]:
+def with_copies(par: Array, start: Start, labels: Integers) -> tuple[Array, Start, Integers]:
     """Each sample followed by its copies: kicked starts, and stricter tolerances."""
     kicks = np.array([0] + [sign for _, sign in COPIES])
     strict = np.array([1.0] + [factor for factor, _ in COPIES])
-    count, n = len(kicks), 2 * at.MAX_COORDINATES
-    par, state = np.repeat(par, count, axis=0), np.repeat(state, count, axis=0)
-    par[:, at.STRICTNESS] = np.tile(strict**2, len(labels))
+    count = len(kicks)
+    par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))
+    Parameters(par).strictness = np.tile(strict**2, len(labels))
     # Signs alternate over the coordinates, so that the kick is no motion of the mechanism as a whole.
-    pattern = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)
-    state[:, :n] *= 1.0 + KICK * np.tile(kicks, len(labels))[:, None] * pattern
+    pattern = np.where(np.arange(start.moving.shape[-1]) % 2 == 0, 1.0, -1.0)
+    start.moving *= 1.0 + KICK * np.tile(kicks, len(labels))[:, None] * pattern
     copies = (labels[:, None] + np.arange(count)).ravel()
-    return par, state[:, :STATE], copies
+    return par, start, copies
 
 
 def joined(sample: int, group: Records) -> Records:
@@ -166,47 +167,47 @@ def joined(sample: int, group: Records) -> Records:
     return record
 
 
-def outcome_records(labels: Integers, rows: Array, par: Array, responses: bool = False) -> Records:
-    """Kernel outcome rows (m, OUT) and parameters (m, PARAMETERS) as records.
+def outcome_records(
+    labels: Integers, outcome: Outcome, par: Array, responses: bool = False
+) -> Records:
+    """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
     `responses`, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
-    records["status"] = rows[:, at.OUT_STATUS]
-    records["rhs_evaluations"] = rows[:, at.OUT_EVALUATIONS]
+    records["status"] = outcome.status
+    records["rhs_evaluations"] = outcome.evaluations
     valid = np.isin(records["status"], [status for status in Status if status.valid])
-    records["objective"] = rows[:, at.OUT_OBJECTIVE]
-    records["objective_spread"] = rows[:, at.OUT_SPREAD]
+    records["objective"] = outcome.objective
+    records["objective_spread"] = outcome.spread
     records["objective_uncertainty"] = np.nan
-    records["mean_gap"] = rows[:, [at.OUT_GAP_12, at.OUT_GAP_23]]
-    records["peak_contact_force"] = rows[:, [at.OUT_PEAK_12, at.OUT_PEAK_23]]
-    records["mean_contact_force"] = rows[:, [at.OUT_FORCE_12, at.OUT_FORCE_23]]
-    records["peak_crank_moment"] = rows[:, at.OUT_MOMENT]
-    records["slider_acceleration_deviation"] = rows[:, at.OUT_ACCELERATION]
+    records["mean_gap"] = outcome.mean_gap
+    records["peak_contact_force"] = outcome.peak_force
+    records["mean_contact_force"] = outcome.mean_force
+    records["peak_crank_moment"] = outcome.peak_moment
+    records["slider_acceleration_deviation"] = outcome.acceleration_deviation
     records["energy_error"] = np.nan
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][~valid] = np.nan
     for name in RESPONSES:
         records[name][~(valid & responses)] = np.nan
-    latched = rows[:, [at.OUT_LATCHED_12, at.OUT_LATCHED_23]] == 1.0
+    latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
-    flags = int(Flag.LATCHED) * latched.any(axis=1) + int(Flag.BEYOND_HERTZ) * beyond_hertz(
-        rows, par
-    )
-    flags += int(Flag.STIFF) * (rows[:, at.OUT_STIFF_STEPS] > 0.0)
+    flags = int(Flag.LATCHED) * latched.any(axis=1)
+    flags += int(Flag.BEYOND_HERTZ) * beyond_hertz(outcome, par)
+    flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)
     records["flags"] = np.where(valid, flags, 0)
     return records
 
 
-def beyond_hertz(rows: Array, par: Array) -> Booleans:
+def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
     """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
-    beyond = np.zeros(len(rows), bool)
-    for joint, deepest in ((at.JOINT_12, at.OUT_DEEPEST_12), (at.JOINT_23, at.OUT_DEEPEST_23)):
-        ratio = par[:, joint + at.JOURNAL_RADIUS] / par[:, joint + at.BEARING_RADIUS]
-        beyond |= rows[:, deepest] > HERTZ_RANGE * ratio * par[:, joint + at.CLEARANCE]
-    return beyond
+    p = Parameters(par)
+    ratio = p.journal_radius / p.bearing_radius
+    beyond: Booleans = outcome.deepest > HERTZ_RANGE * ratio * p.clearance
+    return beyond[:, 0] | beyond[:, 1]
 
 
 def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> Records:

@@ -6,9 +6,13 @@ the lanes without run-time checks. Rows of effects that are off are never touche
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 TURN = 6.283185307179586  # rad
 
 MAX_COORDINATES = 9  # Baumgarte: three bodies in the plane
+COORDINATES = np.arange(MAX_COORDINATES)
+"""For loops written out over them: as numbers they would have every function compiled anew for each of them."""
 
 
 class Effects(NamedTuple):
@@ -88,6 +92,43 @@ PARAMETERS = 47
 (SLIDER_ACCELERATION, SLIDER_SQUARE) = range(15, 17)  # and its square; for responses only
 RATES = 17
 
+
+class Integrated(NamedTuple):
+    """A rate that every stepper integrates over a step: its row, the effect that asks for it, and, of a gap alone, the row
+    of its joint's clearance. A gap's absolute value is integrated, and the error of its integral, relative to the clearance
+    times a revolution, counts for the step's."""
+
+    rate: int
+    asked_by: str
+    clearance: int | None = None
+
+
+INTEGRATED = (
+    Integrated(GAP_12, "crank_rod", JOINT_12 + CLEARANCE),
+    Integrated(GAP_23, "rod_slider", JOINT_23 + CLEARANCE),
+    Integrated(DRIVE_POWER, "ledger"),
+    Integrated(ABS_DRIVE_POWER, "ledger"),
+    Integrated(DISSIPATION, "ledger"),
+    Integrated(LOAD_POWER, "ledger"),
+    Integrated(FORCE_12, "responses"),
+    Integrated(FORCE_23, "responses"),
+    Integrated(SLIDER_ACCELERATION, "responses"),
+    Integrated(SLIDER_SQUARE, "responses"),
+)
+"""All that is integrated. The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
+
+GAPS = tuple(one for one in INTEGRATED if one.clearance is not None)
+MEASURES = tuple(one for one in INTEGRATED if one.clearance is None)
+INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
+
+
+def place(rate: int) -> int:
+    """Where a rate stands in `INTEGRATED`."""
+    return [one.rate for one in INTEGRATED].index(rate)
+
+
+WORKS = place(DRIVE_POWER)  # the first of four: drive, its absolute value, losses, load
+
 # ---- lane state and scratch ---------------------------------------------------------------------
 Q = 0  # coordinates at the start of the step
 V = Q + MAX_COORDINATES
@@ -142,36 +183,26 @@ WORK = INTEGRAL + RATES + 35
 (
     SAMPLE,  # slot of the sample in the queue
     REVOLUTION,  # revolutions finished
-    GAP_SUM_12,  # m s, over the averaged revolutions
-    GAP_SUM_23,
-    TIME_SUM,  # s
+    TIME_SUM,  # s, over the averaged revolutions
     MEAN_F,  # Welford mean of the revolution's objective
     M2_F,
     COUNT_F,
     LATCHED_12,
     LATCHED_23,
-    DRIVE_WORK,
-    ABS_DRIVE_WORK,
-    DISSIPATED,
-    LOAD_WORK,
     ELAPSED,  # s, whole revolutions so far
     LAST_F,  # the objective of the revolution before
     LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
     FIRST_F,
-    FORCE_SUM_12,  # N s, over the averaged revolutions
-    FORCE_SUM_23,
-    ACCELERATION_SUM,  # m/s
-    SQUARE_SUM,  # m^2/s^3
-) = range(22)
-BOOK = 22
+) = range(12)
+AVERAGED = 12  # integrals over the averaged revolutions, in the order of INTEGRATED
+TOTAL = AVERAGED + len(INTEGRATED)  # integrals over all revolutions, likewise
+BOOK = TOTAL + len(INTEGRATED)
 
 # ---- one finished sample --------------------------------------------------------------------------
 (
     OUT_STATUS,
     OUT_OBJECTIVE,
     OUT_SPREAD,
-    OUT_GAP_12,
-    OUT_GAP_23,
     OUT_PEAK_12,
     OUT_PEAK_23,
     OUT_LATCHED_12,
@@ -180,10 +211,6 @@ BOOK = 22
     OUT_DEEPEST_23,
     OUT_EVALUATIONS,
     OUT_REVOLUTIONS,
-    OUT_DRIVE_WORK,
-    OUT_ABS_DRIVE_WORK,
-    OUT_DISSIPATED,
-    OUT_LOAD_WORK,
     OUT_TIME,
     OUT_ACTIVE_12,
     OUT_ACTIVE_23,
@@ -191,10 +218,75 @@ BOOK = 22
     OUT_INVERSE_IMPACT_23,
     OUT_ATTEMPTS,
     OUT_STIFF_STEPS,
-    OUT_FORCE_12,
-    OUT_FORCE_23,
     OUT_MOMENT,
     OUT_ACCELERATION,
-) = range(28)
-OUT_STATE = 28
+) = range(20)
+OUT_MEAN = 20  # time means over the averaged revolutions, in the order of INTEGRATED
+OUT_TOTAL = OUT_MEAN + len(INTEGRATED)  # integrals over all revolutions, likewise
+OUT_STATE = OUT_TOTAL + len(INTEGRATED)
 OUT = OUT_STATE + 2 * MAX_COORDINATES
+
+# ---- one sample to come ---------------------------------------------------------------------------
+START_CONTACTS = 2 * MAX_COORDINATES  # after coordinates and velocities: active flags, then 1/d'_0
+START = START_CONTACTS + 4
+
+
+# ---- what the steppers hand on as one -------------------------------------------------------------
+class Joint(NamedTuple):
+    """Where one joint with clearance has its numbers."""
+
+    block: int  # of parameters
+    gap: int  # rates
+    force: int
+    rate: int
+    friction: int
+    sliding: int
+    active: int  # rows of `work`
+    inverse_impact: int
+    peak: int
+    deepest: int
+    ended: int
+
+
+O12 = Joint(
+    JOINT_12, GAP_12, FORCE_12, RATE_12, FRICTION_12, SLIDING_12,
+    ACTIVE_12, INVERSE_IMPACT_12, PEAK_12, DEEPEST_12, ENDED_12,
+)  # fmt: skip
+O23 = Joint(
+    JOINT_23, GAP_23, FORCE_23, RATE_23, FRICTION_23, SLIDING_23,
+    ACTIVE_23, INVERSE_IMPACT_23, PEAK_23, DEEPEST_23, ENDED_23,
+)  # fmt: skip
+
+
+class Tables(NamedTuple):
+    """Cubic cells of the tabulated drive torque and slider load, 4 coefficients each."""
+
+    torque: Any
+    load: Any
+
+
+class Block(NamedTuple):
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books."""
+
+    work: Any
+    stages: Any
+    par: Any
+    book: Any
+
+
+class Queue(NamedTuple):
+    """Samples to come and samples done: parameters, starts, outcomes, slots in the order they finished, counters."""
+
+    par: Any
+    start: Any
+    out: Any
+    finished: Any
+    counters: Any
+
+
+class Method(NamedTuple):
+    """What a run is integrated with: its settings, the packed tableau, curves."""
+
+    settings: Any
+    weights: Any
+    tables: Tables

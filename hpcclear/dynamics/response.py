@@ -8,22 +8,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Records
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.evaluator import outcome_records
-from hpcclear.dynamics.lanes import Lanes, Problem
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.lowering import (
-    coordinate_count,
-    integrator_of,
-    parameters,
-    problem_of,
-    start_states,
-    topology,
-)
+from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.problem import Problem, coordinate_count, integrator_of, problem_of
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.dynamics.views import Parameters, Rates, Start
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
@@ -48,12 +44,12 @@ def integrate(scene: Scene) -> tuple[Steps, Records, Array]:
     """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
     problem = problem_of(scene, ledger=True, series=True, single=True)
     par = parameters(scene)
-    state = start_states(scene, par)
+    start = start_states(scene, par)
     n = problem.coordinates
     buffer = np.zeros((_CHUNK, rec.columns(n)))
     lanes = Lanes(problem, 1, buffer)
-    lanes.queue(par, state, np.zeros(1, np.int64))
-    chunks = [_first_row(problem, par, state[0], n)]
+    lanes.queue(par, start, np.zeros(1, np.int64))
+    chunks = [_first_row(problem, par[0], start[0], n)]
     while lanes.pending:
         lanes.advance(0.2)
         chunks.append(lanes.take_record())
@@ -74,29 +70,27 @@ def integrate(scene: Scene) -> tuple[Steps, Records, Array]:
     return steps, outcome_records(labels, out, finished), par[0]
 
 
-def _first_row(problem: Problem, par: Array, state: Array, n: int) -> Array:
+def _first_row(problem: Problem, par: Array, start: Start, n: int) -> Array:
     """The start as a row of the record."""
     row = np.zeros((1, rec.columns(n)))
-    velocities = state[at.MAX_COORDINATES : at.MAX_COORDINATES + n]
-    row[0, rec.STATE : rec.STATE + 2 * n] = np.concatenate([state[:n], velocities])
+    states = start.state(n)[None]
     contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
-    row[0, contacts] = state[2 * at.MAX_COORDINATES :]
-    states = row[:, rec.STATE : rec.STATE + 2 * n]
-    row[0, rec.STATE + 2 * n :] = _observed(problem, par[0], states, row[:, contacts], np.zeros(1))[
-        0, :n
-    ]
+    row[0, contacts] = start.contacts
+    row[:, rec.STATE : rec.STATE + 2 * n] = states
+    accelerations, _ = _observed(problem, par, states, row[:, contacts], np.zeros(1))
+    row[:, rec.STATE + 2 * n :] = accelerations
     return row
 
 
-def _observed(problem: Problem, par: Array, states: Array, contacts: Array, times: Array) -> Array:
-    """Accelerations (n) and rates (RATES) at each instant."""
+def _observed(
+    problem: Problem, par: Array, states: Array, contacts: Array, times: Array
+) -> tuple[Array, Rates]:
+    """Accelerations (n) and rates at each instant."""
     n = problem.coordinates
-    out = np.zeros((len(times), n + at.RATES))
-    none = np.zeros(4)
-    tables = [none if t is None else t for t in (problem.torque_table, problem.load_table)]
+    out = np.zeros((len(times), n + Rates.size))
     arrays = [np.ascontiguousarray(x) for x in (states, contacts, times)]
-    observe(problem.effects, n, par, *tables, *arrays, out)
-    return out
+    observe(problem.effects, par, problem.tables, *arrays, out)
+    return out[:, :n], Rates(out[:, n:])
 
 
 def _between(
@@ -109,7 +103,7 @@ def _between(
     """
     q = steps.q.copy()
     if free:
-        q[:, -1] += at.TURN * steps.revolution
+        q[:, -1] += TURN * steps.revolution
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
     h = (steps.time[k + 1] - steps.time[k])[:, None]
     s = (times - steps.time[k])[:, None] / h
@@ -207,12 +201,12 @@ def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
     problem = problem_of(scene, ledger=True, series=True)
     states = np.hstack([_in_turn(q, steps.revolution[k], turning), v])
-    seen = _observed(problem, par, states, contacts, turn_time)
+    accelerations, rates = _observed(problem, par, states, contacts, turn_time)
     ends = np.hstack([steps.q, steps.v])
-    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)
+    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)[1]
     n = problem.coordinates
-    works = _works_between(steps, at_steps[:, n + at.DRIVE_POWER + np.arange(4)], k, s)
-    phi, omega = at.TURN * times / par[at.PERIOD], np.full_like(times, par[at.SPEED])
+    works = _works_between(steps, at_steps.powers, k, s)
+    phi, omega = TURN * times / Parameters(par).period, np.full_like(times, Parameters(par).speed)
     data = {}
     if nine:
         data["constraint_violation"] = baumgarte.constraint_violation(first, second, par, q.T)
@@ -220,14 +214,14 @@ def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     if turning:
         phi, omega = q[:, -1], v[:, -1]
     if first or second:
-        slider = seen[:, rows[-1]]
+        slider = accelerations[:, rows[-1]]
     else:
         rigid = ideal.ideal_response(
-            problem.effects, par, problem.load_table, phi, omega, seen[:, n - 1]
+            problem.effects, par, problem.load_table, phi, omega, accelerations[:, n - 1]
         )
         slider = rigid[ideal.SLIDER_A]
     m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
-    data |= _series(scene, m, par, seen, n, contacts, works)
+    data |= _series(scene, m, par, rates, contacts, works)
     return times, data | {"crank_angle": phi, "slider_acceleration": slider}, record
 
 
@@ -235,7 +229,7 @@ def _in_turn(q: Array, revolution: Array, turning: bool) -> Array:
     """Coordinates with the crank angle, if it is one, counted from the start of its revolution, as the kernel does."""
     if turning:
         q = q.copy()
-        q[:, -1] -= at.TURN * revolution
+        q[:, -1] -= TURN * revolution
     return q
 
 
@@ -246,15 +240,12 @@ def _turn_starts(steps: Steps) -> tuple[Array, Array]:
 
 
 def _series(
-    scene: Scene, m: geometry.Motion, par: Array, seen: Array, n: int, contacts: Array, works: Array
+    scene: Scene, m: geometry.Motion, par: Array, rates: Rates, contacts: Array, works: Array
 ) -> dict[str, Array]:
     """Every time series of the response."""
-    rates = seen[:, n:]
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
-    gaps = np.where(open_, rates[:, [at.GAP_12, at.GAP_23]], 0.0)
-    stiffness = np.where(
-        open_, par[[at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS]], 0.0
-    )
+    gaps = np.where(open_, rates.gap, 0.0)
+    stiffness = np.where(open_, Parameters(par).stiffness, 0.0)
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
     elastic = geometry.elastic_energy(gaps, active, stiffness)
@@ -271,9 +262,9 @@ def _series(
         "eccentricity_x": m.eccentricity_x,
         "eccentricity_y": m.eccentricity_y,
         "penetration": np.maximum(gaps, 0.0) * active,
-        "contact_force": rates[:, [at.FORCE_12, at.FORCE_23]],
-        "friction_force": rates[:, [at.FRICTION_12, at.FRICTION_23]],
-        "crank_moment": rates[:, at.DRIVE_MOMENT],
+        "contact_force": rates.force,
+        "friction_force": rates.friction,
+        "crank_moment": rates.drive_moment,
         "kinetic_energy": kinetic,
         "elastic_energy": elastic,
         "potential_energy": potential,

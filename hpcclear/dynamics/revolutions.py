@@ -3,9 +3,8 @@
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.stepping.lifecycle import STATE
+from hpcclear.dynamics.views import Start
 
 
 def objective(gaps: Array) -> Array:
@@ -13,43 +12,24 @@ def objective(gaps: Array) -> Array:
     return np.hypot(gaps[..., 0], gaps[..., 1])
 
 
-def turn_by_turn(lanes: Lanes, par: Array, state: Array, revolutions: int) -> Array:
+def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int) -> Array:
     """Mean gaps of every revolution, shape (revolutions, samples, 2 joints), m; NaN from a failure on.
 
     Parameters
     ----------
     lanes : Lanes
         Empty, of a problem that averages one revolution without a transient.
-    par, state : ndarray
-        Parameters and starts of the samples, as `hpcclear.dynamics.lowering` makes them.
+    par : ndarray, shape (samples, PARAMETERS)
+    start : Start
     revolutions : int
     """
     count = len(par)
     gaps = np.full((revolutions, count, 2), np.nan)
     alive = np.arange(count)
     for revolution in range(revolutions):
-        lanes.queue(par[alive], state, alive)
-        while lanes.step(1 << 40):
-            pass
-        labels, rows, *_ = lanes.collect()
-        rows = rows[np.argsort(labels)]
-        good = rows[:, at.OUT_STATUS] == 0
-        alive, rows = alive[good], rows[good]
-        gaps[revolution, alive] = rows[:, [at.OUT_GAP_12, at.OUT_GAP_23]]
-        state = ends(rows)
+        outcome = lanes.run(par[alive], start)
+        good = outcome.status == 0
+        alive, outcome = alive[good], outcome[good]
+        gaps[revolution, alive] = outcome.mean_gap
+        start = outcome.end()
     return gaps
-
-
-def ends(rows: Array) -> Array:
-    """Ends of samples (m, OUT) as starts of the next revolution, shape (m, STATE)."""
-    state = np.empty((len(rows), STATE))
-    n = 2 * at.MAX_COORDINATES
-    state[:, :n] = np.nan_to_num(rows[:, at.OUT_STATE : at.OUT_STATE + n])
-    contact = [
-        at.OUT_ACTIVE_12,
-        at.OUT_ACTIVE_23,
-        at.OUT_INVERSE_IMPACT_12,
-        at.OUT_INVERSE_IMPACT_23,
-    ]
-    state[:, n:] = rows[:, contact]
-    return state

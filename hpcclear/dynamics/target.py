@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes, Problem
-from hpcclear.dynamics.lowering import parameters, problem_of, start_states
-from hpcclear.dynamics.revolutions import objective, turn_by_turn
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.revolutions import gaps_of_revolutions, objective
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -54,7 +56,7 @@ class _Pilot:
 
     scene: Scene
     par: Array
-    state: Array
+    start: Start
     width: int
 
     def problem(self, rtol: float, transient: int, averaged: int) -> Problem:
@@ -70,12 +72,8 @@ class _Pilot:
     def objectives(self, rtol: float, transient: int, averaged: int) -> Array:
         """f of every design, NaN where it failed."""
         lanes = Lanes(self.problem(rtol, transient, averaged), self.width)
-        lanes.queue(self.par, self.state, np.arange(len(self.par)))
-        while lanes.step(1 << 40):
-            pass
-        labels, rows, *_ = lanes.collect()
-        rows = rows[np.argsort(labels)]
-        return np.where(rows[:, at.OUT_STATUS] == 0, rows[:, at.OUT_OBJECTIVE], np.nan)
+        outcome = lanes.run(self.par, self.start)
+        return np.where(outcome.status == 0, outcome.objective, np.nan)
 
 
 def resolve(scene: Scene, points: Points | None = None) -> tuple[Scene, str]:
@@ -143,7 +141,7 @@ def _pilot(scene: Scene, points: Points | None) -> _Pilot:
 def choose_revolutions(pilot: _Pilot, target: float, rtol: float) -> tuple[int, int, float]:
     """Fewest transient and averaged revolutions, and the relative error of the average that they leave."""
     lanes = Lanes(pilot.problem(rtol, 0, 1), pilot.width)
-    gaps = turn_by_turn(lanes, pilot.par, pilot.state, LONG)
+    gaps = gaps_of_revolutions(lanes, pilot.par, pilot.start, LONG)
     gaps = gaps[:, np.isfinite(gaps[-1]).all(axis=1)]
     if gaps.shape[1] == 0:
         return SPANS[-1], SPANS[-1], np.nan

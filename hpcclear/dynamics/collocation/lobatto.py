@@ -20,6 +20,7 @@ from numpy.polynomial import legendre
 from hpcclear.base.arrays import Array
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import accelerations
 
@@ -27,7 +28,8 @@ STAGES = 8
 """Unknown stages of a step; the last stands at its end."""
 
 _ROWS = STAGES + 1  # of a matrix: one for each node, the start included
-_N = 5  # coordinates at most: minimal ones with a free crank
+MOST_COORDINATES = 5  # minimal ones of two open joints with a free crank
+COORDINATES = at.COORDINATES[:MOST_COORDINATES]
 
 PAR = at.WORK  # parameters, the same in every lane
 PARAMETER_OFFSET = PAR * STAGES
@@ -36,9 +38,9 @@ MATRIX = NODE + 1  # velocities by accelerations: row l holds the weights of nod
 SQUARE = MATRIX + _ROWS  # coordinates by accelerations, likewise
 LEGENDRE = SQUARE + _ROWS  # coefficients of degree 1 to 8 by accelerations, likewise
 NODE_ACC = LEGENDRE + _ROWS  # accelerations that the stages were made from
-COEFFICIENT = NODE_ACC + _N  # of degree 1 to 8, of the accelerations
-GAP_COEFFICIENT = COEFFICIENT + _N  # and of the two gaps
-BASE = GAP_COEFFICIENT + 2  # row: coefficient of degree 0, lane by lane a coordinate
+COEFFICIENT = NODE_ACC + MOST_COORDINATES  # of degree 1 to 8, of the accelerations
+GAP_COEFFICIENT = COEFFICIENT + MOST_COORDINATES  # and of the gaps, in the order of GAPS
+BASE = GAP_COEFFICIENT + len(at.GAPS)  # row: coefficient of degree 0, lane by lane a coordinate
 START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
 WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
 CHANGE = WEIGHT + 1  # square of the scaled change of the accelerations, by stage
@@ -110,23 +112,19 @@ def row_of(m, row):
 
 
 @lane_function
+@unrolled
 def weighted(m, matrix, start, a, i):
     """Sum over the nodes of a matrix's weights for stage i."""
     total = m[matrix * STAGES + i] * start
-    total += m[(matrix + 1) * STAGES + i] * a[0]
-    total += m[(matrix + 2) * STAGES + i] * a[1]
-    total += m[(matrix + 3) * STAGES + i] * a[2]
-    total += m[(matrix + 4) * STAGES + i] * a[3]
-    total += m[(matrix + 5) * STAGES + i] * a[4]
-    total += m[(matrix + 6) * STAGES + i] * a[5]
-    total += m[(matrix + 7) * STAGES + i] * a[6]
-    total += m[(matrix + 8) * STAGES + i] * a[7]
+    for s in written_out(range(STAGES)):
+        total += m[(matrix + 1 + s) * STAGES + i] * a[s]
     return total
 
 
 @lane_function
-def stages_of(m, k, q, v, h):
+def stages_of(m, work, k, h):
     """Stages of coordinate k from the accelerations at the nodes."""
+    q, v = work[at.Q + k], work[at.V + k]
     start = m[START_ACC * STAGES + k]
     a = row_of(m, NODE_ACC + k)
     for i in range(STAGES):
@@ -137,27 +135,22 @@ def stages_of(m, k, q, v, h):
 
 
 @lane_function
+@unrolled
 def set_stages(m, work, n, h):
     """Coordinates, velocities and times of all stages."""
     t = work[at.TIME]
     for i in range(STAGES):
         m[at.STAGE_TIME * STAGES + i] = t + m[NODE * STAGES + i] * h
-    stages_of(m, 0, work[at.Q], work[at.V], h)
-    if n > 1:
-        stages_of(m, 1, work[at.Q + 1], work[at.V + 1], h)
-    if n > 2:
-        stages_of(m, 2, work[at.Q + 2], work[at.V + 2], h)
-    if n > 3:
-        stages_of(m, 3, work[at.Q + 3], work[at.V + 3], h)
-    if n > 4:
-        stages_of(m, 4, work[at.Q + 4], work[at.V + 4], h)
+    for k in written_out(COORDINATES):
+        if k < n:
+            stages_of(m, work, k, h)
 
 
 @lane_function
-def accelerations_of_stages(effects, m, torque_table, load_table):
+def accelerations_of_stages(effects, m, tables):
     """Accelerations and rates at all stages."""
     par = beyond(m, PARAMETER_OFFSET)  # type: ignore[call-arg, var-annotated]
-    accelerations(effects, m, par, torque_table, load_table, STAGES)
+    accelerations(effects, m, par, tables.torque, tables.load, STAGES)
 
 
 @lane_function
@@ -173,19 +166,16 @@ def change_of(m, k, first):
 
 
 @lane_function
+@unrolled
 def take_accelerations(m, n):
     """Take over what the sweep found; the largest scaled change of a stage (its root mean square over coordinates)."""
-    change_of(m, 0, True)
-    if n > 1:
-        change_of(m, 1, False)
-    if n > 2:
-        change_of(m, 2, False)
-    if n > 3:
-        change_of(m, 3, False)
-    if n > 4:
-        change_of(m, 4, False)
+    for k in written_out(COORDINATES):
+        if k < n:
+            change_of(m, k, k == 0)
     c = row_of(m, CHANGE)
-    total = c[0] + c[1] + c[2] + c[3] + c[4] + c[5] + c[6] + c[7]
+    total = c[0]
+    for s in written_out(range(1, STAGES)):
+        total += c[s]
     return math.sqrt(total)
 
 
@@ -230,21 +220,16 @@ def constant(m, k):
 
 
 @lane_function
+@unrolled
 def guess(m, n, h):
     """First guess of the accelerations at the nodes."""
     old = m[POLYNOMIAL_STEP]
     if old > 0.0:
         ratio = h / old
         begin = m[FOLLOWS]
-        continued(m, 0, begin, ratio)
-        if n > 1:
-            continued(m, 1, begin, ratio)
-        if n > 2:
-            continued(m, 2, begin, ratio)
-        if n > 3:
-            continued(m, 3, begin, ratio)
-        if n > 4:
-            continued(m, 4, begin, ratio)
+        for k in written_out(COORDINATES):
+            if k < n:
+                continued(m, k, begin, ratio)
     else:
         for k in range(n):
             constant(m, k)
@@ -258,19 +243,14 @@ def keep_coordinate(m, k):
 
 
 @lane_function
+@unrolled
 def keep_polynomial(m, n, h):
     """Coefficients of the accelerations over the step just converged."""
     m[POLYNOMIAL_STEP] = h
     m[FOLLOWS] = 0.0
-    keep_coordinate(m, 0)
-    if n > 1:
-        keep_coordinate(m, 1)
-    if n > 2:
-        keep_coordinate(m, 2)
-    if n > 3:
-        keep_coordinate(m, 3)
-    if n > 4:
-        keep_coordinate(m, 4)
+    for k in written_out(COORDINATES):
+        if k < n:
+            keep_coordinate(m, k)
 
 
 @lane_function

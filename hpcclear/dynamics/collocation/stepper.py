@@ -13,25 +13,16 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
-from hpcclear.dynamics.explicit.stepper import free_crank_turn, wrap_crank
 from hpcclear.dynamics.stepping.control import choose_step, commit
-from hpcclear.dynamics.stepping.lifecycle import (
-    ATOL,
-    MAX_STEPS,
-    OK,
-    RTOL,
-    UNFINISHED,
-    end_revolution,
-    failure,
-    finish,
-    integrate_gap,
-    load,
-)
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
+from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
+from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, RTOL
+from hpcclear.dynamics.stepping.stops import integrate_gap, turn_of_free_crank, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
 EXPONENT = (
@@ -45,7 +36,7 @@ BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they 
 
 
 @lane_function
-def replicate(work, par, m):
+def replicate(par, m):
     """Give every stage the sample's parameters."""
     for r in range(at.PARAMETERS):
         for i in range(STAGES):
@@ -67,14 +58,14 @@ def begin_contacts(work, m):
 
 
 @lane_function
-def evaluate_start(effects, work, stages, m, torque_table, load_table, n):
+def evaluate_start(effects, work, stages, m, tables, n):
     """Accelerations and rates at the start of the step, where they are not known."""
     for i in range(STAGES):
         m[at.STAGE_TIME * STAGES + i] = work[at.TIME]
         for k in range(n):
             m[(at.QS + k) * STAGES + i] = work[at.Q + k]
             m[(at.VS + k) * STAGES + i] = work[at.V + k]
-    lob.accelerations_of_stages(effects, m, torque_table, load_table)
+    lob.accelerations_of_stages(effects, m, tables)
     for k in range(n):
         stages[k] = m[(at.ACC + k) * STAGES]
     for r in range(at.RATES):
@@ -98,7 +89,7 @@ def weigh(work, stages, m, settings, strictness, n):
 
 
 @lane_function
-def sweep(effects, work, m, torque_table, load_table, n):
+def sweep(effects, work, m, tables, n):
     """Iterate the stages of the step until they have converged. Returns False when they will not in `MOST_SWEEPS`."""
     h = work[at.STEP]
     ratio = h / m[lob.CONTRACTION_STEP]
@@ -110,7 +101,7 @@ def sweep(effects, work, m, torque_table, load_table, n):
     while left > 0.0:
         left -= 1.0
         lob.set_stages(m, work, n, h)
-        lob.accelerations_of_stages(effects, m, torque_table, load_table)
+        lob.accelerations_of_stages(effects, m, tables)
         change = lob.take_accelerations(m, n)
         work[at.EVALUATIONS] += STAGES
         if before > 0.0:
@@ -128,23 +119,23 @@ def sweep(effects, work, m, torque_table, load_table, n):
 
 
 @lane_function
-def gap_tail(flag, work, m, gap, clearance, rtol, strictness, high, low):
-    """Add the last coefficients of a gap, scaled as its integral's error is, to those of the accelerations."""
+def gap_tail(flag, work, m, gap, clearance, row, rtol):
+    """Squares of the last two coefficients of a gap and of the two before, scaled as its integral's error is."""
     if flag is not None:
-        row = lob.GAP_COEFFICIENT + (gap - at.GAP_12) // 3
         lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
         scale = work[at.STEP] / (
             rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES]
         )
         last, before = lob.tail(m, row)
-        weight = strictness * scale * scale
-        return high + weight * last, low + weight * before
+        weight = m[(lob.PAR + at.STRICTNESS) * STAGES] * scale * scale
+        return weight * last, weight * before
     else:
-        return high, low
+        return 0.0, 0.0
 
 
 @lane_function
-def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
+@unrolled
+def error_of(effects, work, m, rtol, n):
     """Square of the scaled error of a converged step.
 
     The last two coefficients bound the error of the polynomial. At the end of the step the method is far better, and
@@ -156,27 +147,36 @@ def error_of(crank_rod, rod_slider, work, m, rtol, strictness, n):
         last, before = lob.tail(m, lob.COEFFICIENT + k)
         high += m[lob.WEIGHT * STAGES + k] * last
         low += m[lob.WEIGHT * STAGES + k] * before
-    high, low = gap_tail(
-        crank_rod, work, m, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, strictness, high, low
-    )
-    high, low = gap_tail(
-        rod_slider, work, m, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, strictness, high, low
-    )
+    row = lob.GAP_COEFFICIENT
+    for gap in written_out(at.GAPS):
+        flag = getattr(effects, gap.asked_by)
+        last, before = gap_tail(flag, work, m, gap.rate, gap.clearance, row, rtol)
+        high += last
+        low += before
+        row += 1
     return high * min(high / (low + 1e-300), 1.0)
 
 
 @lane_function
-def quadrature(work, m, rate):
+def quadrature(flag, work, m, rate):
     """Integral of a rate over the step, over h."""
-    row = lob.row_of(m, at.RATE_NOW + rate)
-    work[at.RATE_SUM + rate] = lob.weighted(
-        m, lob.MATRIX, work[at.RATE_OLD + rate], row, STAGES - 1
-    )
+    if flag is not None:
+        row = lob.row_of(m, at.RATE_NOW + rate)
+        start = work[at.RATE_OLD + rate]
+        work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, start, row, STAGES - 1)
 
 
 @lane_function
-def end_of_step(effects, work, m, n):
-    """Put the end of the step, and the integrals over it, where the block stepper would leave them."""
+@unrolled
+def quadratures(effects, work, m):
+    """Integrals of all that is integrated over the step, over h."""
+    for one in written_out(at.INTEGRATED):
+        quadrature(getattr(effects, one.asked_by), work, m, one.rate)
+
+
+@lane_function
+def end_of_step(work, m, n):
+    """Put the end of the step where the block stepper would leave them."""
     last = STAGES - 1
     h = work[at.STEP]
     for k in range(n):
@@ -188,25 +188,19 @@ def end_of_step(effects, work, m, n):
         work[at.ACC + k] = a[7]
     for r in range(at.RATES):
         work[at.RATE_NOW + r] = m[(at.RATE_NOW + r) * STAGES + last]
-    if effects.crank_rod is not None:
-        quadrature(work, m, at.GAP_12)
-    if effects.rod_slider is not None:
-        quadrature(work, m, at.GAP_23)
-    if effects.ledger is not None:
-        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            quadrature(work, m, r)
-    if effects.responses is not None:
-        for r in (at.FORCE_12, at.FORCE_23, at.SLIDER_ACCELERATION, at.SLIDER_SQUARE):
-            quadrature(work, m, r)
 
 
 @lane_function
-def peaks_inside(flag, work, m, gap, peak, deepest):
+def peaks_inside(flag, work, m, joint):
     """Extremes of a joint at the nodes of an accepted step, its end left to `commit`."""
     if flag is not None and work[at.AVERAGING] == 1.0:
         for i in range(STAGES):
-            work[peak] = max(work[peak], m[(at.RATE_NOW + gap + 1) * STAGES + i])
-            work[deepest] = max(work[deepest], m[(at.RATE_NOW + gap) * STAGES + i])
+            force, depth = (
+                m[(at.RATE_NOW + joint.force) * STAGES + i],
+                m[(at.RATE_NOW + joint.gap) * STAGES + i],
+            )
+            work[joint.peak] = max(work[joint.peak], force)
+            work[joint.deepest] = max(work[joint.deepest], depth)
 
 
 @lane_function
@@ -241,21 +235,19 @@ def after_step(work, m):
 
 
 @lane_function
-def try_step(effects, work, stages, par, m, torque_table, load_table, settings, n):
+def try_step(effects, block, m, tables, settings, n):
     """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
-    strictness = par[at.STRICTNESS]
+    work, stages, par = block.work, block.stages, block.par
     choose_step(work, par, effects.torque, 1)
     begin_contacts(work, m)
     if work[at.FRESH] == 1.0:
-        evaluate_start(effects, work, stages, m, torque_table, load_table, n)
-    weigh(work, stages, m, settings, strictness, n)
+        evaluate_start(effects, work, stages, m, tables, n)
+    weigh(work, stages, m, settings, par[at.STRICTNESS], n)
     lob.guess(m, n, work[at.STEP])
     work[at.ATTEMPTS] += 1.0
-    if sweep(effects, work, m, torque_table, load_table, n):
+    if sweep(effects, work, m, tables, n):
         lob.keep_polynomial(m, n, work[at.STEP])
-        error = error_of(
-            effects.crank_rod, effects.rod_slider, work, m, settings[RTOL], strictness, n
-        )
+        error = error_of(effects, work, m, settings[RTOL], n)
         work[at.ERROR] = error
         propose(work, m, error)
     else:
@@ -271,16 +263,24 @@ def judge_end(effects, work, stages, m, settings, n):
     if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
         status = failure(0, 1, n, work, stages, settings)
     if status == OK and work[at.ACCEPT] == 1.0:
-        end_of_step(effects, work, m, n)
+        end_of_step(work, m, n)
+        quadratures(effects, work, m)
         stop_at_contacts(effects, work, m, settings)
         if work[at.ACCEPT] == 1.0:
-            status = free_crank_turn(effects.torque, 0, 1, work, settings, n - 1)
+            status = turn_of_free_crank(effects.torque, 0, 1, work, settings, n - 1)
         if work[at.ACCEPT] == 1.0:
-            integrate_gap(0, 1, work, at.GAP_12)
-            integrate_gap(0, 1, work, at.GAP_23)
-            peaks_inside(effects.crank_rod, work, m, at.GAP_12, at.PEAK_12, at.DEEPEST_12)
-            peaks_inside(effects.rod_slider, work, m, at.GAP_23, at.PEAK_23, at.DEEPEST_23)
+            integrate_gap(0, 1, work, at.O12)
+            integrate_gap(0, 1, work, at.O23)
+            peaks_inside(effects.crank_rod, work, m, at.O12)
+            peaks_inside(effects.rod_slider, work, m, at.O23)
     return status
+
+
+@lane_function
+def next_sample(n, block, queue, settings, m):
+    """Take the next sample of the queue, if there is one."""
+    load(0, 1, n, block, queue, settings)
+    replicate(block.par, m)
 
 
 @cache
@@ -289,28 +289,30 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
 
     Its arguments are those of `stepper.make_stepper`, so that either serves `lanes.Lanes`; the tableau is not read, and
     `memory` is what `lobatto.new_memory` makes.
+
+    Raises
+    ------
+    ValueError
+        If there are not 1 to `lobatto.MOST_COORDINATES` coordinates.
     """
+    if not 1 <= n <= lob.MOST_COORDINATES:
+        raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
 
     @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
-    def stepper(
-        effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
-        queue_par, queue_state, out, finished, counters, record, m, budget,
-    ):  # fmt: skip
+    def stepper(effects, block, queue, method, record, m, budget):
+        settings, tables, counters = method.settings, method.tables, queue.counters
+        work, stages, book = block.work, block.stages, block.book
         if work[at.RUNNING] == 0.0:
-            load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
-            replicate(work, par, m)
+            next_sample(n, block, queue, settings, m)
         full = False
         while budget > 0 and work[at.RUNNING] > 0.0 and not full:
             budget -= 1
-            try_step(effects, work, stages, par, m, torque_table, load_table, settings, n)
+            try_step(effects, block, m, tables, settings, n)
             status = judge_end(effects, work, stages, m, settings, n)
             goes_on = status == OK
             if goes_on and work[at.ACCEPT] == 1.0:
                 record_nodes(record, counters, work, m, book, n)
-                ended = commit(
-                    effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
-                    effects.responses, work, stages, n, 1,
-                )  # fmt: skip
+                ended = commit(effects, work, stages, n, 1)
                 record_step(record, counters, work, stages, book, n, 1)
                 full = no_room(record, counters)
                 after_step(work, m)
@@ -319,12 +321,8 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
                     status = end_revolution(0, 1, work, book, settings)
                     goes_on = status == UNFINISHED
             if not goes_on:
-                finish(0, 1, n, status, work, book, out, finished, counters)
-                load(0, 1, n, work, par, book, queue_par, queue_state, counters, settings)
-                replicate(work, par, m)
+                finish(0, 1, n, status, block, queue)
+                next_sample(n, block, queue, settings, m)
         return work[at.RUNNING] > 0.0
 
     return stepper
-
-
-__all__ = ["make_collocation_stepper"]

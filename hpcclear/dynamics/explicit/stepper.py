@@ -12,39 +12,28 @@ from numba import njit
 
 from hpcclear.base.bits import borrowed
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.explicit.combine import any_stage_state, step_error
+from hpcclear.dynamics.explicit import tableau as tab
+from hpcclear.dynamics.explicit.combine import Step, any_stage_state, step_error
 from hpcclear.dynamics.explicit.switching import sense_stiffness, settle_methods
 from hpcclear.dynamics.implicit.stiff import take_implicit_steps
 from hpcclear.dynamics.linkage.rhs import accelerations
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
-from hpcclear.dynamics.stepping.lifecycle import (
-    ATOL,
-    BETA,
-    EXPONENT,
-    FINISHED,
-    GAP_TOLERANCE,
-    MAX_STEPS,
-    NEXT_SLOT,
-    OK,
-    RTOL,
-    SLOTS,
-    SMALLEST_STEP,
-    UNFINISHED,
-    end_revolution,
-    end_turn_of_free_crank,
-    failure,
-    finish,
-    integrate_gap,
-    load,
-    stop_at_impacts,
-    stop_at_kinks,
-)
 from hpcclear.dynamics.stepping.record import record_step
+from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
+from hpcclear.dynamics.stepping.settings import ATOL, GAP_TOLERANCE, RTOL
+from hpcclear.dynamics.stepping.stops import (
+    impacts,
+    integrate_gap,
+    stop_at_kinks,
+    turn_of_free_crank,
+    wrap_crank,
+)
 
 
 @lane_function
-def begin_stage(work, par, torque, c, W):
+def begin_stage(work, torque, c, W):
     """Time of this stage within the revolution."""
     if torque is None:
         for i in range(W):
@@ -74,16 +63,6 @@ def adopt_fresh(work, stages, n, W):
 
 
 @lane_function
-def weigh_gap(flag, work, gap, first, row, b, e, i, W):
-    """Add a stage's gap to the sums that become its integral over the step and the error of that."""
-    if flag is not None:
-        weigh_rate(flag, work, gap, first, row, b, i, W)
-        before = work[(at.RATE_ERROR + gap) * W + i]
-        before = 0.0 if first else before
-        work[(at.RATE_ERROR + gap) * W + i] = before + e * work[(row + gap) * W + i]
-
-
-@lane_function
 def weigh_rate(flag, work, rate, first, row, b, i, W):
     """Add a stage's rate to the sum that becomes its integral over the step."""
     if flag is not None:
@@ -93,197 +72,194 @@ def weigh_rate(flag, work, rate, first, row, b, i, W):
 
 
 @lane_function
-def weigh_rates(crank_rod, rod_slider, ledger, responses, work, first, row, b, e, W):
+def weigh_error(flag, work, gap, first, row, e, i, W):
+    """Add a stage's gap to the sum that becomes the error of its integral."""
+    if flag is not None:
+        before = work[(at.RATE_ERROR + gap) * W + i]
+        before = 0.0 if first else before
+        work[(at.RATE_ERROR + gap) * W + i] = before + e * work[(row + gap) * W + i]
+
+
+@lane_function
+@unrolled
+def weigh_rates(effects, work, first, row, b, e, W):
     """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
 
     One loop for all: shorter ones the compiler unrolls instead of vectorising. One product a sum: of two it might
     fuse either, and lanes would differ from a single response in the last bit.
     """
     for i in range(W):
-        weigh_gap(crank_rod, work, at.GAP_12, first, row, b, e, i, W)
-        weigh_gap(rod_slider, work, at.GAP_23, first, row, b, e, i, W)
-        weigh_rate(ledger, work, at.DRIVE_POWER, first, row, b, i, W)
-        weigh_rate(ledger, work, at.ABS_DRIVE_POWER, first, row, b, i, W)
-        weigh_rate(ledger, work, at.DISSIPATION, first, row, b, i, W)
-        weigh_rate(ledger, work, at.LOAD_POWER, first, row, b, i, W)
-        weigh_rate(responses, work, at.FORCE_12, first, row, b, i, W)
-        weigh_rate(responses, work, at.FORCE_23, first, row, b, i, W)
-        weigh_rate(responses, work, at.SLIDER_ACCELERATION, first, row, b, i, W)
-        weigh_rate(responses, work, at.SLIDER_SQUARE, first, row, b, i, W)
+        for one in written_out(at.INTEGRATED):
+            weigh_rate(getattr(effects, one.asked_by), work, one.rate, first, row, b, i, W)
+        for gap in written_out(at.GAPS):
+            weigh_error(getattr(effects, gap.asked_by), work, gap.rate, first, row, e, i, W)
 
 
 @lane_function
-def weigh_stage(effects, work, weights, s, count, W):
+def weigh_stage(effects, work, weights, s, W):
     """Weigh the rates of stage s; those of the first stage are known from the step before."""
-    B = count + 2 * count * count
-    E = B + count
+    b, e = tab.WEIGHTS, tab.ERROR
     if s == 1:
-        weigh_rates(
-            effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-            True, at.RATE_OLD, weights[B], weights[E], W,
-        )  # fmt: skip
-    weigh_rates(
-        effects.crank_rod, effects.rod_slider, effects.ledger, effects.responses, work,
-        False, at.RATE_NOW, weights[B + s], weights[E + s], W,
+        weigh_rates(effects, work, True, at.RATE_OLD, weights[b], weights[e], W)
+    weigh_rates(effects, work, False, at.RATE_NOW, weights[b + s], weights[e + s], W)
+
+
+@lane_function
+def any_fresh(work, W):
+    """Whether a lane of the explicit method does not know the accelerations at the start of its step."""
+    fresh = 0.0
+    for i in range(W):
+        fresh += max(work[at.FRESH * W + i] - work[at.STIFF * W + i], 0.0)
+    return fresh > 0.0
+
+
+@lane_function
+def take_explicit_steps(effects, step, tables, memory, W):
+    """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
+    work, weights = step.work, step.weights
+    for s in range(0 if any_fresh(work, W) else 1, tab.STAGES):
+        if s == 0:
+            start_state(work, step.n, W)
+        else:
+            any_stage_state(step, s, W)
+        begin_stage(work, effects.torque, weights[tab.NODES + s], W)
+        accelerations(effects, work, step.par, tables.torque, tables.load, W)
+        if s == 0:
+            adopt_fresh(work, step.stages, step.n, W)
+        else:
+            weigh_stage(effects, work, weights, s, W)
+    step_error(effects, step, W)
+    sense_stiffness(memory, step, W)
+    for i in range(W):
+        evaluations = (tab.STAGES - 1.0) * (1.0 - work[at.STIFF * W + i])
+        work[at.EVALUATIONS * W + i] += evaluations
+
+
+@lane_function
+def end_of_step(effects, i, W, n, block, settings):
+    """What the end of a special lane's step shows: it may be cut. Returns OK or why the lane ends."""
+    work = block.work
+    status = failure(i, W, n, work, block.stages, settings)
+    if status == OK and work[at.ACCEPT * W + i] == 1.0:
+        impacts(effects.latched, i, W, work, settings)
+        if work[at.ACCEPT * W + i] == 1.0:
+            stop_at_kinks(i, W, work, settings)
+        if work[at.ACCEPT * W + i] == 1.0:
+            status = turn_of_free_crank(effects.torque, i, W, work, settings, n - 1)
+        integrate_gap(i, W, work, at.O12)
+        integrate_gap(i, W, work, at.O23)
+    return status
+
+
+@lane_function
+def change_sample(i, W, n, status, block, queue, settings):
+    """Write down a lane's sample and give it the next. Returns the change of the number of running lanes."""
+    finish(i, W, n, status, block, queue)
+    load(i, W, n, block, queue, settings)
+    return block.work[at.RUNNING * W + i] - 1.0
+
+
+@lane_function
+def load_lanes(W, n, block, queue, settings):
+    """Give samples to lanes that rest. Returns how many run."""
+    running = 0.0
+    for i in range(W):
+        if block.work[at.RUNNING * W + i] == 0.0:
+            load(i, W, n, block, queue, settings)
+        running += block.work[at.RUNNING * W + i]
+    return running
+
+
+@lane_function
+def judge_steps(effects, n, block, queue, settings, W):
+    """Accept, cut or reject every lane's step. Returns the change of the number of running lanes."""
+    work = block.work
+    change = 0.0
+    special = judge_step(work, settings, W)
+    special += flag_gaps(
+        effects.crank_rod, effects.rod_slider, effects.torque, effects.latched,
+        work, n - 1, settings[GAP_TOLERANCE], W,
     )  # fmt: skip
+    if special > 0.0:
+        for i in range(W):
+            if work[at.SPECIAL * W + i] == 1.0:
+                status = end_of_step(effects, i, W, n, block, settings)
+                if status != OK:
+                    change += change_sample(i, W, n, status, block, queue, settings)
+    return change
 
 
 @lane_function
-def free_crank_turn(torque, lane, W, work, settings, last):
-    """End the step where a crank that is a coordinate ends its revolution; the status if it never will."""
-    if torque is not None:
-        return end_turn_of_free_crank(lane, W, work, settings, last)
-    else:
-        return OK
+def end_revolutions(effects, n, block, queue, settings, W):
+    """Close the revolutions that ended. Returns the change of the number of running lanes."""
+    work = block.work
+    change = 0.0
+    for i in range(W):
+        ends = work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
+        if ends == 1.0:
+            wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
+            status = end_revolution(i, W, work, block.book, settings)
+            if status != UNFINISHED:
+                change += change_sample(i, W, n, status, block, queue, settings)
+    return change
 
 
 @lane_function
-def impacts(latched, lane, W, work, settings):
-    """End the step at the first impact inside it, under laws that need the impact speed."""
-    if latched is not None:
-        stop_at_impacts(lane, W, work, settings)
-
-
-@lane_function
-def wrap_crank(torque, baumgarte, lane, W, work, last):
-    """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
-    if torque is not None or baumgarte is not None:
-        work[(at.Q + last) * W + lane] -= at.TURN
+def borrowed_all(block, queue, method):
+    """The same arrays without their counts of references, which functions that are not inlined would keep."""
+    lent: Any = borrowed
+    tables = at.Tables(lent(method.tables.torque), lent(method.tables.load))
+    return (
+        at.Block(lent(block.work), lent(block.stages), lent(block.par), lent(block.book)),
+        at.Queue(
+            lent(queue.par), lent(queue.start), lent(queue.out),
+            lent(queue.finished), lent(queue.counters),
+        ),
+        at.Method(lent(method.settings), lent(method.weights), tables),
+    )  # fmt: skip
 
 
 @cache
 def make_stepper(W: int, n: int) -> Callable[..., Any]:
     """Return the compiled stepper for W lanes of n coordinates.
 
-    Its arguments: effects (`layout.Effects`), number of stages, packed tableau, settings,
-    work, stages (stages n W), par, book, drive and load tables, the queue (parameters, states), out,
-    finished, counters, record (array or None), memory of the implicit method (see `radau.new_memory`; None switches it off)
-    and budget: how many block steps to take at most.
-    It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
+    Its arguments: effects (`layout.Effects`), `layout.Block`, `layout.Queue`, `layout.Method`, record (array or None),
+    memory of the implicit method (see `radau.new_memory`; None switches it off) and budget: how many block steps to take
+    at most. It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
     vector length.
-    """
 
+    Raises
+    ------
+    ValueError
+        If there are not 1 to `MAX_COORDINATES` coordinates.
+    """
+    if not 1 <= n <= at.MAX_COORDINATES:
+        raise ValueError(f"the stepper holds 1 to {at.MAX_COORDINATES} coordinates, not {n}")
     size = (0,) * n  # a length the compiler knows, for scalar code
 
     @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
-    def stepper(
-        effects, count, weights, settings, work, stages, par, book, torque_table, load_table,
-        queue_par, queue_state, out, finished, counters, record, memory, budget,
-    ):  # fmt: skip
-        # scalar functions would count references to what they are handed
-        settings, work, stages = borrowed(settings), borrowed(work), borrowed(stages)  # type: ignore[call-arg]
-        par, book, out, memory = borrowed(par), borrowed(book), borrowed(out), borrowed(memory)
-        torque_table, load_table = borrowed(torque_table), borrowed(load_table)
-        queue_par, queue_state = borrowed(queue_par), borrowed(queue_state)
-        finished, counters = borrowed(finished), borrowed(counters)
-        # offsets in the packed tableau: c, A, A A, b, e, e A
-        A = count
-        AA = A + count * count
-        E = AA + count * count + count
-        EA = E + count
-        LAST = EA + count
+    def stepper(effects, block, queue, method, record, memory, budget):
+        block, queue, method = borrowed_all(block, queue, method)
+        memory = borrowed(memory)  # type: ignore[call-arg]
+        settings, tables, work = method.settings, method.tables, block.work
         atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
-        running = 0.0
-        for i in range(W):
-            if work[at.RUNNING * W + i] == 0.0:
-                load(i, W, n, work, par, book, queue_par, queue_state, counters, settings)
-            running += work[at.RUNNING * W + i]
+        step = Step(work, block.stages, block.par, method.weights, n, settings[RTOL], atol)
+        running = load_lanes(W, n, block, queue, settings)
         while budget > 0 and running > 0.0:
             budget -= 1
-            choose_step(work, par, effects.torque, W)
+            choose_step(work, block.par, effects.torque, W)
             implicit = settle_methods(memory, settings, work, W)
             if implicit < running:
-                fresh = 0.0
-                for i in range(W):
-                    fresh += max(work[at.FRESH * W + i] - work[at.STIFF * W + i], 0.0)
-                for s in range(0 if fresh > 0.0 else 1, count):
-                    if s == 0:
-                        start_state(work, n, W)
-                    else:
-                        any_stage_state(
-                            work,
-                            stages,
-                            weights,
-                            weights[s],
-                            A + s * count,
-                            AA + s * count,
-                            n,
-                            s,
-                            W,
-                        )
-                    begin_stage(work, par, effects.torque, weights[s], W)
-                    accelerations(effects, work, par, torque_table, load_table, W)
-                    if s == 0:
-                        adopt_fresh(work, stages, n, W)
-                    else:
-                        weigh_stage(effects, work, weights, s, count, W)
-                step_error(
-                    effects.crank_rod, effects.rod_slider, work, stages, par, weights, E, EA, n,
-                    settings[RTOL], atol, 6, W,
-                )  # fmt: skip
-                sense_stiffness(memory, work, stages, weights, LAST, atol, n, 6, W)
-                for i in range(W):
-                    work[at.EVALUATIONS * W + i] += (count - 1.0) * (1.0 - work[at.STIFF * W + i])
+                take_explicit_steps(effects, step, tables, memory, W)
             if implicit > 0.0:
-                take_implicit_steps(
-                    effects, size, work, stages, par, torque_table, load_table, memory, settings, W
-                )
-            special = judge_step(
-                work,
-                settings[EXPONENT],
-                settings[BETA],
-                settings[MAX_STEPS],
-                settings[SMALLEST_STEP],
-                W,
-            )
-            special += flag_gaps(
-                effects.crank_rod, effects.rod_slider, effects.torque, effects.latched,
-                work, n - 1, settings[GAP_TOLERANCE], W,
-            )  # fmt: skip
-            if special > 0.0:
-                for i in range(W):
-                    if work[at.SPECIAL * W + i] == 1.0:
-                        status = failure(i, W, n, work, stages, settings)
-                        if status == OK and work[at.ACCEPT * W + i] == 1.0:
-                            impacts(effects.latched, i, W, work, settings)
-                            if work[at.ACCEPT * W + i] == 1.0:
-                                stop_at_kinks(i, W, work, settings)
-                            if work[at.ACCEPT * W + i] == 1.0:
-                                status = free_crank_turn(
-                                    effects.torque, i, W, work, settings, n - 1
-                                )
-                            integrate_gap(i, W, work, at.GAP_12)
-                            integrate_gap(i, W, work, at.GAP_23)
-                        if status != OK:
-                            finish(i, W, n, status, work, book, out, finished, counters)
-                            load(
-                                i, W, n, work, par, book, queue_par, queue_state, counters, settings
-                            )
-                            running += work[at.RUNNING * W + i] - 1.0
-            ended = commit(
-                effects.crank_rod, effects.rod_slider, effects.latched, effects.ledger,
-                effects.responses, work, stages, n, W,
-            )  # fmt: skip
-            full = record_step(record, counters, work, stages, book, n, W)
+                take_implicit_steps(effects, size, block, tables, memory, settings, W)
+            running += judge_steps(effects, n, block, queue, settings, W)
+            ended = commit(effects, work, block.stages, n, W)
+            full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
             if ended > 0.0:
-                for i in range(W):
-                    if (
-                        work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
-                        == 1.0
-                    ):
-                        wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
-                        status = end_revolution(i, W, work, book, settings)
-                        if status != UNFINISHED:
-                            finish(i, W, n, status, work, book, out, finished, counters)
-                            load(
-                                i, W, n, work, par, book, queue_par, queue_state, counters, settings
-                            )
-                            running += work[at.RUNNING * W + i] - 1.0
+                running += end_revolutions(effects, n, block, queue, settings, W)
             if full:
                 break
         return running > 0.0
 
     return stepper
-
-
-__all__ = ["FINISHED", "NEXT_SLOT", "SLOTS", "make_stepper"]

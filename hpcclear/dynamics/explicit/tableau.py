@@ -11,6 +11,18 @@ from fractions import Fraction as F
 
 import numpy as np
 
+STAGES = 7
+"""Stages of every pair, the new point included: the sums over them are unrolled."""
+
+# where the rows of a packed tableau start: c, A, A A, b, e, e A, b - (the stage before)
+NODES = 0
+MATRIX = NODES + STAGES
+SQUARE = MATRIX + STAGES * STAGES
+WEIGHTS = SQUARE + STAGES * STAGES
+ERROR = WEIGHTS + STAGES
+ERROR_SQUARE = ERROR + STAGES
+LAST = ERROR_SQUARE + STAGES
+
 
 @dataclass(frozen=True)
 class Tableau:
@@ -26,6 +38,11 @@ class Tableau:
     a, b, e : numpy.ndarray
         Stage matrix (stages, stages), weights and error weights (stages,), first-same-as-last.
     source : str
+
+    Raises
+    ------
+    ValueError
+        If there are not `STAGES` stages.
     """
 
     name: str
@@ -36,13 +53,14 @@ class Tableau:
     e: np.ndarray
     source: str
 
-    @property
-    def stages(self) -> int:
-        """Number of stages, the new point included; a step costs one evaluation less."""
-        return len(self.b)
+    def __post_init__(self) -> None:
+        if not (self.a.shape == (STAGES, STAGES) and len(self.b) == len(self.e) == STAGES):
+            raise ValueError(
+                f"{self.name}: the stepper takes pairs of {STAGES} stages, the new point included, not {len(self.b)}"
+            )
 
     def packed(self) -> np.ndarray:
-        """Coefficients for the stepper: c, A, A A, b, e, e A, b - (the stage before) in one flat array."""
+        """Coefficients for the stepper in one flat array: c, A, A A, b, e, e A, b - (the stage before)."""
         last = self.b - self.a[-2]
         rows = (self.a.sum(axis=1), self.a, self.a @ self.a, self.b, self.e, self.e @ self.a, last)
         return np.concatenate([np.ravel(x) for x in rows])

@@ -6,9 +6,10 @@ each law and topology, could not be cheaper.
 
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.memory import COORDINATES, LANES
+from hpcclear.dynamics.implicit.memory import LANES
 from hpcclear.dynamics.linkage.rhs import accelerations
 
 _RELATIVE = 1.5e-8  # square root of the round-off
@@ -17,10 +18,10 @@ SECOND_OFFSET = mem.SECOND * LANES
 
 
 @scalar_function
-def evaluate_bank(effects, bank, torque_table, load_table):
+def evaluate_bank(effects, bank, tables):
     """Accelerations and rates of the eight states held in a bank."""
     par = beyond(bank, PARAMETER_OFFSET)  # type: ignore[call-arg, var-annotated]
-    accelerations(effects, bank, par, torque_table, load_table, LANES)
+    accelerations(effects, bank, par, tables.torque, tables.load, LANES)
 
 
 @lane_function
@@ -71,32 +72,21 @@ def displace(k, n, m, c, first, i):
 
 
 @lane_function
+@unrolled
 def displace_all(n, m, first):
     """States of the second bank: that of the first one's middle stage, each displaced along one coordinate or velocity.
 
     All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
     """
     time = m[at.STAGE_TIME * LANES + mem.MIDDLE]
-    c0 = coordinate(COORDINATES[0], n, m)
-    c1 = coordinate(COORDINATES[1], n, m)
-    c2 = coordinate(COORDINATES[2], n, m)
-    c3 = coordinate(COORDINATES[3], n, m)
-    c4 = coordinate(COORDINATES[4], n, m)
-    c5 = coordinate(COORDINATES[5], n, m)
-    c6 = coordinate(COORDINATES[6], n, m)
-    c7 = coordinate(COORDINATES[7], n, m)
-    c8 = coordinate(COORDINATES[8], n, m)
+    c: dict = {}
+    for k in written_out(at.COORDINATES):
+        c[k] = coordinate(k, n, m)
     for i in range(LANES):
         m[(mem.SECOND + at.STAGE_TIME) * LANES + i] = time
-        by = displace(COORDINATES[0], n, m, c0, first, i)
-        by += displace(COORDINATES[1], n, m, c1, first, i)
-        by += displace(COORDINATES[2], n, m, c2, first, i)
-        by += displace(COORDINATES[3], n, m, c3, first, i)
-        by += displace(COORDINATES[4], n, m, c4, first, i)
-        by += displace(COORDINATES[5], n, m, c5, first, i)
-        by += displace(COORDINATES[6], n, m, c6, first, i)
-        by += displace(COORDINATES[7], n, m, c7, first, i)
-        by += displace(COORDINATES[8], n, m, c8, first, i)
+        by = 0.0
+        for k in written_out(at.COORDINATES):
+            by += displace(k, n, m, c[k], first, i)
         m[mem.INCREMENT * LANES + i] = by
 
 
@@ -111,22 +101,22 @@ def take_differences(n, m, first):
 
 
 @lane_function
-def columns(effects, n, m, torque_table, load_table, first):
+def columns(effects, n, m, tables, first):
     """As many columns of the Jacobian as there are lanes, from `first` on."""
     if first < 2 * n:
         displace_all(n, m, first)
         bank = beyond(m, SECOND_OFFSET)  # type: ignore[call-arg, var-annotated]
-        evaluate_bank(effects, bank, torque_table, load_table)
+        evaluate_bank(effects, bank, tables)
         take_differences(n, m, first)
 
 
 @scalar_function
-def difference_jacobian(effects, size, m, torque_table, load_table):
+def difference_jacobian(effects, size, m, tables):
     """Partial derivatives of the accelerations at the state of the middle stage, into mem.JACOBIAN.
 
     The length of `size` is the number n of coordinates; mem.BASE holds the accelerations there.
     """
     n = len(size)
-    columns(effects, n, m, torque_table, load_table, 0)
-    columns(effects, n, m, torque_table, load_table, LANES)
-    columns(effects, n, m, torque_table, load_table, 2 * LANES)
+    columns(effects, n, m, tables, 0)
+    columns(effects, n, m, tables, LANES)
+    columns(effects, n, m, tables, 2 * LANES)

@@ -30,11 +30,11 @@ _BOTH = 2 * mem.KINKS_A_JOINT
 
 
 @lane_function
-def damping_part(fixed, latched, m, joint, rate, inverse, i):
+def damping_part(fixed, latched, m, joint, rate, i):
     """Damping factor of the normal force; 1 without damping or contact."""
-    damping = m[(mem.PAR + joint + at.DAMPING) * LANES + i]
+    damping = m[(mem.PAR + joint.block + at.DAMPING) * LANES + i]
     if latched is not None:
-        return 1.0 + damping * rate * m[inverse * LANES + i]
+        return 1.0 + damping * rate * m[joint.inverse_impact * LANES + i]
     elif fixed is not None:
         return 1.0 + damping * rate
     else:
@@ -62,33 +62,31 @@ def impact_ahead(latched, m, active, i):
 @lane_function
 def ramp_sides(coulomb, ambrosio, m, joint, sliding, i):
     """Functions that vanish where friction's ramp begins and ends."""
-    inverse_ramp = m[(mem.PAR + joint + at.INVERSE_RAMP) * LANES + i]
+    inverse_ramp = m[(mem.PAR + joint.block + at.INVERSE_RAMP) * LANES + i]
     if coulomb is not None:
         return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
     elif ambrosio is not None:
-        ramp = (abs(sliding) - m[(mem.PAR + joint + at.DEAD_SPEED) * LANES + i]) * inverse_ramp
+        ramp = (
+            abs(sliding) - m[(mem.PAR + joint.block + at.DEAD_SPEED) * LANES + i]
+        ) * inverse_ramp
         return ramp, ramp - 1.0
     else:
         return 0.0, 0.0
 
 
 @lane_function
-def kinks_of_joint(flag, effects, latched, m, k, i):
-    """The four functions of joint k (0 or 1) at the state in lane i; 0 where no kink can be felt."""
+def kinks_of_joint(flag, effects, latched, m, joint, row, i):
+    """The four functions of a joint, from `row` on, at the state in lane i; 0 where no kink can be felt."""
     if flag is not None:
-        joint = at.JOINT_12 if k == 0 else at.JOINT_23
-        gap = m[(at.RATE_NOW + at.GAP_12 + 3 * k) * LANES + i]
-        rate = m[(at.RATE_NOW + at.RATE_12 + 3 * k) * LANES + i]
-        sliding = m[(at.RATE_NOW + at.SLIDING_12 + k) * LANES + i]
-        factor = damping_part(
-            effects.fixed, latched, m, joint, rate, at.INVERSE_IMPACT_12 + k, i
-        )  # fmt: skip
-        touches = in_contact(latched, m, gap, at.ACTIVE_12 + k, i)
+        gap = m[(at.RATE_NOW + joint.gap) * LANES + i]
+        rate = m[(at.RATE_NOW + joint.rate) * LANES + i]
+        sliding = m[(at.RATE_NOW + joint.sliding) * LANES + i]
+        factor = damping_part(effects.fixed, latched, m, joint, rate, i)
+        touches = in_contact(latched, m, gap, joint.active, i)
         pushes = touches and factor > 0.0
         low, high = ramp_sides(effects.coulomb, effects.ambrosio, m, joint, sliding, i)
-        free = impact_ahead(latched, m, at.ACTIVE_12 + k, i)
-        unit = GAP_UNIT * m[(mem.PAR + joint + at.CLEARANCE) * LANES + i]
-        row = mem.KINKS + k * mem.KINKS_A_JOINT
+        free = impact_ahead(latched, m, joint.active, i)
+        unit = GAP_UNIT * m[(mem.PAR + joint.block + at.CLEARANCE) * LANES + i]
         m[row * LANES + i] = factor if touches else 0.0
         m[(row + 1) * LANES + i] = low if pushes else 0.0
         m[(row + 2) * LANES + i] = high if pushes else 0.0
@@ -98,9 +96,10 @@ def kinks_of_joint(flag, effects, latched, m, k, i):
 @scalar_function
 def kink_functions(effects, m):
     """Kink functions of both joints at the states of the first bank, as evaluated."""
+    second = mem.KINKS + mem.KINKS_A_JOINT
     for i in range(LANES):
-        kinks_of_joint(effects.crank_rod, effects, effects.latched, m, 0, i)
-        kinks_of_joint(effects.rod_slider, effects, effects.latched, m, 1, i)
+        kinks_of_joint(effects.crank_rod, effects, effects.latched, m, at.O12, mem.KINKS, i)
+        kinks_of_joint(effects.rod_slider, effects, effects.latched, m, at.O23, second, i)
 
 
 @scalar_function

@@ -5,14 +5,10 @@ that the functions that run on lanes run on them too. In the first the stages of
 the displaced states that the Jacobian's differences are taken from: eight evaluations take no longer than one.
 """
 
-import numpy as np
-
 from hpcclear.dynamics import layout as at
 
 LANES = 8
 _N = at.MAX_COORDINATES
-COORDINATES = np.arange(_N)
-"""For code that names each: numbers written out would have every function compiled anew for each of them."""
 
 PAR = at.WORK  # row of the first parameter in a bank
 SECOND = PAR + at.PARAMETERS  # row where the second bank starts

@@ -17,11 +17,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.dense import factorise, factorise_complex, solve, solve_complex
 from hpcclear.dynamics.implicit.jacobian import evaluate_bank, fill
-from hpcclear.dynamics.implicit.memory import COORDINATES, END, LANES
+from hpcclear.dynamics.implicit.memory import END, LANES
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -189,34 +190,22 @@ def stage_of(k, n, m, c, h, i):
 
 
 @scalar_function
-def evaluate_stages(effects, size, m, torque_table, load_table, h):
+@unrolled
+def evaluate_stages(effects, size, m, tables, h):
     """Coordinates and velocities of the stages from the increments of the velocities; accelerations and rates there.
 
     All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
     """
     n = len(size)
     t = m[mem.TIME]
-    c0 = start_and_increments(COORDINATES[0], n, m)
-    c1 = start_and_increments(COORDINATES[1], n, m)
-    c2 = start_and_increments(COORDINATES[2], n, m)
-    c3 = start_and_increments(COORDINATES[3], n, m)
-    c4 = start_and_increments(COORDINATES[4], n, m)
-    c5 = start_and_increments(COORDINATES[5], n, m)
-    c6 = start_and_increments(COORDINATES[6], n, m)
-    c7 = start_and_increments(COORDINATES[7], n, m)
-    c8 = start_and_increments(COORDINATES[8], n, m)
+    c: dict = {}
+    for k in written_out(at.COORDINATES):
+        c[k] = start_and_increments(k, n, m)
     for i in range(LANES):
         m[at.STAGE_TIME * LANES + i] = t + m[mem.NODE * LANES + i] * h
-        stage_of(COORDINATES[0], n, m, c0, h, i)
-        stage_of(COORDINATES[1], n, m, c1, h, i)
-        stage_of(COORDINATES[2], n, m, c2, h, i)
-        stage_of(COORDINATES[3], n, m, c3, h, i)
-        stage_of(COORDINATES[4], n, m, c4, h, i)
-        stage_of(COORDINATES[5], n, m, c5, h, i)
-        stage_of(COORDINATES[6], n, m, c6, h, i)
-        stage_of(COORDINATES[7], n, m, c7, h, i)
-        stage_of(COORDINATES[8], n, m, c8, h, i)
-    evaluate_bank(effects, m, torque_table, load_table)
+        for k in written_out(at.COORDINATES):
+            stage_of(k, n, m, c[k], h, i)
+    evaluate_bank(effects, m, tables)
 
 
 @scalar_function
@@ -268,7 +257,7 @@ def correct(size, m, h):
 
 
 @scalar_function
-def newton(effects, size, m, torque_table, load_table, h, known):
+def newton(effects, size, m, tables, h, known):
     """Solve for the stages. Returns how many iterations it took, negative if it did not converge.
 
     `known`: the stages of the first guess have been evaluated already.
@@ -278,7 +267,7 @@ def newton(effects, size, m, torque_table, load_table, h, known):
     m[mem.RATE] = 0.0
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0 or not known:
-            evaluate_stages(effects, size, m, torque_table, load_table, h)
+            evaluate_stages(effects, size, m, tables, h)
         change = correct(size, m, h)
         if iteration > 0:
             rate = change / before
@@ -330,14 +319,14 @@ def filtered_error(size, m, h):
 
 
 @scalar_function
-def refilter_error(effects, size, m, torque_table, load_table, h):
+def refilter_error(effects, size, m, tables, h):
     """The estimate once more, from the start moved by the estimate: for a first try that looked too inaccurate."""
     n = len(size)
     fill(m, at.STAGE_TIME, m[mem.TIME])
     for k in range(n):
         fill(m, at.VS + k, m[mem.V + k] + m[mem.CHANGE + k])
         fill(m, at.QS + k, m[mem.Q + k] + m[mem.CHANGE + n + k])
-    evaluate_bank(effects, m, torque_table, load_table)
+    evaluate_bank(effects, m, tables)
     for k in range(n):
         m[mem.SHIFTED + k] = m[(at.ACC + k) * LANES + END]
         m[mem.SHIFTED + n + k] = m[mem.CHANGE + k]
@@ -345,43 +334,47 @@ def refilter_error(effects, size, m, torque_table, load_table, h):
 
 
 @lane_function
-def gap_of_step(flag, m, work, gap, clearance, rtol, lane, W):
-    """Integral of a gap over the step into RATE_SUM; square of its scaled error, as for the explicit method."""
+def gap_error(flag, m, work, gap, clearance, lane, W):
+    """Square of the scaled error of a gap's integral over the step, as for the explicit method."""
     if flag is not None:
         error = work[(at.RATE_OLD + gap) * W + lane]
-        total = 0.0
         for s in range(3):
-            d = m[(at.RATE_NOW + gap) * LANES + s]
-            total += MATRIX[2, s] * d
-            error += ERROR_BY_MATRIX[s] * d
-        work[(at.RATE_SUM + gap) * W + lane] = total
+            error += ERROR_BY_MATRIX[s] * m[(at.RATE_NOW + gap) * LANES + s]
         span = m[(mem.PAR + clearance) * LANES] * m[(mem.PAR + at.PERIOD) * LANES]
-        error *= m[mem.STEP] / MU / (rtol * span)
+        error *= m[mem.STEP] / MU / (m[mem.TOLERANCE] * span)
         return error * error
     else:
         return 0.0
 
 
 @lane_function
-def rate_of_step(m, work, rate, lane, W):
-    """Mean of a rate over the step."""
+@unrolled
+def gap_errors(effects, m, work, lane, W):
+    """Squares of the scaled errors of all gaps' integrals, added."""
     total = 0.0
-    for s in range(3):
-        total += MATRIX[2, s] * m[(at.RATE_NOW + rate) * LANES + s]
-    work[(at.RATE_SUM + rate) * W + lane] = total
+    for gap in written_out(at.GAPS):
+        total += gap_error(
+            getattr(effects, gap.asked_by), m, work, gap.rate, gap.clearance, lane, W
+        )
+    return total
 
 
 @lane_function
-def rates_of_step(ledger, responses, m, work, lane, W):
-    """Means of the powers, and of what the responses are made of, over the step."""
-    if ledger is not None:
-        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            rate_of_step(m, work, r, lane, W)
-    if responses is not None:
-        rate_of_step(m, work, at.FORCE_12, lane, W)
-        rate_of_step(m, work, at.FORCE_23, lane, W)
-        rate_of_step(m, work, at.SLIDER_ACCELERATION, lane, W)
-        rate_of_step(m, work, at.SLIDER_SQUARE, lane, W)
+def mean_of_step(flag, m, work, rate, lane, W):
+    """Mean of a rate over the step."""
+    if flag is not None:
+        total = 0.0
+        for s in range(3):
+            total += MATRIX[2, s] * m[(at.RATE_NOW + rate) * LANES + s]
+        work[(at.RATE_SUM + rate) * W + lane] = total
+
+
+@lane_function
+@unrolled
+def means_of_step(effects, m, work, lane, W):
+    """Means of all that is integrated over the step."""
+    for one in written_out(at.INTEGRATED):
+        mean_of_step(getattr(effects, one.asked_by), m, work, one.rate, lane, W)
 
 
 @scalar_function

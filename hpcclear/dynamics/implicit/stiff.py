@@ -24,16 +24,16 @@ from hpcclear.dynamics.implicit.radau import (
     evaluate_stages,
     factorise_both,
     filtered_error,
-    gap_of_step,
+    gap_errors,
     guess_from_start,
     guess_stages,
+    means_of_step,
     newton,
     next_step,
-    rates_of_step,
     refilter_error,
     start_of_step,
 )
-from hpcclear.dynamics.stepping.lifecycle import ATOL, RTOL
+from hpcclear.dynamics.stepping.settings import ATOL, RTOL
 
 CHEAP_CONTRACTION = 0.002
 """While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
@@ -103,7 +103,7 @@ def fit_to_ramp(m, settings):
 
 
 @scalar_function
-def take_over(size, lane, W, work, par, m, settings):
+def take_over(size, lane, W, par, m, settings):
     """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
     n = len(size)
     for k in range(at.PARAMETERS):
@@ -128,9 +128,11 @@ def take_over(size, lane, W, work, par, m, settings):
 
 
 @scalar_function
-def fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows):
-    """Bring the start of the step into the lane's memory; `follows`: it is where the lane's last implicit step ended."""
+def fetch(effects, size, lane, W, block, m, tables):
+    """Bring the start of the step into the lane's memory."""
     n = len(size)
+    work, stages = block.work, block.stages
+    follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
     m[mem.STEP] = work[at.STEP * W + lane]
     for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
@@ -143,7 +145,7 @@ def fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, set
     unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if unknown:
         start_of_step(n, m)
-        evaluate_bank(effects, m, torque_table, load_table)
+        evaluate_bank(effects, m, tables)
         work[at.EVALUATIONS * W + lane] += 1.0
     if fresh:
         m[mem.NEW_JACOBIAN] = 0.0
@@ -183,10 +185,10 @@ def norm_of_jacobian(size, m):
 
 
 @scalar_function
-def cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table):
+def cut_at_kink(effects, size, lane, W, work, m, tables):
     """Evaluate the guessed stages, and cut the step if they show a kink."""
     h = m[mem.STEP]
-    evaluate_stages(effects, size, m, torque_table, load_table, h)
+    evaluate_stages(effects, size, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 3.0
     fraction = kink_fraction(effects, m, GUESSED_BEYOND)
     if fraction < 1.0:
@@ -197,39 +199,39 @@ def cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table):
         work[at.ENDING * W + lane] = 0.0
         m[mem.CONTINUES] = 0.0
         guess_stages(size, m, h)
-        evaluate_stages(effects, size, m, torque_table, load_table, h)
+        evaluate_stages(effects, size, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 3.0
 
 
 @scalar_function
-def new_jacobian(effects, size, m, torque_table, load_table, guessed):
+def new_jacobian(effects, size, m, tables, guessed):
     """Jacobian at the second guessed stage, or at the start where there is no guess."""
     n = len(size)
     if not guessed:
         start_of_step(n, m)
     for k in range(n):
         m[mem.BASE + k] = m[(at.ACC + k) * LANES + mem.MIDDLE] if guessed else m[mem.START + k]
-    difference_jacobian(effects, size, m, torque_table, load_table)
+    difference_jacobian(effects, size, m, tables)
     m[mem.NORM] = norm_of_jacobian(size, m)
     m[mem.NEW_JACOBIAN] = 1.0
     m[mem.FACTORED_STEP] = 0.0
 
 
 @scalar_function
-def begin_step(effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings):
+def begin_step(effects, size, lane, W, block, m, tables, settings):
     """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
-    follows = work[at.ACCEPT * W + lane] == 1.0
+    work = block.work
     first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if first:
-        take_over(size, lane, W, work, par, m, settings)
-    elif follows:
+        take_over(size, lane, W, block.par, m, settings)
+    elif work[at.ACCEPT * W + lane] == 1.0:
         m[mem.ACCEPTED_STEP] = m[mem.STEP]
         m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
         m[mem.NEW_JACOBIAN] = 0.0
         copy_polynomial(size, m, mem.Z, mem.KEPT)
         m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
         m[mem.CONTINUES] = 1.0
-    fetch(effects, size, lane, W, work, stages, m, torque_table, load_table, settings, follows)
+    fetch(effects, size, lane, W, block, m, tables)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
     if first:
@@ -240,18 +242,18 @@ def begin_step(effects, size, lane, W, work, stages, m, par, torque_table, load_
 
 
 @scalar_function
-def solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed):
+def solve_step(effects, size, lane, W, work, m, tables, guessed):
     """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
     if guessed:
-        cut_at_kink(effects, size, lane, W, work, m, torque_table, load_table)
+        cut_at_kink(effects, size, lane, W, work, m, tables)
     h = m[mem.STEP]
     stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
     if stale and m[mem.NEW_JACOBIAN] == 0.0:
-        new_jacobian(effects, size, m, torque_table, load_table, guessed)
+        new_jacobian(effects, size, m, tables, guessed)
         work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
     if m[mem.FACTORED_STEP] != h and not factorise_both(size, m, h):
         return -1
-    iterations = newton(effects, size, m, torque_table, load_table, h, guessed)
+    iterations = newton(effects, size, m, tables, h, guessed)
     evaluated = abs(iterations) - 1 if guessed else abs(iterations)
     work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
     return iterations
@@ -274,15 +276,12 @@ def give_up(size, lane, W, work, m):
 
 
 @scalar_function
-def implicit_step(
-    effects, size, lane, W, work, stages, par, torque_table, load_table, memory, settings
-):
+def implicit_step(effects, size, lane, W, block, tables, memory, settings):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
-    guessed = begin_step(
-        effects, size, lane, W, work, stages, m, par, torque_table, load_table, settings
-    )
-    iterations = solve_step(effects, size, lane, W, work, m, torque_table, load_table, guessed)
+    work = block.work
+    guessed = begin_step(effects, size, lane, W, block, m, tables, settings)
+    iterations = solve_step(effects, size, lane, W, work, m, tables, guessed)
     if iterations < 0:
         give_up(size, lane, W, work, m)
         return
@@ -298,33 +297,27 @@ def implicit_step(
         work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
     else:
         m[mem.KINK_CUTS] = 0.0
-        judge(effects, size, lane, W, work, m, torque_table, load_table, iterations)
+        judge(effects, size, lane, W, work, m, tables, iterations)
 
 
 @scalar_function
-def judge(effects, size, lane, W, work, m, torque_table, load_table, iterations):
+def judge(effects, size, lane, W, work, m, tables, iterations):
     """Error of a converged step, its integrals, its end and the step to try next."""
     n = len(size)
     h = m[mem.STEP]
-    rtol = m[mem.TOLERANCE]
     for k in range(n):
         m[mem.SHIFTED + k] = m[mem.START + k]
         m[mem.SHIFTED + n + k] = 0.0
     total = filtered_error(size, m, h)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
     if total > 2.0 * n and uneasy:
-        total = refilter_error(effects, size, m, torque_table, load_table, h)
+        total = refilter_error(effects, size, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 1.0
     # as the last correction left them: integrals fit the end of the step
-    evaluate_stages(effects, size, m, torque_table, load_table, h)
+    evaluate_stages(effects, size, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 1.0
-    gaps = gap_of_step(
-        effects.crank_rod, m, work, at.GAP_12, at.JOINT_12 + at.CLEARANCE, rtol, lane, W
-    )
-    gaps += gap_of_step(
-        effects.rod_slider, m, work, at.GAP_23, at.JOINT_23 + at.CLEARANCE, rtol, lane, W
-    )
-    rates_of_step(effects.ledger, effects.responses, m, work, lane, W)
+    gaps = gap_errors(effects, m, work, lane, W)
+    means_of_step(effects, m, work, lane, W)
     leave(size, lane, W, work, m)
     mean = (total + gaps) * (0.5 / n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
@@ -370,23 +363,10 @@ def leave(size, lane, W, work, m):
 
 
 @lane_function
-def take_implicit_steps(
-    effects, size, work, stages, par, torque_table, load_table, memory, settings, W
-):
+def take_implicit_steps(effects, size, block, tables, memory, settings, W):
     """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
     if memory is not None:
+        work = block.work
         for i in range(W):
             if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
-                implicit_step(
-                    effects,
-                    size,
-                    i,
-                    W,
-                    work,
-                    stages,
-                    par,
-                    torque_table,
-                    load_table,
-                    memory,
-                    settings,
-                )
+                implicit_step(effects, size, i, W, block, tables, memory, settings)

@@ -9,6 +9,8 @@ Coordinates: x1, y1, x2, y2, theta2, x3, y3, theta3 and, last as in every topolo
 by their mass centres. At prescribed speed the crank angle restarts every revolution, as the time in it does.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from hpcclear.base.arrays import Array
@@ -34,6 +36,23 @@ from hpcclear.dynamics.physics.angles import sincos
 (X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI1) = range(9)
 
 
+class Here(NamedTuple):
+    """What is known of a state before the bodies' accelerations are."""
+
+    crank: Any  # sine, cosine, angle, speed, time in this revolution
+    rod: Any  # sine, cosine, speed
+    slider: Any  # speed, acceleration across the guide
+    pin: Any  # acceleration of the crank pin but for that of the crank angle
+    first: Any  # journal relative to bearing at O12, and its velocity
+    second: Any  # likewise at O23
+    force_1: Any  # as `open_joint` returns them
+    force_2: Any
+    gravity: Any
+    load: Any
+    torque: Any
+    rest: Any  # moment on the crank about its bearing, from everything but the rod
+
+
 @lane_function
 def feedback(par, c, dc, i, W):
     """Second derivative that a constraint is given: -2 alpha c' - beta^2 c."""
@@ -41,23 +60,24 @@ def feedback(par, c, dc, i, W):
 
 
 @lane_function
-def open_joint(flag, effects, work, par, joint, row, active, inverse, e, de, spin_j, spin_b, i, W):
+def open_joint(flag, effects, work, par, joint, relative, i, W):
     """Contact and friction of a joint with clearance (see `motion.joint_force`); nothing for an ideal one."""
     if flag is not None:
-        return joint_force(
-            effects, work, par, joint, row, work[active * W + i], work[inverse * W + i],
-            e[0], e[1], de[0], de[1], spin_j, spin_b, i, W,
-        )  # fmt: skip
+        return joint_force(effects, work, par, joint, relative, i, W)
     else:
         return 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @lane_function
-def crank_acceleration(torque, par, inertia, force, phi, omega, time, i, W):
-    """Angular acceleration of the crank: from the forces, or from the driving constraint."""
+def crank_acceleration(torque, par, inertia, force, crank, i, W):
+    """Angular acceleration of the crank: from the forces, or from the driving constraint.
+
+    `crank`: sine, cosine, angle, speed and the time in this revolution.
+    """
     if torque is not None:
         return force / inertia
     else:
+        _, _, phi, omega, time = crank
         speed = par[at.SPEED * W + i]
         return feedback(par, phi - speed * time, omega - speed, i, W)
 
@@ -102,13 +122,12 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W):
         work[(at.QS + Y3) * W + i] - (y2 + far * st),
     )
     de23 = (v3 - (vx2 - far * spin * st), work[(at.VS + Y3) * W + i] - (vy2 + far * spin * ct))
+    spin3 = work[(at.VS + THETA3) * W + i]
     force_1 = open_joint(
-        crank_rod, effects, work, par, at.JOINT_12, at.GAP_12, at.ACTIVE_12, at.INVERSE_IMPACT_12,
-        e12, de12, omega, spin, i, W,
+        crank_rod, effects, work, par, at.O12, (*e12, *de12, omega, spin), i, W
     )  # fmt: skip
     force_2 = open_joint(
-        rod_slider, effects, work, par, at.JOINT_23, at.GAP_23, at.ACTIVE_23, at.INVERSE_IMPACT_23,
-        e23, de23, work[(at.VS + THETA3) * W + i], spin, i, W,
+        rod_slider, effects, work, par, at.O23, (*e23, *de23, spin3, spin), i, W
     )  # fmt: skip
     # acceleration of the crank pin but for that of the crank angle
     pin = (rx - crank * c * omega * omega, ry - crank * s * omega * omega)
@@ -118,64 +137,45 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W):
     torque = torque_of(effects.torque_table, work, par, i, W)
     # on the crank about its bearing, from everything but the rod
     rest = moment * (s * rx - c * ry) - product(effects.gravity, moment * c, g)
-    alpha1, drive, friction = bodies(
-        effects, crank_rod, rod_slider, work, par, s, c, st, ct, phi, omega, spin, v3, ay3, pin,
-        e12, de12, e23, de23, force_1, force_2, g, load, torque, rest, i, W,
+    here = Here(
+        (s, c, phi, omega, work[at.STAGE_TIME * W + i]), (st, ct, spin), (v3, ay3), pin,
+        (e12, de12), (e23, de23), force_1, force_2, g, load, torque, rest,
     )  # fmt: skip
+    alpha1, drive, friction = bodies(effects, crank_rod, rod_slider, work, par, here, i, W)
     work[(at.ACC + PHI1) * W + i] = alpha1
     work[(at.ACC + X1) * W + i] = rx - u1 * (s * alpha1 + c * omega * omega)
     work[(at.ACC + Y1) * W + i] = ry + u1 * (c * alpha1 - s * omega * omega)
     store_power(
-        effects.ledger, effects.series, effects.responses, work,
-        drive_moment_of(effects.torque, torque, drive), omega,
+        effects, work, (drive_moment_of(effects.torque, torque, drive), omega),
         force_1[4] + force_2[4] + friction * v3, load * v3, work[(at.ACC + X3) * W + i], i, W,
     )  # fmt: skip
 
 
 @lane_function
-def bodies(
-    effects, crank_rod, rod_slider, work, par, s, c, st, ct, phi, omega, spin, v3, ay3, pin,
-    e12, de12, e23, de23, force_1, force_2, g, load, torque, rest, i, W,
-):  # fmt: skip
+def bodies(effects, crank_rod, rod_slider, work, par, here, i, W):
     """Rod, slider and crank, by which joints are open. Returns crank acceleration, drive moment, guide friction."""
-    fx1, fy1, _, mj1, _ = force_1
     if crank_rod is not None:
-        rest = rest + par[at.CRANK_LENGTH * W + i] * (s * fx1 - c * fy1) + mj1
+        fx1, fy1, _, mj1, _ = here.force_1
+        s, c, _, _, _ = here.crank
+        rest = here.rest + par[at.CRANK_LENGTH * W + i] * (s * fx1 - c * fy1) + mj1
         inertia = par[at.CRANK_INERTIA * W + i]
         alpha1 = crank_acceleration(
-            effects.torque,
-            par,
-            inertia,
-            torque + rest,
-            phi,
-            omega,
-            work[at.STAGE_TIME * W + i],
-            i,
-            W,
+            effects.torque, par, inertia, here.torque + rest, here.crank, i, W
         )
         if rod_slider is not None:
-            friction = free_rod(
-                effects, work, par, st, ct, v3, ay3, force_1, force_2, g, load, i, W
-            )
+            friction = free_rod(effects, work, par, here, i, W)
         else:
-            friction = rod_on_slider(
-                effects, work, par, st, ct, spin, v3, ay3, e23, de23, force_1, g, load, i, W
-            )
+            friction = rod_on_slider(effects, work, par, here, i, W)
         return alpha1, inertia * alpha1 - rest, friction
     else:
         # the rod's first bearing follows the crank pin
-        fx = pin[0] - feedback(par, e12[0], de12[0], i, W)
-        fy = pin[1] - feedback(par, e12[1], de12[1], i, W)
+        e12, de12 = here.first
+        fx = here.pin[0] - feedback(par, e12[0], de12[0], i, W)
+        fy = here.pin[1] - feedback(par, e12[1], de12[1], i, W)
         if rod_slider is not None:
-            return rod_on_crank(
-                effects, work, par, s, c, st, ct, phi, omega, spin, v3, ay3, fx, fy,
-                force_2, g, load, torque, rest, i, W,
-            )  # fmt: skip
+            return rod_on_crank(effects, work, par, here, (fx, fy), i, W)
         else:
-            return closed_chain(
-                effects, work, par, s, c, st, ct, phi, omega, spin, v3, ay3, fx, fy,
-                e23, de23, g, load, torque, rest, i, W,
-            )  # fmt: skip
+            return closed_chain(effects, work, par, here, (fx, fy), i, W)
 
 
 @lane_function
@@ -187,9 +187,11 @@ def store_rod(work, ax, ay, alpha, i, W):
 
 
 @lane_function
-def free_rod(effects, work, par, st, ct, v3, ay3, force_1, force_2, g, load, i, W):
+def free_rod(effects, work, par, here, i, W):
     """Both joints open. Returns the guide's friction on the slider, against +x."""
-    fx1, fy1, mb1, _, _ = force_1
+    st, ct, _ = here.rod
+    force_2 = here.force_2
+    fx1, fy1, mb1, _, _ = here.force_1
     near = par[at.ROD_NEAR * W + i]
     far = par[at.ROD_FAR * W + i]
     inverse = par[at.INV_ROD_MASS * W + i]
@@ -199,28 +201,34 @@ def free_rod(effects, work, par, st, ct, v3, ay3, force_1, force_2, g, load, i, 
     store_rod(
         work,
         (fx1 + force_2[0]) * inverse,
-        (fy1 + force_2[1]) * inverse - g,
+        (fy1 + force_2[1]) * inverse - here.gravity,
         moment * par[at.INV_ROD_INERTIA * W + i],
         i,
         W,
     )
-    return free_slider(effects, work, par, v3, ay3, force_2[0], force_2[1], g, load, i, W)
+    return free_slider(effects, work, par, here, i, W)
 
 
 @lane_function
-def free_slider(effects, work, par, v3, ay3, fx, fy, g, load, i, W):
-    """Slider with an open joint, (fx, fy) its force on the rod. Returns the guide's friction."""
+def free_slider(effects, work, par, here, i, W):
+    """Slider with an open joint. Returns the guide's friction."""
+    v3, ay3 = here.slider
+    fx, fy, _, _, _ = here.force_2  # on the rod
     friction = guide_friction(
-        effects.guide, par, v3, par[at.SLIDER_MASS * W + i] * (ay3 + g) + fy, i, W
+        effects.guide, par, v3, par[at.SLIDER_MASS * W + i] * (ay3 + here.gravity) + fy, i, W
     )
-    work[(at.ACC + X3) * W + i] = (load - fx - friction) * par[at.INV_SLIDER_MASS * W + i]
+    work[(at.ACC + X3) * W + i] = (here.load - fx - friction) * par[at.INV_SLIDER_MASS * W + i]
     return friction
 
 
 @lane_function
-def rod_on_slider(effects, work, par, st, ct, spin, v3, ay3, e23, de23, force_1, g, load, i, W):
+def rod_on_slider(effects, work, par, here, i, W):
     """O12 open, O23 ideal: rod angle and slider are coupled by the rod's mass."""
-    fx1, fy1, mb1, _, _ = force_1
+    st, ct, spin = here.rod
+    v3, ay3 = here.slider
+    e23, de23 = here.second
+    g, load = here.gravity, here.load
+    fx1, fy1, mb1, _, _ = here.force_1
     length = par[at.ROD_LENGTH * W + i]
     far = par[at.ROD_FAR * W + i]
     m2 = par[at.ROD_MASS * W + i]
@@ -231,9 +239,10 @@ def rod_on_slider(effects, work, par, st, ct, spin, v3, ay3, e23, de23, force_1,
     b1 = length * (st * fx1 - ct * fy1) + mb1 + m2 * far * (ct * (g + fy) - st * fx)
     b2 = fx1 + load - m2 * (fx + far * ct * spin * spin)
     weight = m2 * (g + fy) + m3 * (g + ay3) - fy1
+    inertia = par[at.ROD_INERTIA * W + i] + m2 * far * far
     alpha, a3, friction = sliding_pair(
-        effects.guide, par, par[at.ROD_INERTIA * W + i] + m2 * far * far, m2 * far * st, m2 + m3, b1, b2,
-        m2 * far, st, ct, spin, v3, weight, i, W,
+        effects.guide, par, (inertia, m2 * far * st, m2 + m3), (b1, b2), (m2 * far, st, ct, spin),
+        (v3, weight), i, W,
     )  # fmt: skip
     work[(at.ACC + X3) * W + i] = a3
     ax = a3 + fx + far * (st * alpha + ct * spin * spin)
@@ -242,31 +251,13 @@ def rod_on_slider(effects, work, par, st, ct, spin, v3, ay3, e23, de23, force_1,
 
 
 @lane_function
-def rod_on_crank(
-    effects,
-    work,
-    par,
-    s,
-    c,
-    st,
-    ct,
-    phi,
-    omega,
-    spin,
-    v3,
-    ay3,
-    fx,
-    fy,
-    force_2,
-    g,
-    load,
-    torque,
-    rest,
-    i,
-    W,
-):
-    """O12 ideal, O23 open: rod and crank are coupled by the rod's mass."""
-    fx2, fy2, mb2, _, _ = force_2
+def rod_on_crank(effects, work, par, here, bearing, i, W):
+    """O12 ideal, O23 open: rod and crank are coupled by the rod's mass. `bearing`: the rod's first one's known acceleration."""
+    s, c, _, _, _ = here.crank
+    st, ct, spin = here.rod
+    fx, fy = bearing
+    g, torque, rest = here.gravity, here.torque, here.rest
+    fx2, fy2, mb2, _, _ = here.force_2
     crank = par[at.CRANK_LENGTH * W + i]
     length = par[at.ROD_LENGTH * W + i]
     near = par[at.ROD_NEAR * W + i]
@@ -279,43 +270,26 @@ def rod_on_crank(
     b3 = rest + crank * (c * fy2 - s * fx2) + m2 * crank * (s * fx - c * (fy + g) - swing)
     alpha1 = crank_acceleration(
         effects.torque, par, a33 - a13 * a13 / a11, torque + b3 - a13 * b1 / a11,
-        phi, omega, work[at.STAGE_TIME * W + i], i, W,
+        here.crank, i, W,
     )  # fmt: skip
     alpha = (b1 - a13 * alpha1) / a11
     ax = fx - crank * s * alpha1 - near * (st * alpha + ct * spin * spin)
     store_rod(
         work, ax, fy + crank * c * alpha1 + near * (ct * alpha - st * spin * spin), alpha, i, W
     )
-    friction = free_slider(effects, work, par, v3, ay3, fx2, fy2, g, load, i, W)
+    friction = free_slider(effects, work, par, here, i, W)
     return alpha1, a33 * alpha1 + a13 * alpha - b3, friction
 
 
 @lane_function
-def closed_chain(
-    effects,
-    work,
-    par,
-    s,
-    c,
-    st,
-    ct,
-    phi,
-    omega,
-    spin,
-    v3,
-    ay3,
-    fx,
-    fy,
-    e23,
-    de23,
-    g,
-    load,
-    torque,
-    rest,
-    i,
-    W,
-):
+def closed_chain(effects, work, par, here, bearing, i, W):
     """Both joints ideal: every acceleration is a multiple of the crank's plus a known part."""
+    s, c, _, _, _ = here.crank
+    st, ct, spin = here.rod
+    v3, ay3 = here.slider
+    fx, fy = bearing
+    e23, de23 = here.second
+    g, load, torque, rest = here.gravity, here.load, here.torque, here.rest
     crank = par[at.CRANK_LENGTH * W + i]
     length = par[at.ROD_LENGTH * W + i]
     far = par[at.ROD_FAR * W + i]
@@ -343,12 +317,13 @@ def closed_chain(
         - i2 * k * k0
         - m3 * x3 * x30
     )
-    n1 = reaction_slope(par, st, ct, k, x2, y2, x3, i, W)
-    n0 = reaction_slope(par, st, ct, k0, x20, y20 + g, x30, i, W) + load * st / ct + m3 * (g + ay3)
+    n1 = reaction_slope(par, (st, ct), (k, x2, y2, x3), i, W)
+    n0 = reaction_slope(par, (st, ct), (k0, x20, y20 + g, x30), i, W)
+    n0 = n0 + load * st / ct + m3 * (g + ay3)
+    chain = ((inertia, force), (n0, n1, st / ct), (v3, x3))
     alpha1, friction = chain_acceleration(
-        effects.torque, effects.guide, par, inertia, force, x3, n0, n1, st / ct, phi, omega,
-        work[at.STAGE_TIME * W + i], v3, i, W,
-    )  # fmt: skip
+        effects.torque, effects.guide, par, chain, here.crank, i, W
+    )
     alpha = k * alpha1 + k0
     work[(at.ACC + X3) * W + i] = x3 * alpha1 + x30
     store_rod(work, x2 * alpha1 + x20, y2 * alpha1 + y20, alpha, i, W)
@@ -356,15 +331,18 @@ def closed_chain(
 
 
 @lane_function
-def chain_acceleration(
-    torque, guide, par, inertia, force, x3, n0, n1, slope, phi, omega, time, v3, i, W
-):
-    """Crank acceleration and guide friction of the closed chain, whose guide reaction is n0 + n1 alpha1 - slope f."""
+def chain_acceleration(torque, guide, par, chain, crank, i, W):
+    """Crank acceleration and guide friction of the closed chain, whose guide reaction is n0 + n1 alpha1 - slope f.
+
+    `chain`: balance, reaction and slider as of `motion.guided_crank`; `crank` as of `crank_acceleration`.
+    """
+    balance, reaction, slider = chain
     if torque is not None:
-        return guided_crank(guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
+        return guided_crank(guide, par, balance, reaction, slider, i, W)
     else:
-        alpha1 = crank_acceleration(None, par, inertia, force, phi, omega, time, i, W)
-        return alpha1, known_guide_friction(guide, par, n0 + n1 * alpha1, slope, v3, i, W)
+        alpha1 = crank_acceleration(None, par, balance[0], balance[1], crank, i, W)
+        n0, n1, slope = reaction
+        return alpha1, known_guide_friction(guide, par, n0 + n1 * alpha1, slope, slider[0], i, W)
 
 
 @lane_function

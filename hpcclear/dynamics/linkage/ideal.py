@@ -81,7 +81,7 @@ def _instant(effects, par, load_table, angle, w, alpha, out, i):
     load = load_of(effects.load, effects.load_table, par, table_value(load_table, angle), 0, 1)
     # guide reaction N = free - slope f with f = ratio |N|, one balance of rod and slider
     slope = length * st * inverse
-    free = reaction_slope(par, st, ct, alpha2, ax, ay + g, a3, 0, 1) + load * slope + m3 * g
+    free = reaction_slope(par, (st, ct), (alpha2, ax, ay + g, a3), 0, 1) + load * slope + m3 * g
     ratio = guide_ratio(effects.guide, par, v3, 0, 1)
     ratio = ratio if free >= 0.0 else -ratio
     push = free / (1.0 + slope * ratio)
@@ -219,8 +219,8 @@ def ideal_outcomes(
     rows[:, at.OUT_REVOLUTIONS] = transient + averaged
     rows[:, at.OUT_TIME] = (transient + averaged) * par[:, at.PERIOD]
     # works are not part of an ensemble's record; `ideal_works` has them for one response
-    works = [at.OUT_DRIVE_WORK, at.OUT_ABS_DRIVE_WORK, at.OUT_DISSIPATED, at.OUT_LOAD_WORK]
-    rows[:, works] = np.nan
+    works = at.OUT_TOTAL + at.WORKS
+    rows[:, works : works + 4] = np.nan
     if effects.responses:
         angle = np.linspace(0.0, at.TURN, _PER_TURN, endpoint=False)
         for row, own in zip(rows, par, strict=True):

@@ -104,58 +104,46 @@ def guide_friction(guide, par, speed, reaction, i, W):
 
 
 @lane_function
-def joint_force(
-    effects,
-    work,
-    par,
-    joint,
-    row,
-    active,
-    inverse_impact,
-    ex,
-    ey,
-    vx,
-    vy,
-    spin_journal,
-    spin_bearing,
-    i,
-    W,
-):
+def joint_force(effects, work, par, joint, relative, i, W):
     """Contact and friction in one open joint.
 
-    Parameters are the journal's position and velocity relative to the bearing's centre and both bodies'
-    angular velocities. Gap |e| - c, normal force and gap rate go to three rate rows from `row` on.
+    `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
+    velocities of journal and bearing. Gap |e| - c, normal force and gap rate go to their rows.
     Returns the force on the bearing (the journal gets the opposite), the moments of the friction force on
     bearing and journal about their own centres, and the dissipated power.
     """
+    ex, ey, vx, vy, spin_journal, spin_bearing = relative
+    block = joint.block
+    active = work[joint.active * W + i]
+    inverse_impact = work[joint.inverse_impact * W + i]
     square = ex * ex + ey * ey + _TINY
     inverse = 1.0 / math.sqrt(square)
     nx = ex * inverse
     ny = ey * inverse
-    gap = square * inverse - par[(joint + at.CLEARANCE) * W + i]
+    gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
     rate = vx * nx + vy * ny
     depth = 0.5 * (gap + abs(gap))
-    stiffness = par[(joint + at.CONTACT_STIFFNESS) * W + i]
+    stiffness = par[(block + at.CONTACT_STIFFNESS) * W + i]
     normal = normal_force(
         effects.fixed,
         effects.latched,
         stiffness,
-        par[(joint + at.DAMPING) * W + i],
+        par[(block + at.DAMPING) * W + i],
         depth,
         rate,
         inverse_impact,
     )
     normal = switched(effects.latched, normal, active)
-    arm_bearing = par[(joint + at.BEARING_RADIUS) * W + i] + 0.5 * depth
-    arm_journal = par[(joint + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
+    arm_bearing = par[(block + at.BEARING_RADIUS) * W + i] + 0.5 * depth
+    arm_journal = par[(block + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
     sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
     coulomb, ambrosio = effects.coulomb, effects.ambrosio
     ratio = friction_ratio(
         coulomb,
         ambrosio,
-        par[(joint + at.FRICTION) * W + i],
-        par[(joint + at.DEAD_SPEED) * W + i],
-        par[(joint + at.INVERSE_RAMP) * W + i],
+        par[(block + at.FRICTION) * W + i],
+        par[(block + at.DEAD_SPEED) * W + i],
+        par[(block + at.INVERSE_RAMP) * W + i],
         sliding,
     )
     tangential = either_product(coulomb, ambrosio, normal, ratio)
@@ -165,11 +153,11 @@ def joint_force(
     moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
-    work[(at.RATE_NOW + row) * W + i] = gap
-    work[(at.RATE_NOW + row + 1) * W + i] = normal
-    work[(at.RATE_NOW + row + 2) * W + i] = rate
-    store_rate(effects.series, work, at.FRICTION_12 + row // 3, tangential, i, W)
-    store_rate(effects.sliding, work, at.SLIDING_12 + row // 3, sliding, i, W)
+    work[(at.RATE_NOW + joint.gap) * W + i] = gap
+    work[(at.RATE_NOW + joint.force) * W + i] = normal
+    work[(at.RATE_NOW + joint.rate) * W + i] = rate
+    store_rate(effects.series, work, joint.friction, tangential, i, W)
+    store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
     return fx, fy, moment_bearing, -moment_journal, loss
 
 
@@ -190,22 +178,18 @@ def switched(latched, force, active):
 
 
 @lane_function
-def store_power(
-    ledger, series, responses, work, drive_moment, speed, loss, load_power, acceleration, i, W
-):
-    """What the drive, the contacts and the load do, and the slider's acceleration."""
-    if responses is not None:
-        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
-        work[(at.RATE_NOW + at.SLIDER_ACCELERATION) * W + i] = acceleration
-        work[(at.RATE_NOW + at.SLIDER_SQUARE) * W + i] = acceleration * acceleration
-    if series is not None:
-        work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i] = drive_moment
-    if ledger is not None:
-        power = drive_moment * speed
-        work[(at.RATE_NOW + at.DRIVE_POWER) * W + i] = power
-        work[(at.RATE_NOW + at.ABS_DRIVE_POWER) * W + i] = abs(power)
-        work[(at.RATE_NOW + at.DISSIPATION) * W + i] = loss
-        work[(at.RATE_NOW + at.LOAD_POWER) * W + i] = load_power
+def store_power(effects, work, drive, loss, load_power, acceleration, i, W):
+    """What the drive (its moment, the crank's speed), the contacts and the load do, and the slider's acceleration."""
+    moment, speed = drive
+    power = moment * speed
+    store_rate(effects.series, work, at.DRIVE_MOMENT, moment, i, W)
+    store_rate(effects.ledger, work, at.DRIVE_POWER, power, i, W)
+    store_rate(effects.ledger, work, at.ABS_DRIVE_POWER, abs(power), i, W)
+    store_rate(effects.ledger, work, at.DISSIPATION, loss, i, W)
+    store_rate(effects.ledger, work, at.LOAD_POWER, load_power, i, W)
+    store_rate(effects.responses, work, at.DRIVE_MOMENT, moment, i, W)
+    store_rate(effects.responses, work, at.SLIDER_ACCELERATION, acceleration, i, W)
+    store_rate(effects.responses, work, at.SLIDER_SQUARE, acceleration * acceleration, i, W)
 
 
 @lane_function
@@ -245,16 +229,15 @@ def two_open(effects, work, par, phi, omega, i, W):
         effects,
         work,
         par,
-        at.JOINT_12,
-        at.GAP_12,
-        work[at.ACTIVE_12 * W + i],
-        work[at.INVERSE_IMPACT_12 * W + i],
-        crank * cphi - (x2 - near * ct),
-        crank * sphi - (y2 - near * st),
-        -crank * omega * sphi - (vx2 + near * spin * st),
-        crank * omega * cphi - (vy2 - near * spin * ct),
-        omega,
-        spin,
+        at.O12,
+        (
+            crank * cphi - (x2 - near * ct),
+            crank * sphi - (y2 - near * st),
+            -crank * omega * sphi - (vx2 + near * spin * st),
+            crank * omega * cphi - (vy2 - near * spin * ct),
+            omega,
+            spin,
+        ),
         i,
         W,
     )
@@ -262,16 +245,15 @@ def two_open(effects, work, par, phi, omega, i, W):
         effects,
         work,
         par,
-        at.JOINT_23,
-        at.GAP_23,
-        work[at.ACTIVE_23 * W + i],
-        work[at.INVERSE_IMPACT_23 * W + i],
-        work[(at.QS + 3) * W + i] - (x2 + far * ct),
-        -(y2 + far * st),
-        v3 - (vx2 - far * spin * st),
-        -(vy2 + far * spin * ct),
-        0.0,
-        spin,
+        at.O23,
+        (
+            work[(at.QS + 3) * W + i] - (x2 + far * ct),
+            -(y2 + far * st),
+            v3 - (vx2 - far * spin * st),
+            -(vy2 + far * spin * ct),
+            0.0,
+            spin,
+        ),
         i,
         W,
     )
@@ -294,12 +276,9 @@ def two_open(effects, work, par, phi, omega, i, W):
         effects.torque, work, 4, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
     )
     store_power(
-        effects.ledger,
-        effects.series,
-        effects.responses,
+        effects,
         work,
-        drive_moment_of(effects.torque, torque, -crank_load),
-        omega,
+        (drive_moment_of(effects.torque, torque, -crank_load), omega),
         loss1 + loss2 + guide * v3,
         load * v3,
         work[(at.ACC + 3) * W + i],
@@ -325,16 +304,15 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
         effects,
         work,
         par,
-        at.JOINT_12,
-        at.GAP_12,
-        work[at.ACTIVE_12 * W + i],
-        work[at.INVERSE_IMPACT_12 * W + i],
-        crank * cphi - (x3 - length * ct),
-        crank * sphi + length * st,
-        -crank * omega * sphi - (v3 + length * spin * st),
-        crank * omega * cphi + length * spin * ct,
-        omega,
-        spin,
+        at.O12,
+        (
+            crank * cphi - (x3 - length * ct),
+            crank * sphi + length * st,
+            -crank * omega * sphi - (v3 + length * spin * st),
+            crank * omega * cphi + length * spin * ct,
+            omega,
+            spin,
+        ),
         i,
         W,
     )
@@ -349,22 +327,9 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
     b1 = length * (st * fx - ct * fy) + mb + product(effects.gravity, m2 * far * ct, g)
     b2 = fx + load - m2 * far * ct * spin * spin
     alpha, a3, friction = sliding_pair(
-        effects.guide,
-        par,
-        a11,
-        a12,
-        a22,
-        b1,
-        b2,
-        m2 * far,
-        st,
-        ct,
-        spin,
-        v3,
-        (m2 + m3) * g - fy,
-        i,
-        W,
-    )
+        effects.guide, par, (a11, a12, a22), (b1, b2), (m2 * far, st, ct, spin),
+        (v3, (m2 + m3) * g - fy), i, W,
+    )  # fmt: skip
     work[at.ACC * W + i] = alpha
     work[(at.ACC + 1) * W + i] = a3
     crank_load = (
@@ -376,12 +341,9 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
         effects.torque, work, 2, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
     )
     store_power(
-        effects.ledger,
-        effects.series,
-        effects.responses,
+        effects,
         work,
-        drive_moment_of(effects.torque, torque, -crank_load),
-        omega,
+        (drive_moment_of(effects.torque, torque, -crank_load), omega),
         loss + friction * v3,
         load * v3,
         a3,
@@ -391,14 +353,21 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
 
 
 @lane_function
-def sliding_pair(guide, par, a11, a12, a22, b1, b2, moment, st, ct, spin, v3, weight, i, W):
+def sliding_pair(guide, par, matrix, right, rod, slider, i, W):
     """Solve for rod angle and slider x with guide friction on an ideal slider pin.
+
+    `matrix`: a11, a12, a22; `right`: its right-hand sides; `rod`: mass times the arm to the pin, sine and cosine of its
+    angle, angular velocity; `slider`: its speed, and the guide's reaction but for the rod's vertical acceleration.
 
     The guide's reaction N = weight + m2 y2'' depends on the acceleration, and friction opposes the sliding
     whatever the sign of N: solve for N > 0, and for N < 0 where that sign does not hold.
     Returns angular acceleration, slider acceleration, friction force against +x.
     """
+    a11, a12, a22 = matrix
+    b1, b2 = right
     if guide is not None:
+        moment, st, ct, spin = rod
+        v3, weight = slider
         ratio = guide_ratio(guide, par, v3, i, W)
         y2_rest = moment * st * spin * spin  # the part of m2 y2'' without the angular acceleration
         rest = weight + y2_rest
@@ -435,16 +404,15 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
         effects,
         work,
         par,
-        at.JOINT_23,
-        at.GAP_23,
-        work[at.ACTIVE_23 * W + i],
-        work[at.INVERSE_IMPACT_23 * W + i],
-        x3 - (crank * cphi + length * ct),
-        -(crank * sphi + length * st),
-        v3 + crank * omega * sphi + length * spin * st,
-        -(crank * omega * cphi + length * spin * ct),
-        0.0,
-        spin,
+        at.O23,
+        (
+            x3 - (crank * cphi + length * ct),
+            -(crank * sphi + length * st),
+            v3 + crank * omega * sphi + length * spin * st,
+            -(crank * omega * cphi + length * spin * ct),
+            0.0,
+            spin,
+        ),
         i,
         W,
     )
@@ -481,12 +449,9 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
     work[(at.ACC + 1) * W + i] = (load - fx - guide) * par[at.INV_SLIDER_MASS * W + i]
     store_crank(effects.torque, work, 2, crank_alpha, i, W)
     store_power(
-        effects.ledger,
-        effects.series,
-        effects.responses,
+        effects,
         work,
-        drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3),
-        omega,
+        (drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3), omega),
         loss + guide * v3,
         load * v3,
         work[(at.ACC + 1) * W + i],
@@ -546,33 +511,28 @@ def both_ideal(effects, work, par, phi, omega, i, W):
     w2 = omega * omega
     slope = st / ct
     # guide reaction n0 + n1 alpha - slope f
-    n1 = reaction_slope(par, st, ct, k, x2, y2, x3, i, W)
-    n0 = reaction_slope(par, st, ct, dk * w2, dx2 * w2, dy2 * w2 + g, dx3 * w2, i, W)
+    n1 = reaction_slope(par, (st, ct), (k, x2, y2, x3), i, W)
+    n0 = reaction_slope(par, (st, ct), (dk * w2, dx2 * w2, dy2 * w2 + g, dx3 * w2), i, W)
     n0 = n0 + load * slope + m3 * g
-    alpha, friction = guided_crank(effects.guide, par, inertia, force, x3, n0, n1, slope, v3, i, W)
+    alpha, friction = guided_crank(
+        effects.guide, par, (inertia, force), (n0, n1, slope), (v3, x3), i, W
+    )
     work[at.ACC * W + i] = alpha
     store_power(
-        effects.ledger,
-        effects.series,
-        effects.responses,
-        work,
-        torque,
-        omega,
-        friction * v3,
-        load * v3,
-        x3 * alpha + dx3 * w2,
-        i,
-        W,
+        effects, work, (torque, omega), friction * v3, load * v3, x3 * alpha + dx3 * w2, i, W
     )
 
 
 @lane_function
-def reaction_slope(par, st, ct, alpha2, ax2, ay2, ax3, i, W):
+def reaction_slope(par, direction, accelerations, i, W):
     """Force Ry that a rod between ideal pins takes from the slider for given accelerations, without load and friction.
 
     Moments about the rod's first pin: I2 alpha2 + m2 near (ct ay2 - st ax2) = length (ct Ry - st Rx), and the
-    slider's balance Rx = load - f - m3 ax3. Gravity counts as part of ay2.
+    slider's balance Rx = load - f - m3 ax3. Gravity counts as part of ay2. `direction`: st, ct of the rod;
+    `accelerations`: alpha2, ax2, ay2, ax3.
     """
+    st, ct = direction
+    alpha2, ax2, ay2, ax3 = accelerations
     length = par[at.ROD_LENGTH * W + i]
     m2_near = par[at.ROD_MASS * W + i] * par[at.ROD_NEAR * W + i]
     moment = par[at.ROD_INERTIA * W + i] * alpha2 + m2_near * (ct * ay2 - st * ax2)
@@ -580,11 +540,15 @@ def reaction_slope(par, st, ct, alpha2, ax2, ay2, ax3, i, W):
 
 
 @lane_function
-def guided_crank(guide, par, inertia, force, x3, n0, n1, slope, v3, i, W):
+def guided_crank(guide, par, balance, reaction, slider, i, W):
     """Crank acceleration with guide friction f = ratio |N|, whose reaction N = n0 + n1 alpha - slope f depends on it.
 
-    Solve for N > 0, and for N < 0 where that sign does not hold. Returns acceleration and f.
+    Solve for N > 0, and for N < 0 where that sign does not hold. `balance`: inertia, force; `reaction`: n0, n1, slope;
+    `slider`: its speed, and that over the crank's. Returns acceleration and f.
     """
+    inertia, force = balance
+    n0, n1, slope = reaction
+    v3, x3 = slider
     if guide is not None:
         ratio = guide_ratio(guide, par, v3, i, W)
         scaled = ratio / (1.0 + slope * ratio)  # f = scaled (n0 + n1 alpha)

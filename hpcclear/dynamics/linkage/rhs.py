@@ -43,12 +43,13 @@ def look_up(effects, flag, row, work, par, table, last, W):
 
 
 @lane_function
-def lane_motion(effects, baumgarte, crank_rod, rod_slider, torque, work, par, last, i, W):
+def lane_motion(effects, baumgarte, crank_rod, rod_slider, work, par, i, W):
     """Accelerations and rates of lane i, by formulation and open joints; what is not called is not compiled."""
     if baumgarte is not None:
         nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W)
     else:
-        phi, omega = crank_motion(torque, baumgarte, work, par, last, i, W)
+        last = crank_coordinate(baumgarte, crank_rod, rod_slider)
+        phi, omega = crank_motion(effects.torque, baumgarte, work, par, last, i, W)
         if crank_rod is not None:
             if rod_slider is not None:
                 two_open(effects, work, par, phi, omega, i, W)
@@ -69,6 +70,4 @@ def accelerations(effects, work, par, torque_table, load_table, W):
     look_up(effects, effects.torque_table, at.TORQUE_VALUE, work, par, torque_table, last, W)
     look_up(effects, effects.load_table, at.LOAD_VALUE, work, par, load_table, last, W)
     for i in range(W):
-        lane_motion(
-            effects, baumgarte, crank_rod, rod_slider, effects.torque, work, par, last, i, W
-        )  # fmt: skip
+        lane_motion(effects, baumgarte, crank_rod, rod_slider, work, par, i, W)

@@ -8,7 +8,9 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
 _LOG_SAFETY = -0.152003  # log2(0.9)
 _LOG_SHRINK = -2.321928  # a step shrinks to a fifth at most
@@ -36,8 +38,10 @@ def choose_step(work, par, torque, W):
 
 
 @lane_function
-def judge_step(work, expo, beta, max_steps, smallest, W):
+def judge_step(work, settings, W):
     """Accept or reject by the error, propose the next step; lanes that cannot go on become special."""
+    expo, beta = settings[EXPONENT], settings[BETA]
+    max_steps, smallest = settings[MAX_STEPS], settings[SMALLEST_STEP]
     special = 0.0
     for i in range(W):
         error = work[at.ERROR * W + i]
@@ -72,16 +76,16 @@ def judge_step(work, expo, beta, max_steps, smallest, W):
 
 
 @lane_function
-def gap_flag(latched, work, active, gap, i, W, tolerance):
+def gap_flag(latched, work, joint, i, W, tolerance):
     """1 where the joint's gap needs the scalar code: an impact inside the step, or a change of sign."""
-    d0 = work[(at.RATE_OLD + gap) * W + i]
-    d1 = work[(at.RATE_NOW + gap) * W + i]
+    d0 = work[(at.RATE_OLD + joint.gap) * W + i]
+    d1 = work[(at.RATE_NOW + joint.gap) * W + i]
     flag = 1.0 if d0 * d1 < 0.0 else 0.0
     if latched is not None:
         h = work[at.STEP * W + i]
-        m0 = h * work[(at.RATE_OLD + gap + 2) * W + i]
-        m1 = h * work[(at.RATE_NOW + gap + 2) * W + i]
-        flight = 1.0 - work[active * W + i]
+        m0 = h * work[(at.RATE_OLD + joint.rate) * W + i]
+        m1 = h * work[(at.RATE_NOW + joint.rate) * W + i]
+        flight = 1.0 - work[joint.active * W + i]
         hit = 1.0 if d1 > -tolerance else 0.0
         bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
         flag = max(flag, flight * max(hit, bump))
@@ -95,9 +99,9 @@ def flag_gaps(crank_rod, rod_slider, torque, latched, work, last, tolerance, W):
     for i in range(W):
         flag = 0.0
         if crank_rod is not None:
-            flag = max(flag, gap_flag(latched, work, at.ACTIVE_12, at.GAP_12, i, W, tolerance))
+            flag = max(flag, gap_flag(latched, work, at.O12, i, W, tolerance))
         if rod_slider is not None:
-            flag = max(flag, gap_flag(latched, work, at.ACTIVE_23, at.GAP_23, i, W, tolerance))
+            flag = max(flag, gap_flag(latched, work, at.O23, i, W, tolerance))
         if torque is not None:
             turned = 1.0 if work[(at.QS + last) * W + i] > at.TURN - 1e-6 else 0.0
             stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
@@ -129,89 +133,62 @@ def add_integral(work, rate, mean, yes, i, W):
 
 
 @lane_function
-def commit_joint(flag, latched, work, gap, active, peak, deepest, ended, i, W):
+def commit_joint(flag, latched, work, joint, i, W):
     """Contact state, integral and extremes of one joint after a step."""
     if flag is not None:
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
         counts = accept * work[at.AVERAGING * W + i] == 1.0
-        d = work[(at.RATE_NOW + gap) * W + i]
-        force = work[(at.RATE_NOW + gap + 1) * W + i]
-        work[peak * W + i] = max(work[peak * W + i], force if counts else 0.0)
-        work[deepest * W + i] = max(work[deepest * W + i], d if counts else 0.0)
-        add_integral(work, gap, abs(work[(at.RATE_SUM + gap) * W + i]), yes, i, W)
-        keep(work, at.RATE_OLD + gap, d, yes, i, W)
-        keep(work, at.RATE_OLD + gap + 2, work[(at.RATE_NOW + gap + 2) * W + i], yes, i, W)
+        d = work[(at.RATE_NOW + joint.gap) * W + i]
+        force = work[(at.RATE_NOW + joint.force) * W + i]
+        work[joint.peak * W + i] = max(work[joint.peak * W + i], force if counts else 0.0)
+        work[joint.deepest * W + i] = max(work[joint.deepest * W + i], d if counts else 0.0)
+        add_integral(work, joint.gap, abs(work[(at.RATE_SUM + joint.gap) * W + i]), yes, i, W)
+        keep(work, at.RATE_OLD + joint.gap, d, yes, i, W)
+        keep(work, at.RATE_OLD + joint.rate, work[(at.RATE_NOW + joint.rate) * W + i], yes, i, W)
         if latched is not None:
-            on = work[active * W + i]
+            on = work[joint.active * W + i]
             off = 1.0 if (accept * on == 1.0) & (d < 0.0) else 0.0
-            work[active * W + i] = on - off
-            work[ended * W + i] += off
+            work[joint.active * W + i] = on - off
+            work[joint.ended * W + i] += off
 
 
 @lane_function
-def commit_ledger(ledger, work, i, W):
-    """Powers and works after a step."""
-    if ledger is not None:
-        yes = work[at.ACCEPT * W + i] == 1.0
-        for r in range(at.DRIVE_POWER, at.LOAD_POWER + 1):
-            add_integral(work, r, work[(at.RATE_SUM + r) * W + i], yes, i, W)
-            keep(work, at.RATE_OLD + r, work[(at.RATE_NOW + r) * W + i], yes, i, W)
-
-
-@lane_function
-def commit_response(work, rate, yes, i, W):
+def commit_measure(flag, work, rate, i, W):
     """Integral of a rate after a step."""
-    add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
-    keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+    if flag is not None:
+        yes = work[at.ACCEPT * W + i] == 1.0
+        add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
+        keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
 
 
 @lane_function
-def commit_responses(responses, work, i, W):
-    """Integrals of forces and slider acceleration, and the peak of the crank moment, after a step."""
+def commit_peak(responses, work, i, W):
+    """Peak of the crank moment after a step."""
     if responses is not None:
-        yes = work[at.ACCEPT * W + i] == 1.0
         counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
-        commit_response(work, at.FORCE_12, yes, i, W)
-        commit_response(work, at.FORCE_23, yes, i, W)
-        commit_response(work, at.SLIDER_ACCELERATION, yes, i, W)
-        commit_response(work, at.SLIDER_SQUARE, yes, i, W)
         moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
         peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
         work[at.PEAK_MOMENT * W + i] = peak
 
 
 @lane_function
-def commit(crank_rod, rod_slider, latched, ledger, responses, work, stages, n, W):
+@unrolled
+def commit_rates(effects, work, i, W):
+    """Integrals over a step, and what else is kept of the rates at its end."""
+    commit_joint(effects.crank_rod, effects.latched, work, at.O12, i, W)
+    commit_joint(effects.rod_slider, effects.latched, work, at.O23, i, W)
+    for one in written_out(at.MEASURES):
+        commit_measure(getattr(effects, one.asked_by), work, one.rate, i, W)
+    commit_peak(effects.responses, work, i, W)
+
+
+@lane_function
+def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     ended = 0.0
     for i in range(W):
-        commit_joint(
-            crank_rod,
-            latched,
-            work,
-            at.GAP_12,
-            at.ACTIVE_12,
-            at.PEAK_12,
-            at.DEEPEST_12,
-            at.ENDED_12,
-            i,
-            W,
-        )
-        commit_joint(
-            rod_slider,
-            latched,
-            work,
-            at.GAP_23,
-            at.ACTIVE_23,
-            at.PEAK_23,
-            at.DEEPEST_23,
-            at.ENDED_23,
-            i,
-            W,
-        )
-        commit_ledger(ledger, work, i, W)
-        commit_responses(responses, work, i, W)
+        commit_rates(effects, work, i, W)
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
         for k in range(n):

@@ -3,7 +3,7 @@
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.lobatto import MATRIX, STAGES, row_of, weighted
-from hpcclear.dynamics.stepping.lifecycle import RECORDED
+from hpcclear.dynamics.stepping.settings import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
 (TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
@@ -29,7 +29,7 @@ def record_step(record, counters, work, stages, book, n, W):
             record[row, INVERSE_12] = work[at.INVERSE_IMPACT_12 * W]
             record[row, INVERSE_23] = work[at.INVERSE_IMPACT_23 * W]
             for r in range(4):
-                done = book[(at.DRIVE_WORK + r) * W]
+                done = book[(at.TOTAL + at.WORKS + r) * W]
                 record[row, DRIVE_WORK + r] = done + work[(at.INTEGRAL + at.DRIVE_POWER + r) * W]
             for k in range(n):
                 record[row, STATE + k] = work[(at.Q + k) * W]
@@ -59,7 +59,7 @@ def record_nodes(record, counters, work, m, book, n):
                 power = at.DRIVE_POWER + r
                 rates = row_of(m, at.RATE_NOW + power)
                 since = weighted(m, MATRIX, work[at.RATE_OLD + power], rates, i)
-                done = book[at.DRIVE_WORK + r] + work[at.INTEGRAL + power]
+                done = book[at.TOTAL + at.WORKS + r] + work[at.INTEGRAL + power]
                 record[row, DRIVE_WORK + r] = done + work[at.STEP] * since
             for k in range(n):
                 record[row, STATE + k] = m[(at.QS + k) * STAGES + i]

@@ -1,0 +1,110 @@
+"""Kernel parameters of a scene's samples."""
+
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.physics import contact
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+
+class Numbers:
+    """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
+
+    def __init__(self, scene: Scene, points: Points | None) -> None:
+        self.scene = scene
+        self.points = points
+        self.size = 1 if points is None else len(points)
+        self._columns = {}
+        if points is not None:
+            for k, paths in enumerate(points.paths):
+                self._columns.update(dict.fromkeys(paths, points.values[:, k]))
+
+    def __call__(self, path: str) -> Array:
+        """Values of an entry, shape (size,), SI."""
+        column = self._columns.get(path)
+        return np.full(self.size, self.scene.number(path)) if column is None else column
+
+
+def topology(scene: Scene) -> tuple[bool, bool, bool]:
+    """Whether O12 is open, O23 is open, and the crank is free."""
+    open_joints = scene.clearance_joints()
+    return "crank_rod" in open_joints, "rod_slider" in open_joints, scene.drive.kind == "torque"
+
+
+def parameters(scene: Scene, points: Points | None = None) -> Array:
+    """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
+    get = Numbers(scene, points)
+    p = np.ones((get.size, at.PARAMETERS))
+    body = {
+        name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
+    }
+    free = scene.drive.kind == "torque"
+    speed = get("drive.initial_speed" if free else "drive.speed")
+    p[:, at.SPEED] = speed
+    p[:, at.PERIOD] = at.TURN / speed
+    p[:, at.FIRST_STEP] = 1e-3 * p[:, at.PERIOD]
+    p[:, at.CRANK_LENGTH] = body["crank.length"]
+    p[:, at.ROD_LENGTH] = body["rod.length"]
+    near = get("mechanism.rod.mass_center")
+    p[:, at.ROD_NEAR], p[:, at.ROD_FAR] = near, body["rod.length"] - near
+    mass, inertia = get("mechanism.rod.mass"), get("mechanism.rod.inertia")
+    p[:, at.ROD_MASS], p[:, at.INV_ROD_MASS] = mass, 1.0 / mass
+    p[:, at.ROD_INERTIA], p[:, at.INV_ROD_INERTIA] = inertia, 1.0 / inertia
+    p[:, at.SLIDER_MASS], p[:, at.INV_SLIDER_MASS] = body["slider.mass"], 1.0 / body["slider.mass"]
+    m1, u1 = get("mechanism.crank.mass"), get("mechanism.crank.mass_center")
+    own = get("mechanism.crank.inertia") + (get("drive.flywheel_inertia") if free else 0.0)
+    p[:, at.CRANK_MASS], p[:, at.CRANK_NEAR], p[:, at.CRANK_OWN_INERTIA] = m1, u1, own
+    p[:, at.CRANK_MOMENT] = m1 * u1
+    p[:, at.CRANK_INERTIA] = own + m1 * u1**2
+    p[:, at.GRAVITY] = get("effects.gravity")
+    p[:, at.BAUMGARTE_ALPHA2] = 2.0 * scene.numerics.alpha
+    p[:, at.BAUMGARTE_BETA2] = scene.numerics.beta**2
+    _outside_parameters(scene, get, p)
+    for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
+        if joint in scene.clearance_joints():
+            _joint_parameters(scene, get, joint, p[:, base:])
+    return p
+
+
+def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
+    """Drive torque, slider load and guide friction; tables are multiplied by 1."""
+    if isinstance(scene.effects.slider_load, float):
+        p[:, at.LOAD] = get("effects.slider_load")
+    if isinstance(getattr(scene.drive, "torque", None), float):
+        p[:, at.TORQUE] = get("drive.torque")
+    if scene.effects.guide_friction is not None:
+        p[:, at.GUIDE_COEFFICIENT] = get("effects.guide_friction.coefficient")
+        p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")
+
+
+def _joint_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
+    """Fill one joint's block of parameters (a view, first column its first entry)."""
+    key = f"joints.{joint}"
+    clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+    h_bearing, h_journal = (
+        contact.reduced_compliance(
+            get(f"{key}.{part}.youngs_modulus"), get(f"{key}.{part}.poisson_ratio")
+        )
+        for part in ("bearing", "journal")
+    )
+    p[:, at.CLEARANCE] = clearance
+    p[:, at.CONTACT_STIFFNESS] = contact.contact_stiffness(h_bearing, h_journal, bearing, clearance)
+    p[:, at.BEARING_RADIUS] = bearing
+    p[:, at.JOURNAL_RADIUS] = bearing - clearance
+    law: Any = scene.effects.contact
+    if law.law == "hunt-crossley":
+        p[:, at.DAMPING] = get("effects.contact.damping")
+    elif law.law in contact.LATCHED_LAWS:
+        p[:, at.DAMPING] = contact.LATCHED_LAWS[law.law](get("effects.contact.restitution"))
+    friction = scene.effects.friction
+    if friction.law != "none":
+        p[:, at.FRICTION] = get("effects.friction.coefficient")
+    if friction.law == "coulomb":
+        p[:, at.INVERSE_RAMP] = 1.0 / get("effects.friction.ramp_speed")
+    elif friction.law == "ambrosio" and friction.speeds is not None:
+        p[:, at.DEAD_SPEED] = friction.speeds[0]
+        p[:, at.INVERSE_RAMP] = 1.0 / (friction.speeds[1] - friction.speeds[0])

@@ -1,0 +1,297 @@
+"""What is common to the samples of a scene: effects, coordinates, method, tolerances, tables."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
+from hpcclear.dynamics.implicit.stiff import STEEP
+from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.physics import contact
+from hpcclear.dynamics.views import Parameters, Settings
+from hpcclear.scene import Scene
+
+LEAST_AVERAGED = 10
+"""Revolutions before an automatic average may end: fewer say nothing about its standard error."""
+
+IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
+"""Methods that take implicit steps whatever the scene, and when."""
+
+TIGHT = 1e-9
+"""Relative tolerance from which "auto" integrates a single response by collocation: two methods agree to about this."""
+
+STIFF_RAMP = STEEP
+"""Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
+
+STIFF_DAMPING = 10.0
+"""Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""
+
+CELLS = 2048
+"""Cells of a tabulated torque or load over one turn."""
+
+_NO_TABLE = np.zeros(4)
+
+IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
+"""When lanes take implicit steps: never, where their motion is stiff, always."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that is common to the samples of a run.
+
+    Attributes
+    ----------
+    effects : layout.Effects
+    coordinates : int
+    tableau : Tableau
+    rtol : float
+    atol : tuple of float
+        Absolute tolerances of coordinates, then velocities, SI (2 * coordinates).
+    impact_floor : float
+        Least latched impact speed, m/s.
+    transient, averaged, max_steps : int
+    averaged_cap, objective_tolerance
+        The average goes on until the relative standard error of the objective is below this, or to the cap;
+        a tolerance of 0 averages over `averaged` revolutions.
+    torque_table, load_table : numpy.ndarray, optional
+        Cubic cells of a periodic table, 4 coefficients a cell.
+    implicit : str
+        When lanes take implicit steps, a key of `IMPLICIT_USE`.
+    collocation : bool
+        Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes.
+
+    Raises
+    ------
+    ValueError
+        If coordinates or tolerances do not fit the kernel.
+    """
+
+    effects: at.Effects
+    coordinates: int
+    tableau: Tableau
+    rtol: float
+    atol: tuple[float, ...]
+    impact_floor: float
+    transient: int
+    averaged: int
+    max_steps: int
+    averaged_cap: int = 0
+    objective_tolerance: float = 0.0
+    torque_table: Array | None = None
+    load_table: Array | None = None
+    implicit: str = "never"
+    collocation: bool = False
+
+    def __post_init__(self) -> None:
+        n = self.coordinates
+        if not 0 <= n <= at.MAX_COORDINATES:
+            raise ValueError(f"the kernel holds {at.MAX_COORDINATES} coordinates at most, not {n}")
+        if len(self.atol) != 2 * n:
+            raise ValueError(f"{n} coordinates have {2 * n} tolerances, not {len(self.atol)}")
+
+    def settings(self) -> Settings:
+        """The numbers that the stepper's control reads."""
+        s = Settings(np.zeros(Settings.size))
+        n = self.coordinates
+        length = min(self.atol[:n])
+        s.rtol = self.rtol
+        # An impact is located ten times better than positions are integrated, but not below round-off.
+        s.gap_tolerance = max(0.1 * length, 4e-15)
+        s.angle_tolerance = max(self.rtol * 1e-3, 1e-13)
+        s.impact_floor = self.impact_floor
+        s.transient, s.averaged, s.max_steps = self.transient, self.averaged, self.max_steps
+        s.averaged_cap = max(self.averaged_cap, self.averaged)
+        s.objective_tolerance = self.objective_tolerance
+        s.smallest_step = 1e-14
+        s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
+        s.beta = 0.04
+        s.implicit = IMPLICIT_USE[self.implicit]
+        s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
+        return s
+
+    @property
+    def tables(self) -> at.Tables:
+        """The tabulated curves as the kernel reads them; one that is absent is never looked up."""
+        torque, load = (_NO_TABLE if t is None else t for t in (self.torque_table, self.load_table))
+        return at.Tables(torque, load)
+
+
+def coordinate_count(scene: Scene) -> int:
+    """Coordinates that are integrated; 0 leaves closed-form kinematics."""
+    if scene.numerics.formulation == "baumgarte":
+        return at.MAX_COORDINATES
+    first, second, free = topology(scene)
+    return {0: 0, 1: 2, 2: 4}[first + second] + free
+
+
+def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
+    """Which branches of the kernel are compiled for this scene."""
+    first, second, free = topology(scene)
+    e = scene.effects
+    contact_law = e.contact.law if e.contact is not None and (first or second) else None
+    friction_law = e.friction.law if first or second else None
+    torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
+    load_is_table = isinstance(e.slider_load, tuple)
+    return at.Effects(
+        crank_rod=_flag(first),
+        rod_slider=_flag(second),
+        fixed=_flag(contact_law == "hunt-crossley"),
+        latched=_flag(contact_law in contact.LATCHED_LAWS),
+        coulomb=_flag(friction_law == "coulomb"),
+        ambrosio=_flag(friction_law == "ambrosio"),
+        torque=_flag(free),
+        torque_table=_flag(free and torque_is_table),
+        gravity=_flag(e.gravity > 0.0),
+        load=_flag(e.slider_load is not None and not load_is_table),
+        load_table=_flag(load_is_table),
+        guide=_flag(e.guide_friction is not None),
+        baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
+        ledger=_flag(scene.numerics.energy if ledger is None else ledger),
+        series=_flag(series),
+        responses=_flag(scene.responses_asked()),
+    )
+
+
+def _flag(on: bool) -> int | None:
+    return 1 if on else None
+
+
+def tableau_of(scene: Scene) -> Tableau:
+    """The embedded pair of ``numerics.method``: Dormand and Prince's unless another one is named."""
+    return TABLEAUS.get(scene.numerics.method, DORMAND_PRINCE)
+
+
+def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
+    """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
+
+    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the crank pin moves
+    slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
+    """
+    first, second, free = topology(scene)
+    a = scene.numerics.absolute_tolerance
+    if scene.numerics.formulation == "baumgarte":
+        lengths, free = [True, True, True, True, False, True, True, False], True
+    elif first and second:
+        lengths = [True, True, False, True]
+    elif first or second:
+        lengths = [False, True]
+    else:
+        lengths = []
+    lengths += [False] * free
+    coordinates = [a if length else 10.0 * a for length in lengths]
+    drive = scene.drive
+    speed = drive.initial_speed if drive.kind == "torque" else drive.speed
+    rate = 1e3 * min(1.0, scene.mechanism.crank.length * abs(speed) / 25.0)
+    velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
+    return (*coordinates, *velocities)
+
+
+def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = CELLS) -> Array:
+    """A tabulated curve over one turn as cubic cells on a uniform grid, 4 coefficients each (flat).
+
+    Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
+    no overshoot, and smooth enough not to stop the integrator at each of them.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    angles = np.array([a for a, _ in curve])
+    values = np.array([v for _, v in curve])
+    if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
+        angles, values = angles[:-1], values[:-1]
+    # three turns side by side, so that the middle one sees its neighbours
+    turns = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
+    smooth = PchipInterpolator(turns, np.tile(values, 3))
+    grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
+    height = smooth(grid)
+    slope = smooth.derivative()(grid) * (at.TURN / cells)
+    height[-1], slope[-1] = height[0], slope[0]
+    d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
+    return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
+
+
+def implicit_method(scene: Scene) -> str:
+    """When the kernel takes implicit steps: "never", "stiff" (where a lane's motion calls for it), "always".
+
+    The automatic choice goes by the scene's numbers, so that a scene that is not stiff pays nothing for the other method.
+    It is the same for a single response and for an ensemble.
+    """
+    method = scene.numerics.method
+    if method != "auto" or not scene.clearance_joints():
+        return IMPLICIT_METHODS.get(method, "never")
+    par = Parameters(parameters(scene)[0])
+    friction = scene.effects.friction.law
+    contact_law = getattr(scene.effects.contact, "law", "hertz")
+    is_open = np.array(topology(scene)[:2])
+    ramp = par.friction * par.inverse_ramp if friction != "none" else np.zeros(2)
+    damping = par.damping if contact_law != "hertz" else np.zeros(2)
+    stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
+    return "stiff" if (stiff & is_open).any() else "never"
+
+
+def takes_collocation(scene: Scene, single: bool) -> bool:
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
+
+    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digits that either
+    knows. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
+    where the motion may be stiff, implicit steps are called for.
+
+    Raises
+    ------
+    InputError
+        If it is named and cannot be had.
+    """
+    minimal = scene.numerics.formulation == "minimal"
+    if scene.numerics.method == "lobatto":
+        if not minimal:
+            raise InputError(
+                "numerics.method",
+                "lobatto",
+                "works in minimal coordinates only",
+                'set numerics.formulation = "minimal" or another method',
+            )
+        return True
+    curves = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
+    smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
+    automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
+    return single and automatic and smooth and scene.numerics.rtol <= TIGHT
+
+
+def problem_of(
+    scene: Scene, *, series: bool = False, ledger: bool | None = None, single: bool = False
+) -> Problem:
+    """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
+    e = scene.effects
+    torque = getattr(scene.drive, "torque", None)
+    averaged: Any = scene.numerics.averaged_revolutions
+    auto = averaged == "auto"
+    return Problem(
+        effects=effects_of(scene, series=series, ledger=ledger),
+        coordinates=coordinate_count(scene),
+        tableau=tableau_of(scene),
+        rtol=scene.numerics.rtol,
+        atol=absolute_tolerances(scene),
+        impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
+        transient=scene.numerics.transient_revolutions,
+        averaged=LEAST_AVERAGED if auto else averaged,
+        averaged_cap=scene.numerics.max_averaged_revolutions if auto else averaged,
+        objective_tolerance=scene.numerics.objective_tolerance if auto else 0.0,
+        max_steps=scene.numerics.max_steps,
+        torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,
+        load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
+        implicit=implicit_method(scene),
+        collocation=takes_collocation(scene, single),
+    )
+
+
+def integrator_of(scene: Scene, *, single: bool = False) -> str:
+    """Name of the method that a scene's samples, or its single response, are integrated by."""
+    if coordinate_count(scene) == 0:
+        return "closed form"
+    if takes_collocation(scene, single):
+        return "lobatto"
+    name = tableau_of(scene).name
+    return {"never": name, "stiff": f"{name} and radau", "always": "radau"}[implicit_method(scene)]

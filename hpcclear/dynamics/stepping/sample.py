@@ -1,0 +1,230 @@
+"""A lane's sample, in scalar code for few lanes at a time: taken from the queue, booked by revolutions, written down."""
+
+import math
+
+from hpcclear.base.jit import scalar_function as lane_event
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.stepping.settings import (
+    AVERAGED,
+    AVERAGED_CAP,
+    FINISHED,
+    MAX_STEPS,
+    NEXT_SLOT,
+    OBJECTIVE_TOLERANCE,
+    SLOTS,
+    SMALLEST_STEP,
+    TRANSIENT,
+)
+
+OK = int(Status.OK)
+STEP_CAP = int(Status.STEP_CAP)
+STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
+NOT_FINITE = int(Status.NOT_FINITE)
+AVERAGE_CAP = int(Status.AVERAGE_CAP)
+UNFINISHED = -1
+
+CONTACTS = (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23)
+"""Rows of the contact states, in the order of a start and of an outcome."""
+
+AS_IT_STANDS = (
+    (at.OUT_PEAK_12, at.PEAK_12),
+    (at.OUT_PEAK_23, at.PEAK_23),
+    (at.OUT_DEEPEST_12, at.DEEPEST_12),
+    (at.OUT_DEEPEST_23, at.DEEPEST_23),
+    (at.OUT_EVALUATIONS, at.EVALUATIONS),
+    (at.OUT_ACTIVE_12, at.ACTIVE_12),
+    (at.OUT_ACTIVE_23, at.ACTIVE_23),
+    (at.OUT_INVERSE_IMPACT_12, at.INVERSE_IMPACT_12),
+    (at.OUT_INVERSE_IMPACT_23, at.INVERSE_IMPACT_23),
+    (at.OUT_ATTEMPTS, at.ATTEMPTS),
+    (at.OUT_STIFF_STEPS, at.STIFF_STEPS),
+)
+"""Columns of an outcome and the rows of `work` that they are copied from."""
+
+AS_BOOKED = (
+    (at.OUT_LATCHED_12, at.LATCHED_12),
+    (at.OUT_LATCHED_23, at.LATCHED_23),
+    (at.OUT_REVOLUTIONS, at.REVOLUTION),
+    (at.OUT_TIME, at.ELAPSED),
+)
+"""Likewise, from the books."""
+
+RATES = len(at.INTEGRATED)
+GAP_12 = at.place(at.GAP_12)
+GAP_23 = at.place(at.GAP_23)
+ACCELERATION = at.place(at.SLIDER_ACCELERATION)
+SQUARE = at.place(at.SLIDER_SQUARE)
+
+
+@lane_event
+def load(lane, W, n, block, queue, settings):
+    """Give a lane the next sample of the queue, or let it rest."""
+    work, book = block.work, block.book
+    slot = queue.counters[NEXT_SLOT]
+    for k in range(at.TIME, at.WORK):
+        work[k * W + lane] = 0.0
+    for k in range(at.RATE_OLD, at.TIME):
+        work[k * W + lane] = 0.0
+    for k in range(at.BOOK):
+        book[k * W + lane] = 0.0
+    if slot >= queue.counters[SLOTS]:
+        return  # the step stays 0: a resting lane repeats its last state
+    queue.counters[NEXT_SLOT] = slot + 1
+    for k in range(at.PARAMETERS):
+        block.par[k * W + lane] = queue.par[slot, k]
+    for k in range(n):
+        work[(at.Q + k) * W + lane] = queue.start[slot, k]
+        work[(at.V + k) * W + lane] = queue.start[slot, at.MAX_COORDINATES + k]
+    for k in range(len(CONTACTS)):
+        work[CONTACTS[k] * W + lane] = queue.start[slot, at.START_CONTACTS + k]
+    work[at.NEXT_STEP * W + lane] = block.par[at.FIRST_STEP * W + lane]
+    work[at.FRESH * W + lane] = 1.0
+    work[at.RUNNING * W + lane] = 1.0
+    work[at.AVERAGING * W + lane] = 1.0 if settings[TRANSIENT] == 0.0 else 0.0
+    book[at.SAMPLE * W + lane] = slot
+
+
+@lane_event
+def finish(lane, W, n, status, block, queue):
+    """Write down a sample that ended, whatever its status, and free the lane."""
+    work, book, out = block.work, block.book, queue.out
+    slot = int(book[at.SAMPLE * W + lane])
+    out[slot, at.OUT_STATUS] = status
+    for column, row in AS_IT_STANDS:
+        out[slot, column] = work[row * W + lane]
+    for column, row in AS_BOOKED:
+        out[slot, column] = book[row * W + lane]
+    for r in range(RATES):
+        out[slot, at.OUT_TOTAL + r] = book[(at.TOTAL + r) * W + lane]
+    count = book[at.COUNT_F * W + lane]
+    spread = math.sqrt(book[at.M2_F * W + lane] / (count - 1.0)) if count > 1.0 else math.nan
+    out[slot, at.OUT_SPREAD] = spread
+    finish_averages(lane, W, work, book, out, slot)
+    for k in range(n):
+        out[slot, at.OUT_STATE + k] = work[(at.Q + k) * W + lane]
+        out[slot, at.OUT_STATE + at.MAX_COORDINATES + k] = work[(at.V + k) * W + lane]
+    queue.finished[queue.counters[FINISHED]] = slot
+    queue.counters[FINISHED] += 1
+    work[at.RUNNING * W + lane] = 0.0
+
+
+@lane_event
+def finish_averages(lane, W, work, book, out, slot):
+    """Means, peak and deviation over the averaged revolutions; those of rates that no effect asked for mean nothing."""
+    time = book[at.TIME_SUM * W + lane]
+    if time > 0.0:
+        for r in range(RATES):
+            out[slot, at.OUT_MEAN + r] = book[(at.AVERAGED + r) * W + lane] / time
+        first = out[slot, at.OUT_MEAN + GAP_12]
+        second = out[slot, at.OUT_MEAN + GAP_23]
+        out[slot, at.OUT_OBJECTIVE] = math.sqrt(first * first + second * second)
+        out[slot, at.OUT_MOMENT] = work[at.PEAK_MOMENT * W + lane]
+        mean = out[slot, at.OUT_MEAN + ACCELERATION]
+        square = out[slot, at.OUT_MEAN + SQUARE]
+        out[slot, at.OUT_ACCELERATION] = math.sqrt(max(square - mean * mean, 0.0))
+
+
+@lane_event
+def failure(lane, W, n, work, stages, settings):
+    """Why a lane cannot go on: a status, or OK if it can."""
+    if work[at.ATTEMPTS * W + lane] >= settings[MAX_STEPS]:
+        return STEP_CAP
+    h = work[at.STEP * W + lane]
+    shortest = settings[SMALLEST_STEP] * (h + work[at.TIME * W + lane])
+    if work[at.ACCEPT * W + lane] == 0.0 and h <= shortest:
+        for k in range(n):
+            state = work[(at.Q + k) * W + lane] + work[(at.V + k) * W + lane]
+            if not math.isfinite(state + stages[k * W + lane]):
+                return NOT_FINITE
+        return STEP_TOO_SMALL
+    return OK
+
+
+@lane_event
+def standard_error(count, m2, lag):
+    """Standard error of the mean of a revolution's objective, whose neighbours are correlated.
+
+    First-order autocorrelation: s/sqrt(n) times sqrt((1 + rho)/(1 - rho)); a negative rho is not trusted to help.
+    """
+    if count < 3.0 or m2 <= 0.0:
+        return 0.0 if count >= 3.0 else math.inf
+    rho = min(max(lag / m2, 0.0), 0.99)
+    return math.sqrt(m2 / (count - 1.0) / count * (1.0 + rho) / (1.0 - rho))
+
+
+@lane_event
+def verdict(lane, W, book, settings):
+    """Whether the average may end: a status, or UNFINISHED."""
+    averaged = book[at.COUNT_F * W + lane]
+    if averaged < settings[AVERAGED]:
+        return UNFINISHED
+    if settings[OBJECTIVE_TOLERANCE] == 0.0:
+        return OK
+    # sum of (f_k - mean)(f_{k+1} - mean) from products about the first f
+    mean = book[at.MEAN_F * W + lane]
+    shift = mean - book[at.FIRST_F * W + lane]
+    total = averaged * shift
+    last = book[at.LAST_F * W + lane] - book[at.FIRST_F * W + lane]
+    lag = (
+        book[at.LAG_F * W + lane] - shift * (2.0 * total - last) + (averaged - 1.0) * shift * shift
+    )
+    error = standard_error(averaged, book[at.M2_F * W + lane], lag)
+    if error <= settings[OBJECTIVE_TOLERANCE] * mean:
+        return OK
+    return AVERAGE_CAP if averaged >= settings[AVERAGED_CAP] else UNFINISHED
+
+
+@lane_event
+def book_objective(lane, W, book, f):
+    """Add a revolution's objective to the averages over revolutions."""
+    count = book[at.COUNT_F * W + lane] + 1.0
+    if count == 1.0:
+        book[at.FIRST_F * W + lane] = f
+    first = book[at.FIRST_F * W + lane]
+    before = book[at.LAST_F * W + lane]
+    book[at.LAG_F * W + lane] += (f - first) * (before - first) * (count > 1.0)
+    book[at.LAST_F * W + lane] = f
+    step = f - book[at.MEAN_F * W + lane]
+    mean = book[at.MEAN_F * W + lane] + step / count
+    book[at.M2_F * W + lane] += step * (f - mean)
+    book[at.MEAN_F * W + lane] = mean
+    book[at.COUNT_F * W + lane] = count
+
+
+@lane_event
+def book_averages(lane, W, work, book, time):
+    """Add a revolution to the books of the averaged ones."""
+    for r in range(RATES):
+        integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
+        book[(at.AVERAGED + r) * W + lane] += integral
+    book[at.TIME_SUM * W + lane] += time
+    gap_12 = work[(at.INTEGRAL + at.GAP_12) * W + lane]
+    gap_23 = work[(at.INTEGRAL + at.GAP_23) * W + lane]
+    book_objective(lane, W, book, math.sqrt(gap_12 * gap_12 + gap_23 * gap_23) / time)
+    if work[at.ACTIVE_12 * W + lane] == 1.0 and work[at.ENDED_12 * W + lane] == 0.0:
+        book[at.LATCHED_12 * W + lane] = 1.0
+    if work[at.ACTIVE_23 * W + lane] == 1.0 and work[at.ENDED_23 * W + lane] == 0.0:
+        book[at.LATCHED_23 * W + lane] = 1.0
+
+
+@lane_event
+def end_revolution(lane, W, work, book, settings):
+    """Close the books of a revolution; the status of the sample when it was the last one, else UNFINISHED."""
+    time = work[at.TIME * W + lane]
+    book[at.ELAPSED * W + lane] += time
+    revolution = book[at.REVOLUTION * W + lane] + 1.0
+    book[at.REVOLUTION * W + lane] = revolution
+    if work[at.AVERAGING * W + lane] == 1.0:
+        book_averages(lane, W, work, book, time)
+    for r in range(RATES):
+        integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
+        book[(at.TOTAL + r) * W + lane] += integral
+    for r in range(at.RATES):
+        work[(at.INTEGRAL + r) * W + lane] = 0.0
+    work[at.TIME * W + lane] = 0.0
+    work[at.ENDED_12 * W + lane] = 0.0
+    work[at.ENDED_23 * W + lane] = 0.0
+    work[at.ENDING * W + lane] = 0.0
+    work[at.AVERAGING * W + lane] = 1.0 if revolution >= settings[TRANSIENT] else 0.0
+    return verdict(lane, W, book, settings)

@@ -1,0 +1,176 @@
+"""Where a step must end, in scalar code for few lanes: at impacts, at kinks of a force, with a free crank's turn."""
+
+from hpcclear.base.jit import lane_function
+from hpcclear.base.jit import scalar_function as lane_event
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.stepping.events import absolute_integral, impact_fraction, root
+from hpcclear.dynamics.stepping.settings import ANGLE_TOLERANCE, GAP_TOLERANCE, IMPACT_FLOOR
+
+OK = int(Status.OK)
+STALLED = int(Status.STALLED)
+
+KINK_REACH = 1e-3
+"""Part of a step that a kink of the force may stand from either end: its effect falls with the 2.5th power."""
+
+
+@lane_event
+def meet_impact(lane, W, work, settings, joint):
+    """Where in this step a joint in flight strikes, as a fraction; 2 if it does not or if it strikes at the end.
+
+    At the end of the step, or at its start, the contact is latched here.
+    """
+    h = work[at.STEP * W + lane]
+    if work[joint.active * W + lane] == 1.0:
+        return 2.0
+    tolerance = settings[GAP_TOLERANCE]
+    d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
+    d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
+    m0 = h * work[(at.RATE_OLD + joint.rate) * W + lane]
+    m1 = h * work[(at.RATE_NOW + joint.rate) * W + lane]
+    if abs(d1) <= tolerance and m1 > 0.0:
+        return 1.0
+    fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
+    if 1.0 - 1e-7 < fraction < 1.0 and m1 > 0.0:
+        return 1.0  # as good as the end of the step, which may be stretched by round-off to end a revolution
+    if fraction == 0.0:
+        latch_at_start(lane, W, work, settings, joint)
+    return fraction
+
+
+@lane_event
+def latch_at_start(lane, W, work, settings, joint):
+    """Start a contact at the start of this step, which is tried again."""
+    speed = max(work[(at.RATE_OLD + joint.rate) * W + lane], settings[IMPACT_FLOOR])
+    work[joint.active * W + lane] = 1.0
+    work[joint.inverse_impact * W + lane] = 1.0 / speed
+    work[at.FRESH * W + lane] = 1.0
+
+
+@lane_event
+def latch(lane, W, work, settings, joint):
+    """Start a contact at the end of this step: its approach speed is kept until the contact ends."""
+    speed = max(work[(at.RATE_NOW + joint.rate) * W + lane], settings[IMPACT_FLOOR])
+    work[joint.active * W + lane] = 1.0
+    work[joint.inverse_impact * W + lane] = 1.0 / speed
+    # within the tolerance of zero: a hair below it would end the contact at once
+    work[(at.RATE_NOW + joint.gap) * W + lane] = max(
+        work[(at.RATE_NOW + joint.gap) * W + lane], 0.0
+    )
+
+
+@lane_event
+def stop_at_impacts(lane, W, work, settings):
+    """Shorten the step to the first impact inside it, or latch the contacts that begin at its end."""
+    first = meet_impact(lane, W, work, settings, at.O12)
+    second = meet_impact(lane, W, work, settings, at.O23)
+    cut_or_latch(lane, W, work, settings, first, second)
+
+
+@lane_event
+def cut_or_latch(lane, W, work, settings, first, second):
+    """Cut the step to the smaller of two fractions below 1, or start the contacts whose fraction is 1, its end.
+
+    Returns whether it did either.
+    """
+    fraction = min(first, second)
+    if fraction < 1.0:
+        h = work[at.STEP * W + lane]
+        work[at.ACCEPT * W + lane] = 0.0
+        work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h
+        return True
+    if first == 1.0:
+        latch(lane, W, work, settings, at.O12)
+    if second == 1.0:
+        latch(lane, W, work, settings, at.O23)
+    return fraction == 1.0
+
+
+@lane_event
+def before_kink(lane, W, work, settings, joint):
+    """Fraction of this step at which a gap changes sign; 2 if it does not, or so near an end that it does no harm."""
+    d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
+    d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
+    if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[GAP_TOLERANCE]:
+        return 2.0
+    h = work[at.STEP * W + lane]
+    m0 = h * work[(at.RATE_OLD + joint.rate) * W + lane]
+    m1 = h * work[(at.RATE_NOW + joint.rate) * W + lane]
+    fraction = root(d0, m0, d1, m1, 1.0)
+    return fraction if KINK_REACH < fraction < 1.0 - KINK_REACH else 2.0
+
+
+@lane_event
+def stop_at_kinks(lane, W, work, settings):
+    """Shorten an explicit step to the first instant at which a contact begins or ends.
+
+    The force is K d^1.5 on one side and 0 on the other: across this kink the pair has neither its order nor an
+    error estimate that can be trusted.
+    """
+    if work[at.STIFF * W + lane] == 0.0:
+        fraction = min(
+            before_kink(lane, W, work, settings, at.O12),
+            before_kink(lane, W, work, settings, at.O23),
+        )
+        if fraction < 1.0:
+            work[at.ACCEPT * W + lane] = 0.0
+            work[at.NEXT_STEP * W + lane] = fraction * work[at.STEP * W + lane]
+
+
+@lane_event
+def integrate_gap(lane, W, work, joint):
+    """Integral of |gap| over a step in which the gap changes sign."""
+    h = work[at.STEP * W + lane]
+    d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
+    d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
+    if d0 * d1 < 0.0:
+        m0 = h * work[(at.RATE_OLD + joint.rate) * W + lane]
+        m1 = h * work[(at.RATE_NOW + joint.rate) * W + lane]
+        mean = work[(at.RATE_SUM + joint.gap) * W + lane]
+        work[(at.RATE_SUM + joint.gap) * W + lane] = absolute_integral(mean, d0, m0, d1, m1)
+
+
+@lane_event
+def stop_free_crank(lane, W, work, settings, last):
+    """End a step where a free crank has made its turn. Returns OK or STALLED."""
+    if work[(at.VS + last) * W + lane] <= 0.0:
+        return STALLED
+    beyond = work[(at.QS + last) * W + lane] - at.TURN
+    tolerance = settings[ANGLE_TOLERANCE]
+    work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0
+    if beyond > tolerance:
+        h = work[at.STEP * W + lane]
+        before = work[(at.Q + last) * W + lane] - at.TURN
+        fraction = impact_fraction(
+            before,
+            h * work[(at.V + last) * W + lane],
+            beyond,
+            h * work[(at.VS + last) * W + lane],
+            0.0,
+        )
+        work[at.ACCEPT * W + lane] = 0.0
+        work[at.NEXT_STEP * W + lane] = fraction * h
+    return OK
+
+
+@lane_function
+def turn_of_free_crank(torque, lane, W, work, settings, last):
+    """End the step where a crank that is a coordinate ends its revolution; the status if it never will."""
+    if torque is not None:
+        return stop_free_crank(lane, W, work, settings, last)
+    else:
+        return OK
+
+
+@lane_function
+def impacts(latched, lane, W, work, settings):
+    """End the step at the first impact inside it, under laws that need the impact speed."""
+    if latched is not None:
+        stop_at_impacts(lane, W, work, settings)
+
+
+@lane_function
+def wrap_crank(torque, baumgarte, lane, W, work, last):
+    """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
+    if torque is not None or baumgarte is not None:
+        work[(at.Q + last) * W + lane] -= at.TURN

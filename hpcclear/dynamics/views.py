@@ -1,0 +1,209 @@
+"""The kernel's rows of numbers by name: starts, outcomes, settings, parameters, rates; elsewhere nobody counts columns.
+
+A view holds rows, shape (..., columns), and reads and writes what it names in place: ``outcome.objective`` has shape (...),
+``outcome.mean_gap`` shape (..., 2 joints).
+"""
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.stepping import settings
+
+
+class Column:
+    """One column of a view's rows, or several."""
+
+    def __init__(self, column: int | Sequence[int] | slice) -> None:
+        self.column = list(column) if isinstance(column, Sequence) else column
+
+    def __get__(self, view: Any, owner: type) -> Array:
+        values: Array = view.rows[..., self.column]
+        return values
+
+    def __set__(self, view: Any, values: Any) -> None:
+        view.rows[..., self.column] = values
+
+
+def _both(first: int, second: int) -> Column:
+    return Column((first, second))
+
+
+def _mean(*rates: int) -> Column:
+    places = [at.OUT_MEAN + at.place(rate) for rate in rates]
+    return Column(places if len(places) > 1 else places[0])
+
+
+def _total(rate: int) -> Column:
+    return Column(at.OUT_TOTAL + at.place(rate))
+
+
+class View:
+    """Rows of numbers, shape (..., `size`).
+
+    Raises
+    ------
+    ValueError
+        If the rows have another length.
+    """
+
+    size: int
+
+    def __init__(self, rows: Array) -> None:
+        if rows.shape[-1] != self.size:
+            name = type(self).__name__
+            raise ValueError(f"a row of {name} holds {self.size} numbers, not {rows.shape[-1]}")
+        self.rows = rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, which: Any) -> Self:
+        """Some of the rows."""
+        return type(self)(self.rows[which])
+
+
+class Start(View):
+    """Starts of samples: coordinates and velocities (of those the topology has), contact states."""
+
+    size = at.START
+
+    contacts = Column(slice(at.START_CONTACTS, at.START))  # active flags, then 1/d'_0: (..., 4)
+    active = Column(slice(at.START_CONTACTS, at.START_CONTACTS + 2))
+    inverse_impact = Column(slice(at.START_CONTACTS + 2, at.START))
+    moving = Column(slice(0, at.START_CONTACTS))  # all places of coordinates and velocities
+
+    @classmethod
+    def at_rest(cls, samples: int) -> "Start":
+        """Starts that are all zero."""
+        return cls(np.zeros((samples, at.START)))
+
+    def coordinates(self, n: int) -> Array:
+        """The n coordinates of a topology, shape (..., n)."""
+        return self.rows[..., :n]
+
+    def velocities(self, n: int) -> Array:
+        """Their velocities, shape (..., n)."""
+        return self.rows[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
+
+    def state(self, n: int) -> Array:
+        """Coordinates, then velocities, shape (..., 2 n); a copy."""
+        return np.concatenate([self.coordinates(n), self.velocities(n)], axis=-1)
+
+
+class Outcome(View):
+    """Outcomes of samples; numbers of a failed one are what it had got to, or NaN.
+
+    Means are over the averaged revolutions, totals over all of them; those of rates that no effect asked for are 0.
+    """
+
+    size = at.OUT
+
+    status = Column(at.OUT_STATUS)
+    objective = Column(at.OUT_OBJECTIVE)  # m
+    spread = Column(at.OUT_SPREAD)  # m, between averaged revolutions
+    mean_gap = _mean(at.GAP_12, at.GAP_23)  # m, of both joints
+    peak_force = _both(at.OUT_PEAK_12, at.OUT_PEAK_23)  # N
+    latched = _both(at.OUT_LATCHED_12, at.OUT_LATCHED_23)
+    deepest = _both(at.OUT_DEEPEST_12, at.OUT_DEEPEST_23)  # m
+    evaluations = Column(at.OUT_EVALUATIONS)
+    revolutions = Column(at.OUT_REVOLUTIONS)
+    time = Column(at.OUT_TIME)  # s
+    drive_work = _total(at.DRIVE_POWER)  # J
+    absolute_drive_work = _total(at.ABS_DRIVE_POWER)
+    dissipated = _total(at.DISSIPATION)
+    load_work = _total(at.LOAD_POWER)
+    active = _both(at.OUT_ACTIVE_12, at.OUT_ACTIVE_23)
+    contacts = Column(slice(at.OUT_ACTIVE_12, at.OUT_INVERSE_IMPACT_23 + 1))  # as of a start
+    attempts = Column(at.OUT_ATTEMPTS)
+    stiff_steps = Column(at.OUT_STIFF_STEPS)
+    mean_force = _mean(at.FORCE_12, at.FORCE_23)  # N
+    peak_moment = Column(at.OUT_MOMENT)  # N m
+    acceleration_deviation = Column(at.OUT_ACCELERATION)  # m/s^2
+    moving = Column(slice(at.OUT_STATE, at.OUT))  # all places of coordinates and velocities
+
+    def coordinates(self, n: int) -> Array:
+        """The n coordinates of a topology at the end, shape (..., n)."""
+        return self.rows[..., at.OUT_STATE : at.OUT_STATE + n]
+
+    def velocities(self, n: int) -> Array:
+        """Their velocities, shape (..., n)."""
+        first = at.OUT_STATE + at.MAX_COORDINATES
+        return self.rows[..., first : first + n]
+
+    def end(self) -> Start:
+        """Where the samples ended, to go on from; places that no coordinate has are 0."""
+        start = Start(np.empty((*self.rows.shape[:-1], at.START)))
+        start.moving = np.nan_to_num(self.moving)
+        start.contacts = self.contacts
+        return start
+
+
+class Settings(View):
+    """Numbers that steer a run, one row."""
+
+    size = settings.SETTINGS
+
+    rtol = Column(settings.RTOL)
+    gap_tolerance = Column(settings.GAP_TOLERANCE)  # m
+    angle_tolerance = Column(settings.ANGLE_TOLERANCE)  # rad
+    impact_floor = Column(settings.IMPACT_FLOOR)  # m/s
+    transient = Column(settings.TRANSIENT)  # revolutions
+    averaged = Column(settings.AVERAGED)
+    averaged_cap = Column(settings.AVERAGED_CAP)
+    objective_tolerance = Column(settings.OBJECTIVE_TOLERANCE)
+    max_steps = Column(settings.MAX_STEPS)
+    smallest_step = Column(settings.SMALLEST_STEP)
+    exponent = Column(settings.EXPONENT)  # of the step-size control
+    beta = Column(settings.BETA)
+    implicit = Column(settings.IMPLICIT)
+    atol = Column(slice(settings.ATOL, settings.SETTINGS))  # all places
+    atol_coordinates = Column(slice(settings.ATOL, settings.ATOL + at.MAX_COORDINATES))
+    atol_velocities = Column(slice(settings.ATOL + at.MAX_COORDINATES, settings.SETTINGS))
+
+
+class Parameters(View):
+    """Parameters of samples, SI."""
+
+    size = at.PARAMETERS
+
+    speed = Column(at.SPEED)
+    period = Column(at.PERIOD)
+    first_step = Column(at.FIRST_STEP)
+    strictness = Column(at.STRICTNESS)  # squared: how many times tighter than the run's tolerances
+    crank_length = Column(at.CRANK_LENGTH)
+    crank_near = Column(at.CRANK_NEAR)
+    crank_mass = Column(at.CRANK_MASS)
+    crank_moment = Column(at.CRANK_MOMENT)
+    crank_inertia = Column(at.CRANK_INERTIA)
+    crank_own_inertia = Column(at.CRANK_OWN_INERTIA)
+    rod_length = Column(at.ROD_LENGTH)
+    rod_near = Column(at.ROD_NEAR)
+    rod_far = Column(at.ROD_FAR)
+    rod_mass = Column(at.ROD_MASS)
+    rod_inertia = Column(at.ROD_INERTIA)
+    slider_mass = Column(at.SLIDER_MASS)
+    gravity = Column(at.GRAVITY)
+    # of both joints, shape (..., 2)
+    clearance = _both(at.JOINT_12 + at.CLEARANCE, at.JOINT_23 + at.CLEARANCE)
+    stiffness = _both(at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS)
+    damping = _both(at.JOINT_12 + at.DAMPING, at.JOINT_23 + at.DAMPING)
+    bearing_radius = _both(at.JOINT_12 + at.BEARING_RADIUS, at.JOINT_23 + at.BEARING_RADIUS)
+    journal_radius = _both(at.JOINT_12 + at.JOURNAL_RADIUS, at.JOINT_23 + at.JOURNAL_RADIUS)
+    friction = _both(at.JOINT_12 + at.FRICTION, at.JOINT_23 + at.FRICTION)
+    inverse_ramp = _both(at.JOINT_12 + at.INVERSE_RAMP, at.JOINT_23 + at.INVERSE_RAMP)
+
+
+class Rates(View):
+    """What the motion finds at an instant besides accelerations, shape (instants, RATES)."""
+
+    size = at.RATES
+
+    gap = _both(at.GAP_12, at.GAP_23)  # m
+    force = _both(at.FORCE_12, at.FORCE_23)  # N, normal
+    friction = _both(at.FRICTION_12, at.FRICTION_23)  # N
+    drive_moment = Column(at.DRIVE_MOMENT)  # N m
+    powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load

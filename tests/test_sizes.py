@@ -1,0 +1,166 @@
+"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused, loops that are written out."""
+
+import dis
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba import njit
+from running import scene_with
+
+import hpcclear.dynamics
+from hpcclear.base.jit import FASTMATH
+from hpcclear.base.unrolled import unrolled, written_out
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation.stepper import make_collocation_stepper, quadratures
+from hpcclear.dynamics.explicit import tableau as tab
+from hpcclear.dynamics.explicit.combine import Step, group_of, stage_state, step_error
+from hpcclear.dynamics.explicit.stepper import make_stepper, weigh_rates
+from hpcclear.dynamics.implicit.radau import means_of_step
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.stepping.control import commit_rates
+from hpcclear.dynamics.views import Outcome, Start
+
+W = 4
+
+
+@pytest.mark.parametrize("n", [4, 7, 8])
+def test_a_stage_and_its_error_reach_every_coordinate(n: int):
+    """Of any number of coordinates, once each, and no number beside them is touched."""
+    s = tab.STAGES - 1
+
+    @njit(error_model="numpy", fastmath=FASTMATH)
+    def both(effects, work, stages, par, weights, atol):
+        step = Step(work, stages, par, weights, n, 1e-3, atol)
+        stage_state(step, s, s, W)
+        step_error(effects, step, W)
+
+    rng = np.random.default_rng(n)
+    pair = tab.DORMAND_PRINCE
+    work, par = rng.normal(size=(at.WORK, W)), np.ones((at.PARAMETERS, W))
+    stages, atol = (
+        rng.normal(size=(tab.STAGES, n, W)),
+        rng.uniform(0.5, 1.0, (2, at.MAX_COORDINATES)),
+    )
+    work[at.STEP] = 1e-2
+    before = work.copy()
+    both(at.Effects(), work.ravel(), stages.ravel(), par.ravel(), pair.packed(), atol.ravel())
+    h = before[at.STEP]
+    q, v, a = (before[row : row + n] for row in (at.Q, at.V, at.ACC))
+    stages[s - 1] = a  # the latest, put away on the way
+    combined = np.einsum("j,jkw->kw", pair.a[s], stages)
+    twice = np.einsum("j,jkw->kw", (pair.a @ pair.a)[s], stages)
+    qs, vs = work[at.QS : at.QS + n], work[at.VS : at.VS + n]
+    np.testing.assert_allclose(vs, v + h * combined, rtol=1e-12)
+    np.testing.assert_allclose(qs, q + h * (pair.a[s].sum() * v + h * twice), rtol=1e-12)
+    stages[s] = a
+    error_v = h * np.einsum("j,jkw->kw", pair.e, stages)
+    error_q = h * h * np.einsum("j,jkw->kw", pair.e @ pair.a, stages)
+    scale_q = atol[0, :n, None] + 1e-3 * np.maximum(abs(q), abs(qs))
+    scale_v = atol[1, :n, None] + 1e-3 * np.maximum(abs(v), abs(vs))
+    mean = ((error_q / scale_q) ** 2 + (error_v / scale_v) ** 2).sum(axis=0) / (2 * n)
+    np.testing.assert_allclose(work[at.ERROR], mean, rtol=1e-9)
+    for row in (*range(at.QS, at.QS + n), *range(at.VS, at.VS + n), at.ERROR):
+        before[row] = work[row]
+    np.testing.assert_array_equal(work, before)
+
+
+def test_groups_are_short():
+    for n in range(1, at.MAX_COORDINATES + 1):
+        assert 1 <= group_of.py_func(n) <= 5
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(ValueError, match="9 coordinates, not 10"):
+        make_stepper(4, 10)
+    with pytest.raises(ValueError, match="5 coordinates, not 6"):
+        make_collocation_stepper(6)
+    problem = problem_of(scene_with())
+    with pytest.raises(ValueError, match="8 tolerances, not 7"):
+        replace(problem, atol=problem.atol[:7])
+    nine = problem_of(scene_with({"numerics.formulation": "baumgarte"}))
+    with pytest.raises(ValueError, match="collocation holds 1 to 5"):
+        Lanes(replace(nine, collocation=True), 1)
+    three = np.eye(3)
+    with pytest.raises(ValueError, match="pairs of 7 stages"):
+        tab.Tableau("short", 2, 1, three, three[0], three[0], "none")
+    with pytest.raises(ValueError, match="a row of Start holds 22 numbers, not 21"):
+        Start(np.zeros((3, 21)))
+
+
+def test_an_end_is_a_start():
+    rows = np.random.default_rng(0).normal(size=(3, Outcome.size))
+    outcome = Outcome(rows)
+    outcome.coordinates(4)[0, 2] = np.nan
+    start = outcome.end()
+    assert start.coordinates(4)[0, 2] == 0.0
+    np.testing.assert_array_equal(start.velocities(4), outcome.velocities(4))
+    np.testing.assert_array_equal(start.active, outcome.active)
+    np.testing.assert_array_equal(
+        start.state(2)[1], np.r_[rows[1, at.OUT_STATE :][:2], start.velocities(2)[1]]
+    )
+
+
+# ---- what is integrated ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_rates])
+def test_every_stepper_integrates_all_of_the_list(traversal):
+    """Each rate and its effect stand in the code that was written out, the gaps of `commit` in their joints."""
+    seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
+    rates = at.MEASURES if traversal is commit_rates else at.INTEGRATED
+    for one in rates:
+        assert one.rate in seen
+        assert one.asked_by in seen
+
+
+def test_no_stepper_names_a_rate_of_its_own():
+    """A rate is one entry of `layout.INTEGRATED` and its formula in the motion."""
+    names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
+    rows = {one.rate for one in at.MEASURES}
+    powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
+    own = powers | {"SLIDER_ACCELERATION", "SLIDER_SQUARE", "FORCE_12", "FORCE_23"}
+    assert {getattr(at, name) for name in own} == rows
+    room = Path(hpcclear.dynamics.__file__).parent
+    for folder in ("explicit", "implicit", "collocation"):
+        for path in (room / folder).glob("*.py"):
+            text = path.read_text()
+            assert not [name for name in own if f"at.{name}" in text], path.name
+
+
+# ---- loops that are written out --------------------------------------------------------------------
+
+ITEMS = np.array([10, 20, 30])
+
+
+def _sum(x, flags):
+    c: dict = {}
+    total = 0
+    for k in written_out(ITEMS):
+        c[k] = x + k
+    for k in written_out(ITEMS):
+        total += c[k] * k
+    for one in written_out(at.GAPS):
+        if getattr(flags, one.asked_by) is not None:
+            total += one.rate + 1000
+    for s in written_out(range(2)):
+        total += s
+    return total
+
+
+def test_a_loop_written_out_does_what_the_loop_does():
+    flags = at.Effects(rod_slider=1)
+    written = unrolled(_sum)
+    assert written(5, flags) == _sum(5, flags)
+    names = written.__code__.co_varnames
+    assert {"c_0", "c_1", "c_2"} <= set(names)
+    assert "k" not in names
+    assert written.__code__.co_filename == __file__
+    assert written.__code__.co_firstlineno == _sum.__code__.co_firstlineno
+
+
+def test_a_function_without_such_a_loop_is_refused():
+    with pytest.raises(ValueError, match="no loop"):
+        unrolled(test_groups_are_short)
