@@ -1,6 +1,7 @@
 """The package's rooms: every module in one of them, and no two modules that need one another."""
 
 import graphlib
+import re
 import tomllib
 from pathlib import Path
 
@@ -30,3 +31,15 @@ def test_every_module_stands_in_a_room_of_the_contract(graph):
     loose = {name for name in graph.modules - DOORS if name.split(".")[1] not in rooms}
     assert not loose
     assert {path.stem for path in (ROOT / "hpcclear").glob("*.py")} == {"__init__", "__main__"}
+
+
+def test_the_architecture_page_names_files_that_are_there_and_its_walk_is_short():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    walk = re.findall(r"^\d+\. `([\w/]+\.py)`", page, re.M)
+    assert 10 < len(walk) <= 20
+    assert len(set(walk)) == len(walk)
+    named = set(re.findall(r"`((?:\w+/)+\w+\.py)`", page))
+    missing = {
+        name for name in named if not any((ROOT / top / name).exists() for top in ("", "hpcclear"))
+    }
+    assert not missing
