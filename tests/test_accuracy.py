@@ -14,6 +14,7 @@ from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
 from hpcclear.cli.accuracy import advice, describe, resolution
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style
@@ -48,7 +49,7 @@ TINY = Profile(
     copies=4,
     training=(20, 40),
     tests=20,
-    draws=(16, 1024),
+    draws=(16, 64, 1024),  # 256 simulations do for the first two
     blocks=8,
     simulations=256,
     strong_seconds=0.1,
@@ -72,7 +73,7 @@ def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
     # Approached from above as the ladder moves down: 6.2 from 1e-4 on, 5.8 from 1e-6 on, 5.7 here, where double precision
     # ends. test_order.py finds 4.95 with steps of one length.
     assert order["dormand-prince"] == pytest.approx(5.0, abs=0.8)
-    assert order["dormand-prince, 32 lanes"] == order["dormand-prince"]
+    assert order[f"dormand-prince, {DEFAULT_LANES} lanes"] == order["dormand-prince"]
     assert order["fehlberg"] == pytest.approx(4.0, abs=0.5)
     assert order["RK4, fixed steps"] == pytest.approx(4.0, abs=0.5)
     assert order["DOP853 (scipy)"] == pytest.approx(8.0, abs=0.8)
@@ -202,14 +203,16 @@ def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
     )  # small beside the mean: digits cancel in both ways
     r2 = measured["r2"].sel(surrogate="Kriging")
     assert float(r2[-1]) > 0.9
-    assert (measured["moment_error"].sel(moment="mean") < 0.05).all()
+    error = measured["moment_error"].sel(moment="mean")
+    assert (error.isel(draws=slice(2)) < 0.05).all()
+    assert float(error.sel(estimate="surrogate")[-1]) < 0.05
     assert float(measured["strong_seconds"][0]) > 0.0
 
 
 def test_monte_carlo_on_the_surrogate_converges_as_theory_says(measured):
     error = measured["moment_error"].sel(estimate="surrogate", moment="mean").to_numpy()
     # 64 times the draws, 8 samples each: the square of the ratio over 64 is distributed as F of 8 and 8 degrees
-    square = (error[0] / error[1]) ** 2 / 64.0
+    square = (error[0] / error[2]) ** 2 / 64.0
     at_least(square, f.ppf(FALSE_RED / 2.0, 8, 8))
     at_most(square, f.isf(FALSE_RED / 2.0, 8, 8))
 
