@@ -81,7 +81,6 @@ run_setting() {
     user) user=somebody folder=/home/somebody/hpcclear home=/home/somebody ;;
     umlaut) folder="/root/eigene Prüfung/hpcclear" ;;
     home-read-only) user=somebody folder=/srv/hpcclear home=/home/read-only ;;
-    *) refuse "there is no setting $setting" ;;
     esac
     case $setting in lowest | latest) option=--$setting ;; esac
     root_of "$release"
@@ -148,7 +147,8 @@ while [ $# -gt 0 ]; do
         run_words=${2:-}
         shift
         ;;
-    *) settings+=("$1") ;;
+    debian12 | debian13 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) settings+=("$1") ;;
+    *) refuse "there is no setting $1" ;;
     esac
     shift
 done

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from patience import crowded
@@ -65,6 +66,17 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     assert response["slider_position"].attrs["units"] == "m"
     assert response.sizes["time"] == 721
     assert dataset.read(out, "response")["status"] == 0
+
+
+def test_a_response_that_did_not_end_is_written_and_told(tmp_path):
+    out = tmp_path / "response.nc"
+    words = ["simulate", "jobs/slider_crank.toml", "-o", out, *SHORT]
+    done = hpcclear(*words, "--set", "numerics.max_steps=100")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: step_cap: numerics.max_steps was reached")
+    found = dataset.read(out, "response")
+    assert np.isnan(found["objective"])
+    assert found.sizes["time"] > 10
 
 
 def test_the_shell_completes_commands_and_options():

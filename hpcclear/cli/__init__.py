@@ -147,10 +147,13 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
 def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
+    Exit code 1 if the simulation did not reach its end; what there is of it is written.
+
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
     if not _is_root():
         return Exit.DONE
+    from hpcclear.base.outcome import Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.results import dataset, files
@@ -160,7 +163,11 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     response = simulate_scene(scene)
     dataset.write(response, output)
     describe_response(response, output)
-    return Exit.DONE
+    status = Status(int(response["status"]))
+    if status.valid:
+        return Exit.DONE
+    click.echo(f"Error: {status.name.lower()}: {status.message}. {status.remedy}", err=True)
+    return Exit.FAILED
 
 
 def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None:

@@ -203,7 +203,7 @@ class Count(Converted):
 
 Curve = float | tuple[tuple[float, float], ...]
 """A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn,
-linear between."""
+a monotone cubic between: no higher than the higher of two rows, no lower than the lower."""
 
 
 @dataclass(frozen=True)
