@@ -7,7 +7,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
+from running import HUNT_CROSSLEY, LATCHED, energy_residual, kept_steps, run, scene_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH
@@ -221,12 +221,7 @@ def test_the_record_holds_every_node_and_a_small_one_changes_no_step():
     steps, _, _ = integrate(scene)
     problem, par = problem_of(scene, ledger=True, series=True), parameters(scene)
     n = problem.coordinates
-    lanes = Lanes(problem, 1, np.zeros((3 * lobatto.STAGES + 5, record.columns(n))))
-    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    chunks = []
-    while lanes.pending:
-        lanes.step(1_000_000)
-        chunks.append(lanes.take_record())
+    chunks = kept_steps(problem, par, start_states(scene, par), 3 * lobatto.STAGES + 5, 1_000_000)
     rows = np.concatenate(chunks)
     assert len(chunks) > 20
     assert len(rows) % lobatto.STAGES == 0

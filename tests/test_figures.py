@@ -37,37 +37,39 @@ def _odd_samples() -> xr.Dataset:
     return made
 
 
+PLAIN = {
+    data.samples: ("samples",),
+    data.sensitivity: ("sensitivity", "fit", "sobol"),
+    data.kriging: ("surfaces", "parity"),
+    data.front: ("front",),
+    data.response: (
+        *("response", "penetration", "energy", "spectrum"),
+        *("orbit", "force_polar", "phase", "poincare"),
+    ),
+    data.timing: ("timing",),
+}
+"""Figures of one dataset alone, by what makes it."""
+
 FIGURES: dict[str, Callable[[], Figure]] = {
-    "samples": lambda: report.samples_figure(data.samples()),
-    "samples, two variables": lambda: report.samples_figure(_odd_samples()),
-    "samples, one variable": lambda: report.samples_figure(
-        data.samples(failed=1).drop_vars(["m2", "m3", "u2", "I2"])
-    ),
-    "sensitivity": lambda: report.sensitivity_figure(data.sensitivity()),
-    "fit": lambda: report.fit_figure(data.sensitivity()),
-    "sobol": lambda: report.sobol_figure(data.sensitivity()),
-    "surfaces": lambda: report.surfaces_figure(data.kriging()),
-    "parity": lambda: report.parity_figure(data.kriging()),
-    "front": lambda: report.front_figure(data.front()),
-    "front, verified": lambda: report.front_figure(data.front(), data.verification()),
-    "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
-    "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
-    "response": lambda: report.response_figure(data.response()),
-    "penetration": lambda: report.penetration_figure(data.response()),
-    "energy": lambda: report.energy_figure(data.response()),
-    "spectrum": lambda: report.spectrum_figure(data.response()),
-    "orbit": lambda: report.orbit_figure(data.response()),
-    "force polar": lambda: report.force_polar_figure(data.response()),
-    "phase": lambda: report.phase_figure(data.response()),
-    "poincare": lambda: report.poincare_figure(data.response()),
-    "bifurcation": lambda: report.bifurcation_figure(
-        [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
-    ),
+    **{
+        name: lambda make=make, name=name: getattr(report, f"{name}_figure")(make())  # type: ignore[misc]
+        for make, names in PLAIN.items()
+        for name in names
+    },
     **{
         f"accuracy, {name}": lambda draw=draw: draw(data.accuracy())  # type: ignore[misc]
         for name, draw in accuracy_figures.FIGURES.items()
     },
-    "timing": lambda: report.timing_figure(data.timing()),
+    "samples, two variables": lambda: report.samples_figure(_odd_samples()),
+    "samples, one variable": lambda: report.samples_figure(
+        data.samples(failed=1).drop_vars(["m2", "m3", "u2", "I2"])
+    ),
+    "front, verified": lambda: report.front_figure(data.front(), data.verification()),
+    "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
+    "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
+    "bifurcation": lambda: report.bifurcation_figure(
+        [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
+    ),
     "timing, one rank": lambda: report.timing_figure(data.timing(1)),
 }
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from running import kept_steps
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import evaluator
@@ -176,12 +177,7 @@ def test_a_small_record_changes_no_step():
     steps, _, _ = integrate(scene)
     problem, par = problem_of(scene, ledger=True, series=True), parameters(scene)
     n = problem.coordinates
-    lanes = Lanes(problem, 1, np.zeros((50, record.columns(n))))
-    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    chunks = []
-    while lanes.pending:
-        lanes.step(1_000_000)
-        chunks.append(lanes.take_record())
+    chunks = kept_steps(problem, par, start_states(scene, par), 50, 1_000_000)
     rows = np.concatenate(chunks)
     assert len(chunks) > 20
     assert rows[:, record.STATE : record.STATE + n].tobytes() == steps.q[1:].tobytes()

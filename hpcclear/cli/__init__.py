@@ -30,6 +30,15 @@ _SET = click.option(
     metavar="KEY.PATH=VALUE",
     help="Override an entry of the file; repeatable.",
 )
+
+
+def _output(words: str) -> Callable[[Any], Any]:
+    """The option that names where results go."""
+    return click.option(
+        "-o", "--output", type=click.Path(path_type=Path), required=True, help=words
+    )
+
+
 _FRESH = click.option(
     "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
 )
@@ -141,9 +150,7 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
 @cli.command(short_help="Simulate one response.")
 @_FILE
 @_SET
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
-)
+@_output("NetCDF file to write.")
 def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
@@ -183,9 +190,7 @@ def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None
 @cli.command(short_help="Simulate many designs.")
 @_FILE
 @_SET
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), required=True, help="NetCDF file to write."
-)
+@_output("NetCDF file to write.")
 @click.option(
     "--points",
     type=click.Path(path_type=Path),
@@ -237,13 +242,7 @@ def sample(
 @cli.command(short_help="Carry a whole study.")
 @_FILE
 @_SET
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    required=True,
-    help="Directory for the results.",
-)
+@_output("Directory for the results.")
 @_FRESH
 @_LIMIT
 @_PROGRESS
@@ -278,13 +277,7 @@ def run(
 @cli.command(short_help="Show what accuracy costs in time.")
 @_FILE
 @_SET
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    required=True,
-    help="Directory for accuracy.nc and the figures.",
-)
+@_output("Directory for accuracy.nc and the figures.")
 @click.option(
     "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
 )

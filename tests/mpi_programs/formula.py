@@ -20,6 +20,13 @@ from hpcclear.study import responses, run_study
 from hpcclear.study.paper import readings
 from hpcclear.study.run import StudyRun
 
+JOINT = """\
+kind = "clearance"
+clearance = "0.3 mm"
+bearing_radius = "20 mm"
+bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
+journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
+"""
 PHYSICS = """
 format_version = 1
 [mechanism]
@@ -31,20 +38,10 @@ slider = { mass = 0.14 }
 kind = "constant-speed"
 speed = "5000 rpm"
 [joints.crank_rod]
-kind = "clearance"
-clearance = "0.3 mm"
-bearing_radius = "20 mm"
-bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
-journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
-[joints.rod_slider]
-kind = "clearance"
-clearance = "0.3 mm"
-bearing_radius = "20 mm"
-bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
-journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
-[effects]
+JOINT[joints.rod_slider]
+JOINT[effects]
 contact = { law = "lankarani-nikravesh", restitution = 0.9 }
-"""
+""".replace("JOINT", JOINT)
 
 STUDY = """
 [study]

@@ -24,6 +24,12 @@ _WORDS = {
 }
 
 
+def _legend_above(figure: "Figure", axes: "Axes") -> None:
+    """One legend for all panels: that of the panel given."""
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=2)
+
+
 def _foot(figure: "Figure", found: xr.Dataset, *sentences: str) -> None:
     """Where the numbers come from, below a figure."""
     versions = str(found.attrs.get("versions", ""))
@@ -69,8 +75,7 @@ def integration_figure(found: xr.Dataset) -> "Figure":
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
     style.settle(axes)
-    handles, names = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=2)
+    _legend_above(figure, axes[0, 0])
     _foot(
         figure,
         found,
@@ -211,8 +216,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
         _decades(panel.xaxis)
     style.settle(axes)
     _small(axes)
-    handles, names = axes[0, 1].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=2)
+    _legend_above(figure, axes[0, 1])
     _foot(
         figure,
         found,

@@ -99,14 +99,7 @@ def spectrum_figure(
 ) -> "Figure":
     """Amplitude spectra of slider acceleration and contact forces over the order of the crank frequency.
 
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int, optional
-        The last ones are used; half of all by default.
-    orders : float
-        Right end of the axis, multiples of the crank frequency.
+    `orders`: right end of the axis, multiples of the crank frequency; else as for `bifurcation_figure`, of one response.
     """
     shown = motion.steady(response, revolutions)
     figure, axes = style.grid(2, 1, 90.0, sharex=True)
