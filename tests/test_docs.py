@@ -110,8 +110,9 @@ def test_commands_and_options_that_are_named_exist(page):
             assert text.split()[0] in options | FOREIGN, f"{page}: {text}"
 
 
-FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind", "--full"}
-"""Options of other programs: srun, apptainer, tests/run.sh."""
+FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind"}
+FOREIGN |= {"--full", "--quick", "--latest", "--lowest", "--with"}
+"""Options of other programs: srun, apptainer, the two commands, tests/elsewhere.sh."""
 
 
 def anchors(page: Path) -> set[str]:

@@ -98,7 +98,7 @@ def test_differences_stay_within_the_ramp():
     """A column's increment is a thousandth of the ramp at most: across its end the slope would be hidden."""
     problem, m = memory_of({"effects.friction.ramp_speed": 1e-6})
     effects, tables = effects_and_tables(problem)
-    difference_jacobian(effects, (0,) * 4, m, *tables)
+    difference_jacobian(effects, (0,) * 4, m, tables)
     increments = m[mem.INCREMENT * mem.LANES :][: mem.LANES]
     assert (abs(increments[4:]) <= 1.0001e-9 * m[mem.LEAST + 4 : mem.LEAST + 8]).all()
     assert (increments != 0.0).all()

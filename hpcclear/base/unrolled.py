@@ -24,7 +24,8 @@ def unrolled(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Of the item a copy stands for,
 
-    - an attribute is written as its value, and so is ``getattr(x, item.name)`` as ``x.value``;
+    - an attribute is written as its value, a whole number in ``int()``, since a function that takes a bare one is compiled
+      anew for each; and so is ``getattr(x, item.name)`` as ``x.value``;
     - the item itself stays ``ITEMS[3]``, or is a number where ITEMS is a range. A function that takes the number is
       compiled anew for each, with a constant in place of the argument; one that takes an array's element is not.
 
@@ -102,9 +103,11 @@ class _Copier(ast.NodeTransformer):
         return self.place if node.id == self.name else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        if isinstance(node.value, ast.Name) and node.value.id == self.name:
-            return ast.Constant(getattr(self.item, node.attr))
-        return self.generic_visit(node)
+        if not (isinstance(node.value, ast.Name) and node.value.id == self.name):
+            return self.generic_visit(node)
+        value = ast.Constant(getattr(self.item, node.attr))
+        whole = isinstance(value.value, int) and not isinstance(value.value, bool)
+        return ast.Call(ast.Name("int", ast.Load()), [value], []) if whole else value
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         held = isinstance(node.value, ast.Name) and node.value.id in self.bags

@@ -42,8 +42,11 @@ def latest(step, k, stage, i, W):
 
 @lane_function
 def group_of(n):
-    """Coordinates worked on in one loop over lanes: the compiler unrolls four of them, nine it would not."""
-    return n if n <= 5 else 3 if n % 3 == 0 else 4
+    """Coordinates worked on in one loop over lanes: the compiler unrolls up to five of them, nine it would not.
+
+    A divisor of n, so that no group is left over: a second copy of the sums for that would be compiled by all.
+    """
+    return n if n <= 5 else 3 if n % 3 == 0 else 4 if n % 4 == 0 else 1
 
 
 @lane_function
@@ -51,11 +54,8 @@ def stage_state(step, s, terms, W):
     """Coordinates and velocities of stage s, a sum of `terms` terms."""
     n = step.n
     count = group_of(n)
-    whole = n - n % count
-    for first in range(0, whole, count):
+    for first in range(0, n, count):
         stage_part(step, s, first, count, terms, W)
-    if whole < n:
-        stage_part(step, s, whole, n % count, terms, W)
 
 
 @lane_function
@@ -133,11 +133,8 @@ def step_error(effects, step, W):
     """Mean square of the scaled error, per lane."""
     n = step.n
     count = group_of(n)
-    whole = n - n % count
-    for first in range(0, whole, count):
+    for first in range(0, n, count):
         error_part(effects, step, first, count, W)
-    if whole < n:
-        error_part(effects, step, whole, n % count, W)
 
 
 @lane_function
