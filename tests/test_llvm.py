@@ -191,7 +191,8 @@ def test_the_bare_scene_costs_what_a_kernel_by_hand_costs():
     (ours,) = vector_loops(compiled_motion(BARE, W)[1])
     arithmetic = [sum("mov" not in line for line in loop) for loop in (ours, hand)]
     assert arithmetic[0] <= 1.03 * arithmetic[1]
-    assert len(ours) <= 1.06 * len(hand)  # with sixteen registers chance decides what is put away: 298 beside 289
+    # With sixteen registers chance decides how much is put away: 298 beside 289.
+    assert len(ours) <= 1.06 * len(hand)
 
 
 def test_the_kernel_by_hand_computes_the_same():
