@@ -1,0 +1,230 @@
+"""Balances of a linkage: for each coordinate, or direction that a joint holds, its row of the mass matrix and its force.
+
+A row is d'Alembert's principle along a column of `kinematics.Kinematics`: masses times accelerations, less forces. Rows
+of coordinates are solved; those of prescribed angles and guides give moments and reactions afterwards.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector, Writer, named, plus
+from hpcclear.dynamics.linkage.kinematics import CENTER, Column, Kinematics, Move
+from hpcclear.dynamics.linkage.parts import GROUND, Body, split
+from hpcclear.dynamics.linkage.trees import Forest
+
+Held = tuple[str, Vector]
+"""A vector held in a frame."""
+
+
+class Pull(NamedTuple):
+    """A force on a place: known terms along the ground's axes."""
+
+    place: str
+    force: Vector
+
+
+class Twist(NamedTuple):
+    """A moment on a body."""
+
+    body: str
+    moment: Term
+
+
+class Balance:
+    """Mass matrix and forces of a forest; forces are added to `pulls` and `twists` before a row is asked for."""
+
+    def __init__(self, forest: Forest, kinematics: Kinematics, writer: Writer, gravity: bool):
+        self.forest = forest
+        self.kinematics = kinematics
+        self.writer = writer
+        self.gravity = gravity
+        self.pulls: list[Pull] = []
+        self.twists: list[Twist] = []
+        self._order = {GROUND: -1} | {b.name: k for k, b in enumerate(forest.mechanism.bodies)}
+        self.falling = _falling(forest) if gravity else set()
+
+    # ---- masses ---------------------------------------------------------------------------------
+    def mass_of(self, body: Body) -> Term:
+        """Mass of a body."""
+        return self.writer.parameter(f"{body.name}_mass")
+
+    def inertia_of(self, body: Body) -> Term:
+        """Inertia of a body about its mass centre, or about its pin if it hangs on the ground."""
+        about = "pivot_inertia" if self.forest.on_ground(body.name) else "inertia"
+        return self.writer.parameter(f"{body.name}_{about}")
+
+    def moment_of(self, body: Body) -> Vector:
+        """Mass times the arm from the ground's pin to the mass centre."""
+        own = split(self.forest.hangs[body.name].own)[1]
+        arm = self.kinematics.arm(body.name, own, CENTER)
+        names = (f"{body.name}_moment_{axis}" for axis in ("x", "y"))
+        x, y = (self.writer.parameter(n) if a else ZERO for n, a in zip(names, arm, strict=True))
+        return x, y
+
+    def mass(self, first: Column, second: Column) -> Term:
+        """Entry of the mass matrix."""
+        if {first.kind, second.kind} == {"slide", "across"} and first.body == second.body:
+            return ZERO
+        total, pairs = ZERO, []
+        for body in self.forest.mechanism.bodies:
+            turns = Column("angle", self.forest.frames[body.name])
+            if first == second == turns:
+                total = total + self.inertia_of(body)
+            if self.forest.on_ground(body.name):
+                continue
+            columns = self.kinematics.columns(self.kinematics.center(body.name))
+            if first in columns and second in columns:
+                if first == second and first.kind in ("x", "y", "slide", "across"):
+                    total = total + self.mass_of(body)
+                else:
+                    pairs.append((self.mass_of(body), columns[first], columns[second]))
+        return total + self.inner(pairs)
+
+    def inner(self, pairs: Iterable[tuple[Term, Held, Held]], rates: tuple[Term, ...] = ()) -> Term:
+        """Sum of mass times the products of two vectors held in frames, times rates."""
+        dots: dict[tuple[str, str], Term] = {}
+        areas: dict[tuple[str, str], Term] = {}
+        moments: dict[tuple[str, Vector], Vector] = {}
+        for mass, one, two in pairs:
+            if self._order[one[0]] < self._order[two[0]]:
+                one, two = two, one
+            (late, a), (early, b) = one, two
+            if early == GROUND and late != GROUND:
+                held = (mass * a[0], mass * a[1])
+                moments[late, b] = plus(moments.get((late, b), NOWHERE), held)
+                continue
+            key = (early, late)
+            dots[key] = dots.get(key, ZERO) + mass * a[0] * b[0] + mass * a[1] * b[1]
+            areas[key] = areas.get(key, ZERO) + (mass * a[1] * b[0] - mass * a[0] * b[1])
+        total = ZERO
+        for (frame, along), moment in moments.items():
+            x, y = self.kinematics.rotated(frame, moment)
+            total = total + _times(x, rates) * along[0] + _times(y, rates) * along[1]
+        for (early, late), dot in dots.items():
+            if early == late:
+                total = total + _times(dot, rates)
+                continue
+            area = areas[early, late]
+            if dot:
+                total = total + _times(dot, rates) * self._cosine(early, late)
+            if area:
+                total = total + _times(area, rates) * self._sine(early, late)
+        return total
+
+    def _cosine(self, early: str, late: str) -> Term:
+        """Cosine of the difference of two frames' angles."""
+        (c, s), (ct, st) = self.kinematics.trig(early), self.kinematics.trig(late)
+        return self.writer.let(f"c_{early}_{late}", c * ct + s * st)
+
+    def _sine(self, early: str, late: str) -> Term:
+        (c, s), (ct, st) = self.kinematics.trig(early), self.kinematics.trig(late)
+        return self.writer.let(f"s_{early}_{late}", s * ct - c * st)
+
+    # ---- forces ---------------------------------------------------------------------------------
+    def force(self, column: Column) -> Term:
+        """What moves along a column: pulls and moments, gravity, and what turning frames ask for."""
+        total = ZERO
+        for pull in self.pulls:
+            found = self.kinematics.columns(self.kinematics.point(pull.place)).get(column)
+            if found is not None:
+                total = total + self.along(found, pull.force)
+        for twist in self.twists:
+            if column == ("angle", self.forest.frames[twist.body]):
+                total = total + twist.moment
+        return total + self._weight(column) + self._turning(column)
+
+    def along(self, held: Held, force: Vector) -> Term:
+        """A force along a vector held in a frame; the signs go into the difference, as one would write it."""
+        frame, (ax, ay) = held
+        fx, fy = force
+        if frame == GROUND:
+            return fx * ax + fy * ay
+        if fx.negative and fy.negative:
+            ax, ay, fx, fy = -ax, -ay, -fx, -fy
+        c, s = self.kinematics.trig(frame)
+        across = s * fx - c * fy if ay.negative else c * fy - s * fx
+        return abs(ay) * across + ax * (c * fx + s * fy)
+
+    def _weight(self, column: Column) -> Term:
+        """Gravity acts towards -y; a tree that nothing holds falls as a whole, which is added to its root alone."""
+        if not self.gravity:
+            return ZERO
+        held: dict[str, Vector] = {}
+        whole = ZERO
+        for body in self.forest.mechanism.bodies:
+            if body.name in self.falling:
+                continue
+            if self.forest.on_ground(body.name):
+                if column == ("angle", body.name):
+                    x, y = self.moment_of(body)
+                    held[body.name] = plus(held.get(body.name, NOWHERE), (-y, x))
+                continue
+            columns = self.kinematics.columns(self.kinematics.center(body.name))
+            if column in columns:
+                frame, (ax, ay) = columns[column]
+                mass = self.mass_of(body)
+                held[frame] = plus(held.get(frame, NOWHERE), (mass * ax, mass * ay))
+        for frame, moment in held.items():
+            whole = whole + self.kinematics.projected((frame, moment), 1)
+        return -(whole * self.writer.parameter("gravity"))
+
+    def _turning(self, column: Column) -> Term:
+        """What centripetal, Coriolis and prescribed accelerations ask for."""
+        pairs: dict[tuple[Term, ...], list[tuple[Term, Held, Held]]] = {}
+        known = ZERO
+        for body in self.forest.mechanism.bodies:
+            if self.forest.on_ground(body.name):
+                continue
+            point = self.kinematics.center(body.name)
+            columns = self.kinematics.columns(point)
+            if column not in columns:
+                continue
+            mine, mass = columns[column], self.mass_of(body)
+            for frame, arm in point.arms.items():
+                if frame == GROUND or column == ("angle", frame):
+                    continue
+                spin = self.kinematics.spin(frame)
+                pairs.setdefault((spin, spin), []).append((mass, mine, (frame, arm)))
+            for rates, held in self.coriolis(point.moves):
+                pairs.setdefault(rates, []).append((-mass, mine, held))
+        for frame in self.forest.prescribed:
+            if turn := self.kinematics.turn(frame):
+                known = known + self.mass(column, Column("angle", frame)) * turn
+        total = ZERO
+        for rates, found in pairs.items():
+            total = total + self.inner(found, rates)
+        return total - known
+
+    def coriolis(self, moves: Iterable[Move]) -> list[tuple[tuple[Term, ...], Held]]:
+        """Rates and vectors of 2 v w of guides in turning frames."""
+        return [
+            (
+                (named("2.0"), named(f"vslide_{move.body}"), self.kinematics.spin(move.frame)),
+                (move.frame, (-move.direction[1], move.direction[0])),
+            )
+            for move in moves
+            if move.kind == "slide" and move.frame != GROUND
+        ]
+
+
+def _times(term: Term, rates: tuple[Term, ...]) -> Term:
+    for rate in rates:
+        term = term * rate
+    return term
+
+
+def root_of(forest: Forest, body: str) -> str:
+    """The body, or the ground, that a body's tree hangs on."""
+    while body != GROUND and forest.hangs[body].joint is not None:
+        body = split(forest.hangs[body].parent)[0]
+    return body
+
+
+def _falling(forest: Forest) -> set[str]:
+    """Bodies of trees that hang on a free body and close no loop."""
+    roots = {body: root_of(forest, body) for body in forest.hangs}
+    held = {GROUND}
+    for one in forest.closures:
+        names = [split(p)[0] for p in one.places] if hasattr(one, "places") else [one.body]
+        held |= {roots.get(name, GROUND) for name in names}
+    return {body for body, root in roots.items() if root not in held}

@@ -1,0 +1,200 @@
+"""Loops without clearance, and prescribed angles of Cartesian bodies: constraints with feedback (index 1).
+
+Every constraint c obeys ``c'' = -2 alpha c' - beta^2 c`` (paper eq. 11). A row holds c's derivatives by the coordinates and
+what c'' has to be besides them.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from hpcclear.dynamics.linkage.expression import (
+    NOWHERE,
+    ONE,
+    ZERO,
+    Term,
+    Vector,
+    Writer,
+    minus,
+    named,
+    plus,
+)
+from hpcclear.dynamics.linkage.kinematics import Column, Kinematics, Point
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    ConstantSpeed,
+    Drive,
+    Fixed,
+    Joint,
+    Revolute,
+    Slide,
+    split,
+)
+
+
+class Row(NamedTuple):
+    """One constraint: derivatives by columns, and the sum of these times accelerations that is asked for.
+
+    `others`: derivatives by what is prescribed or held, for its reactions.
+    """
+
+    name: str
+    columns: dict[Column, Term]
+    asked: Term
+    others: dict[Column, Term]
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Writes the constraints of closures."""
+
+    kinematics: Kinematics
+    writer: Writer
+
+    def rows(self, one: Joint | Drive) -> list[Row]:
+        """The constraints of a joint or of a drive."""
+        if isinstance(one, Revolute):
+            return self._pin(one)
+        if isinstance(one, Slide):
+            return self._guide(one)
+        assert not isinstance(one, Fixed)
+        return [self._driven(one)]
+
+    def _row(
+        self, name: str, columns: dict[Column, Term], rest: Term, rate: Term, error: Term
+    ) -> Row:
+        """`rest`: c'' without the coordinates' accelerations; `rate`, `error`: c' and c."""
+        write, asked = self.writer, -rest
+        free: dict[Column, Term] = {}
+        others: dict[Column, Term] = {}
+        for column, term in columns.items():
+            turns = column.kind == "angle"
+            given = column.kind == "across" or (turns and self.kinematics.given(column.body))
+            if term:
+                (others if given else free)[column] = term
+            if turns and given:
+                asked = asked - term * self.kinematics.turn(column.body)
+        alpha2, beta2 = write.parameter("alpha2"), write.parameter("beta2")
+        return Row(name, free, asked - alpha2 * rate - beta2 * error, others)
+
+    def _pin(self, joint: Revolute) -> list[Row]:
+        kin = self.kinematics
+        journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
+        error = minus(kin.position(journal), kin.position(bearing))
+        rate = self.rate(*joint.places)
+        rest = minus(self.unforced(journal), self.unforced(bearing))
+        columns = self.between(*joint.places)
+        return [
+            self._row(
+                f"{joint.name}_{'xy'[axis]}", {c: v[axis] for c, v in columns.items()}, rest[axis],
+                rate[axis], error[axis],
+            )
+            for axis in (0, 1)
+        ]  # fmt: skip
+
+    def between(self, first: str, second: str) -> dict[Column, Vector]:
+        """Derivatives of the difference of two places, along the ground's axes."""
+        found: dict[Column, Vector] = {}
+        for place, add in ((first, plus), (second, minus)):
+            for column, held in self.kinematics.columns(self.kinematics.point(place)).items():
+                old = found.get(column, NOWHERE)
+                found[column] = add(old, self.kinematics.rotated(*held))
+        return found
+
+    def rate(self, first: str, second: str) -> Vector:
+        """Velocity of one place relative to another."""
+        points = (self.kinematics.point(place) for place in (first, second))
+        one, two = (self.kinematics.velocity(point) for point in points)
+        return minus(one, two)
+
+    def unforced(self, point: Point) -> Vector:
+        """Acceleration of a point while no coordinate accelerates."""
+        kin, found = self.kinematics, NOWHERE
+        for frame, (x, y) in point.arms.items():
+            spin = kin.spin(frame)
+            found = minus(found, kin.rotated(frame, (x * spin * spin, y * spin * spin)))
+        for move in point.moves:
+            if move.kind == "slide" and move.frame != GROUND:
+                rate = named("2.0") * named(f"vslide_{move.body}") * kin.spin(move.frame)
+                x, y = move.direction
+                found = plus(found, kin.rotated(move.frame, (-(y * rate), x * rate)))
+        return found
+
+    def _guide(self, joint: Slide) -> list[Row]:
+        """Across the line, and the angle of the body to it."""
+        kin, write = self.kinematics, self.writer
+        forest = kin.forest
+        body, carrier = (split(place)[0] for place in joint.places)
+        own, other = forest.frames[body], forest.frames[carrier]
+        along = self.direction(joint)
+        normal = (-along[1], along[0])
+        point, line = kin.point(joint.point), kin.point(joint.line)
+        apart = minus(kin.position(point), kin.position(line))
+        rate = self.rate(*joint.places)
+        rest = minus(self.unforced(point), self.unforced(line))
+        spin = kin.spin(other)
+        columns = {c: dot(v, normal) for c, v in self.between(*joint.places).items()}
+        if other != GROUND:
+            x, y = (write.let(f"apart_{joint.name}", part) for part in apart)
+            apart = (x, y)
+            turns = Column("angle", other)
+            columns[turns] = columns.get(turns, ZERO) - dot(apart, along)
+        across = self._row(
+            f"{joint.name}_across",
+            columns,
+            dot(rest, normal) - named("2.0") * spin * dot(rate, along) - spin * spin * dot(apart, normal),
+            dot(rate, normal) - spin * dot(apart, along),
+            dot(apart, normal),
+        )  # fmt: skip
+        c, s = kin.trig(own)
+        tilted = s * along[0] - c * along[1]  # of the angle between body and line
+        angles = {Column("angle", own): ONE, Column("angle", other): -ONE}
+        angles = {column: term for column, term in angles.items() if column.body != GROUND}
+        return [across, self._row(
+            f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted
+        )]  # fmt: skip
+
+    def sliding(self, joint: Slide) -> tuple[dict[Column, Term], Term]:
+        """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
+        kin, along = self.kinematics, self.direction(joint)
+        normal = (-along[1], along[0])
+        point, line = (kin.position(kin.point(place)) for place in joint.places)
+        aside = self.writer.let(f"aside_{joint.name}", dot(minus(point, line), normal))
+        moved = {c: dot(v, along) for c, v in self.between(*joint.places).items()}
+        carrier = kin.forest.frames[split(joint.line)[0]]
+        if carrier != GROUND:
+            turns = Column("angle", carrier)
+            moved[turns] = moved.get(turns, ZERO) + aside
+        speed = dot(self.rate(*joint.places), along) + kin.spin(carrier) * aside
+        return {c: term for c, term in moved.items() if term}, self.writer.let(
+            f"v_{joint.name}", speed
+        )
+
+    def direction(self, joint: Slide) -> Vector:
+        """Unit vector of a guide's line, along the ground's axes."""
+        carrier = split(joint.line)[0]
+        forest, write = self.kinematics.forest, self.writer
+        held = (ONE, ZERO)
+        if forest.offsets[carrier] + joint.angle != 0.0:
+            held = (write.parameter(f"{joint.name}_cos"), write.parameter(f"{joint.name}_sin"))
+        x, y = self.kinematics.rotated(forest.frames[carrier], held)
+        return write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y)
+
+    def _driven(self, drive: Drive) -> Row:
+        kin, name = self.kinematics, f"{drive.name}_drive"
+        angle, spin, turn = kin.driven(drive, name)
+        own = kin.forest.frames[drive.body]
+        error = named(f"angle_{own}") - angle
+        if isinstance(drive, ConstantSpeed) and drive is not kin.forest.mechanism.period:
+            # its angle does not restart with the period
+            apart = self.writer.let(f"apart_{drive.name}", error)
+            names = (f"s_{name}", f"c_{name}")
+            self.writer.when_needed(names, f"{', '.join(names)} = sincos({apart.name})")
+            error = named(f"s_{name}")
+        return self._row(
+            f"{drive.name}_angle", {Column("angle", own): ONE}, -turn, kin.spin(own) - spin, error
+        )
+
+
+def dot(a: Vector, b: Vector) -> Term:
+    """Product of two vectors along the ground's axes."""
+    return a[0] * b[0] + a[1] * b[1]

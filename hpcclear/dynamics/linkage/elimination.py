@@ -1,0 +1,142 @@
+"""Symmetric linear equations solved once, in terms: blocks apart, one and two by hand, more by L D L' in least-degree order.
+
+Multipliers follow the coordinates that they hold: their pivots are -J M^-1 J', which vanishes at true singularities only.
+"""
+
+from collections.abc import Callable, Collection, Iterable
+
+from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer
+
+Matrix = dict[tuple[int, int], Term]
+Vector = dict[int, Term]
+
+
+def blocks(
+    unknowns: Iterable[int], matrix: Matrix, ties: Collection[tuple[int, int]] = ()
+) -> list[list[int]]:
+    """Which unknowns depend on one another, in their order; `ties`: further pairs that do."""
+    left, found = list(unknowns), []
+    while left:
+        block, waiting = [], [left[0]]
+        while waiting:
+            here = waiting.pop()
+            if here in left:
+                left.remove(here)
+                block.append(here)
+                waiting += [
+                    k
+                    for k in left
+                    if matrix.get((here, k), ZERO) or (here, k) in ties or (k, here) in ties
+                ]
+        found.append(sorted(block))
+    return found
+
+
+class Elimination:
+    """The equations of one block, factored; `solve` takes right-hand sides.
+
+    Parameters
+    ----------
+    writer : Writer
+    matrix : dict
+        Entries (i, j), both halves; nought where there is none.
+    block : list of int
+        Unknowns, the coordinates first; the last `held` of them are multipliers.
+    inverse : callable
+        A term's reciprocal, as a parameter where there is one.
+    """
+
+    def __init__(
+        self,
+        writer: Writer,
+        matrix: Matrix,
+        block: list[int],
+        held: int,
+        inverse: Callable[[Term], Term | None],
+    ) -> None:
+        self.writer = writer
+        self.block = block
+        self.inverse = inverse
+        self.entries = {
+            (i, j): writer.let(f"k_{i}_{j}", matrix[i, j])
+            for i in block
+            for j in block
+            if i <= j and matrix.get((i, j), ZERO)
+        }
+        self.small = len(block) <= 2 and not held
+        self.pivots: list[tuple[int, Term, dict[int, Term], dict[int, Term]]] = []
+        if self.small:
+            if len(block) == 2:
+                self._pair = self._reciprocal()
+        else:
+            self._factor(block[: len(block) - held], block[len(block) - held :])
+
+    def at(self, i: int, j: int) -> Term:
+        """Entry of the matrix."""
+        return self.entries.get((min(i, j), max(i, j)), ZERO)
+
+    def _reciprocal(self) -> Term:
+        one, two = self.block
+        a, b, c = self.at(one, one), self.at(one, two), self.at(two, two)
+        return self.writer.let("inverse", ONE / (a * c - b * b))
+
+    def _factor(self, coordinates: list[int], multipliers: list[int]) -> None:
+        """Pivots, with the fewest neighbours first: the coordinates, then the multipliers."""
+        work = dict(self.entries)
+
+        def neighbours(p: int) -> list[int]:
+            return [k for k in left if k != p and work.get((min(k, p), max(k, p)), ZERO)]
+
+        left = [*coordinates, *multipliers]
+        for group in (coordinates, multipliers):
+            group = list(group)
+            while group:
+                pivot = min(group, key=lambda p: (len(neighbours(p)), p))
+                group.remove(pivot)
+                near = neighbours(pivot)
+                left.remove(pivot)
+                diagonal = work[pivot, pivot]
+                inverse = self.inverse(diagonal)
+                if inverse is None:
+                    inverse = self.writer.let(f"inverse_{pivot}", ONE / diagonal)
+                row = {k: work[min(k, pivot), max(k, pivot)] for k in near}
+                scaled = {k: self.writer.let(f"l_{k}_{pivot}", row[k] * inverse) for k in near}
+                for i in near:
+                    for j in near:
+                        if i <= j:
+                            value = work.get((i, j), ZERO) - scaled[i] * row[j]
+                            work[i, j] = self.writer.let(f"k_{i}_{j}", value)
+                self.pivots.append((pivot, inverse, row, scaled))
+
+    def solve(self, right: Vector) -> Vector:
+        """The unknowns for one right-hand side, as terms that still have to be named."""
+        if self.small:
+            return self._small(right)
+        b = {k: self.writer.let(f"b_{k}", right.get(k, ZERO)) for k in self.block}
+        for pivot, _, _, scaled in self.pivots:
+            for k, factor in scaled.items():
+                b[k] = self.writer.let(f"b_{k}", b[k] - factor * b[pivot])
+        found: Vector = {}
+        for pivot, inverse, row, _ in reversed(self.pivots):
+            value = b[pivot]
+            for k, entry in row.items():
+                value = value - entry * found[k]
+            found[pivot] = self.writer.let(f"z_{pivot}", value * inverse)
+        return found
+
+    def _small(self, right: Vector) -> Vector:
+        b = {k: right.get(k, ZERO) for k in self.block}
+        if len(self.block) == 1:
+            (one,) = self.block
+            diagonal = self.at(one, one)
+            inverse = self.inverse(diagonal)
+            if inverse is None and self.writer.hoist and diagonal.fixed:
+                inverse = ONE / diagonal
+            return {one: b[one] / diagonal if inverse is None else b[one] * inverse}
+        one, two = self.block
+        b = {k: self.writer.let(f"b_{k}", term) for k, term in b.items()}
+        a11, a12, a22 = self.at(one, one), self.at(one, two), self.at(two, two)
+        return {
+            one: (b[one] * a22 - a12 * b[two]) * self._pair,
+            two: (a11 * b[two] - a12 * b[one]) * self._pair,
+        }

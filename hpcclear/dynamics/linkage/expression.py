@@ -1,0 +1,223 @@
+"""Arithmetic that writes itself down: terms of names and numbers, and the text that computes them, statement by statement.
+
+What is nought disappears, signs move outwards, and nothing else is rearranged: the text adds and multiplies in the order
+in which the generator did, which decides the last bits. Names are read where they are first needed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+_BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
+
+
+@dataclass(frozen=True)
+class Term:
+    """A sum, a product, a quotient, a name, nought or one; `fixed` if it holds parameters alone."""
+
+    op: str
+    args: tuple["Term", ...] = ()
+    negative: bool = False
+    fixed: bool = True
+    name: str = ""
+
+    def __bool__(self) -> bool:
+        return self.op != "0"
+
+    def __neg__(self) -> "Term":
+        if not self:
+            return self
+        return Term(self.op, self.args, not self.negative, self.fixed, self.name)
+
+    def __abs__(self) -> "Term":
+        return -self if self.negative else self
+
+    def __add__(self, other: "Term") -> "Term":
+        if not (self and other):
+            return self or other
+        left = self.args if self.op == "+" and not self.negative else (self,)
+        right: tuple[Term, ...] = (other,)
+        if other.op == "+" and other.args[0].negative:  # a - (-b - c) is a + b + c
+            right = tuple(-part for part in other.args) if other.negative else other.args
+        return Term("+", left + right, fixed=self.fixed and other.fixed)
+
+    def __sub__(self, other: "Term") -> "Term":
+        return self + -other
+
+    def __mul__(self, other: "Term") -> "Term":
+        if not (self and other):
+            return ZERO
+        negative = self.negative != other.negative
+        for one, two in ((self, other), (other, self)):
+            if one.op == "1":
+                return -abs(two) if negative else abs(two)
+        return Term("*", (abs(self), abs(other)), negative, self.fixed and other.fixed)
+
+    def __truediv__(self, other: "Term") -> "Term":
+        if not self:
+            return ZERO
+        negative = self.negative != other.negative
+        return Term("/", (abs(self), abs(other)), negative, self.fixed and other.fixed)
+
+
+ZERO = Term("0")
+ONE = Term("1")
+Vector = tuple[Term, Term]
+NOWHERE: Vector = (ZERO, ZERO)
+
+
+def named(name: str, fixed: bool = False) -> Term:
+    """A name as a term."""
+    return Term("name", fixed=fixed, name=name)
+
+
+def onto(factor: Term, product: Term) -> Term:
+    """`factor` times a product, from the left: f p a and not f (p a), where p holds what is of parameters alone."""
+    if product.op == "*" and not product.fixed:
+        result = onto(factor, product.args[0]) * product.args[1]
+        return -result if product.negative else result
+    return factor * product
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1]
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Difference of two vectors."""
+    return a[0] - b[0], a[1] - b[1]
+
+
+def across(a: Vector) -> Vector:
+    """A vector turned by a quarter."""
+    return -a[1], a[0]
+
+
+class Writer:
+    """Statements of a text, in the order in which their values are first needed.
+
+    Parameters
+    ----------
+    rows : mapping of parameter name to row
+        Parameters with a row of their own; others get the rows from `free` on.
+    free : int
+        First row of `par` that nobody has.
+    hoist : bool
+        Whether what holds parameters alone is worked out once a sample, as a derived parameter.
+    """
+
+    def __init__(self, rows: Mapping[str, int], free: int, hoist: bool) -> None:
+        self.lines: list[str] = []
+        self.rows = dict(rows)
+        self.free = free
+        self.hoist = hoist
+        self.derived: dict[str, str] = {}  # name: text in parameters
+        self.inputs: dict[str, None] = {}  # parameters that a line or a derived one reads
+        self.read: set[str] = set()  # those that have a row
+        self._derived_names: dict[str, str] = {}
+        self._pending: dict[str, tuple[tuple[str, ...], str, tuple[Term, ...]]] = {}
+        self._values: dict[str, Term] = {}
+        self._taken: set[str] = set()
+
+    def parameter(self, name: str) -> Term:
+        """A parameter of the sample."""
+        return named(name, fixed=True)
+
+    def has(self, name: str) -> bool:
+        """Whether a parameter has been given a row."""
+        return name in self.rows
+
+    def when_needed(self, names: tuple[str, ...], line: str, needs: tuple[Term, ...] = ()) -> None:
+        """A statement that defines `names`, written down before the first that uses one of them."""
+        for name in names:
+            self._pending[name] = (names, line, needs)
+            self._taken.add(name)
+
+    def let(self, name: str, term: Term, *, whole: bool = False) -> Term:
+        """Give a term a name, unless it has one (or is nought, or one) or its text is known already.
+
+        `whole`: whatever it is, with its sign; else the sign stays outside, where it may cancel another.
+        """
+        if not whole and (not term or term.op in ("name", "1") or (term.fixed and self.hoist)):
+            return term
+        outside = term.negative and not whole
+        text = self.text(abs(term) if outside else term)
+        if text not in self._values:
+            name = self.fresh(name)
+            self.lines.append(f"{name} = {text}")
+            self._values[text] = named(name)
+        return -self._values[text] if outside else self._values[text]
+
+    def fresh(self, name: str) -> str:
+        """A name that nothing has yet."""
+        candidate, count = name, 2
+        while candidate in self._taken:
+            candidate, count = f"{name}_{count}", count + 1
+        self._taken.add(candidate)
+        return candidate
+
+    def line(self, text: str) -> None:
+        """A statement as it stands; its names must have been written already (see `text`)."""
+        self.lines.append(text)
+
+    def text(self, term: Term, *, within: int = 0, plain: bool = False) -> str:
+        """A term as Python; what it needs is written down first.
+
+        `within`: how tightly the surroundings bind; `plain`: for a derived parameter, so that nothing is written down.
+        """
+        if not term:
+            return "0.0"
+        if term.op == "1":
+            return "-1.0" if term.negative else "1.0"
+        if self.hoist and not plain and term.fixed and term.op != "name":
+            term = self._hoisted(term)
+        if term.negative and term.op == "+" and term.args[0].negative:
+            term = Term("+", tuple(-part for part in term.args), False, term.fixed)
+        binds = 1 if term.negative else _BINDS[term.op]
+        text = self._body(term, plain)
+        if term.negative:
+            text = "-" + (f"({text})" if term.op == "+" else text)
+        return f"({text})" if binds <= within else text
+
+    def _body(self, term: Term, plain: bool) -> str:
+        if term.op == "name":
+            self._need(term, plain)
+            return term.name
+        parts = [self.text(abs(part), within=1, plain=plain) for part in term.args[:1]]
+        if term.op != "+":
+            return f"{parts[0]} {term.op} {self.text(term.args[1], within=2, plain=plain)}"
+        parts += [self.text(abs(part), within=1, plain=plain) for part in term.args[1:]]
+        text = ("-" if term.args[0].negative else "") + parts[0]
+        for part, written in zip(term.args[1:], parts[1:], strict=True):
+            text += (" - " if part.negative else " + ") + written
+        return text
+
+    def _need(self, term: Term, plain: bool) -> None:
+        """Write down what a name stands for, if that is not done yet."""
+        name = term.name
+        if term.fixed and name not in self.derived:
+            self.inputs.setdefault(name)
+        if plain:
+            return
+        if name in self._pending:
+            names, line, needs = self._pending[name]
+            for one in names:
+                self._pending.pop(one)
+            for needed in needs:
+                self._need(needed, plain)
+            self.lines.append(line)
+        elif term.fixed and name not in self.read:
+            self.read.add(name)
+            row = self.rows.setdefault(name, self.free)
+            self.free = max(self.free, row + 1)
+            comment = f"  # {self.derived[name]}" if name in self.derived else ""
+            self.lines.append(f"{name} = par[{row} * W + i]{comment}")
+
+    def _hoisted(self, term: Term) -> Term:
+        text = self.text(abs(term), plain=True)
+        if text not in self._derived_names:
+            name = f"fixed_{len(self.derived) + 1}"
+            self._derived_names[text] = name
+            self.derived[name] = text
+        result = named(self._derived_names[text], fixed=True)
+        return -result if term.negative else result

@@ -1,0 +1,350 @@
+"""The motion of one lane of any linkage as a text: what a numba function of it does, and what one reads to understand it.
+
+The text reads coordinates and velocities of the stage, calls the contact law of each joint with clearance, and writes
+accelerations, gaps, forces and powers; an effect that is off is not in it. It is written in the order kinematics,
+contact, kinematics, contact, sums, which keeps few numbers alive at a time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
+from hpcclear.dynamics.linkage.closing import Closing
+from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
+from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer, named
+from hpcclear.dynamics.linkage.guides import Guide, coupled
+from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Clearance,
+    Drive,
+    Force,
+    Slide,
+    Spring,
+    Torque,
+    TorqueDrive,
+    split,
+)
+from hpcclear.dynamics.linkage.trees import Forest, forest
+
+
+class On(NamedTuple):
+    """Which effects and outputs a text has, besides the mechanism's own loads and drives."""
+
+    friction: bool = False  # in the joints with clearance
+    gravity: bool = False
+    ledger: bool = False  # energies
+    series: bool = False  # drive moment, for time series
+    responses: bool = False  # drive moment and the followed body's acceleration
+    follow: str = ""  # a guided body
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Where a text finds and leaves its numbers: first rows of `work`, rows of parameters, first row that is free."""
+
+    coordinates: int = at.QS
+    velocities: int = at.VS
+    accelerations: int = at.ACC
+    rates: int = at.RATE_NOW
+    time: int = at.STAGE_TIME
+    torque_value: int = at.TORQUE_VALUE
+    load_value: int = at.LOAD_VALUE
+    parameters: Mapping[str, int] = field(default_factory=dict)
+    free: int = 0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A text and what it needs.
+
+    Attributes
+    ----------
+    source : str
+        Of the function ``lane(effects, joints, work, par, i, W)``.
+    forest : Forest
+    parameters : dict
+        Rows of `par` by name.
+    derived : dict
+        Texts of the derived parameters, by name, in parameters of `inputs`.
+    inputs : tuple of str
+        Names that `numbers.values` gives a number to.
+    constraints : tuple of str
+        Names of the multipliers.
+    """
+
+    source: str
+    forest: Forest
+    parameters: dict[str, int]
+    derived: dict[str, str]
+    inputs: tuple[str, ...]
+    constraints: tuple[str, ...]
+
+
+def generate(
+    mechanism: Mechanism, on: On, rows: Rows, *, cartesian: bool = False, hoist: bool = True
+) -> Motion:
+    """The text of a mechanism's motion.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is nought in it is taken for nought for good.
+    on : On
+    rows : Rows
+    cartesian : bool
+        Every body by itself, ideal joints and prescribed angles as constraints with feedback (paper eq. 11).
+    hoist : bool
+        Whether what holds parameters alone is worked out once a sample.
+    """
+    return _Generator(mechanism, on, rows, cartesian, hoist).motion()
+
+
+class _Generator:
+    def __init__(self, mechanism: Mechanism, on: On, rows: Rows, cartesian: bool, hoist: bool):
+        self.mechanism, self.on, self.rows = mechanism, on, rows
+        self.forest = forest(mechanism, cartesian)
+        self.writer = Writer(rows.parameters, rows.free, hoist)
+        self.kinematics = Kinematics(
+            self.forest, self.writer, rows.coordinates, rows.velocities, rows.time
+        )
+        self.balance = Balance(self.forest, self.kinematics, self.writer, on.gravity)
+        self.closing = Closing(self.kinematics, self.writer)
+        self.columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
+        self.number = {column: k for k, column in enumerate(self.columns)}
+        self.losses: list[Term] = []
+        self.load_power = ZERO
+
+    def motion(self) -> Motion:
+        self.writer.when_needed(
+            ("turned_load",), f"turned_load = work[{self.rows.load_value} * W + i]"
+        )
+        for k, joint in enumerate(self.mechanism.clearances):
+            self._contact(k, joint)
+        for load in self.mechanism.loads:
+            self._load(load)
+        torques = [self._torque(d) for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
+        self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
+        found = self._solved(torques)
+        self._store(found, dict(torques))
+        lines = "\n".join(f"    {line}" for line in (self._described(), *self.writer.lines))
+        names = {k: row for k, row in self.writer.rows.items() if k in self.writer.read}
+        return Motion(
+            f"def lane(effects, joints, work, par, i, W):\n{lines}\n",
+            self.forest,
+            names,
+            {name: text for name, text in self.writer.derived.items() if name in names},
+            tuple(self.writer.inputs),
+            tuple(row.name for row in self.constraints),
+        )
+
+    def _described(self) -> str:
+        """First line of the text: what is integrated, where the contacts are, what closes loops."""
+        parts = {
+            "coordinates": [one.name for one in self.forest.coordinates],
+            "joints with clearance": [joint.name for joint in self.mechanism.clearances],
+            "constraints": [row.name for row in self.constraints],
+        }
+        said = "; ".join(f"{what} {', '.join(names)}" for what, names in parts.items() if names)
+        return f'"""Accelerations of lane i: {said}."""'
+
+    # ---- forces ---------------------------------------------------------------------------------
+    def _contact(self, k: int, joint: Clearance) -> None:
+        """Call of the contact law: journal relative to bearing, and what the joint exerts on both."""
+        kin, write = self.kinematics, self.writer
+        journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
+        (x, y), (bx, by) = kin.position(journal), kin.position(bearing)
+        (vx, vy), (ux, uy) = kin.velocity(journal), kin.velocity(bearing)
+        bodies = [split(place)[0] for place in joint.places]
+        spins = [kin.spin(self.forest.frames[body]) for body in bodies]
+        relative = ", ".join(
+            write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)
+        )
+        made = [write.fresh(f"{name}_{joint.name}") for name in ("fx", "fy", "mb", "mj", "loss")]
+        call = f"joint_force(effects, work, par, joints[{k}], ({relative}), i, W)"
+        write.line(f"{', '.join(made)} = {call}")
+        fx, fy, on_bearing, on_journal, loss = map(named, made)
+        self.balance.pulls += [Pull(joint.journal, (-fx, -fy)), Pull(joint.bearing, (fx, fy))]
+        if self.on.friction:
+            for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
+                if split(place)[0] != GROUND:
+                    self.balance.twists.append(Twist(split(place)[0], moment))
+        self.losses.append(loss)
+
+    def _load(self, load: Force | Torque | Spring) -> None:
+        kin, write, power = self.kinematics, self.writer, ZERO
+        if isinstance(load, Spring):
+            self._spring(load)
+            return
+        turned = named("turned_load") if load.table else ONE
+        if isinstance(load, Torque):
+            moment = write.let(load.name, write.parameter(f"{load.name}_torque") * turned)
+            self.balance.twists.append(Twist(load.body, moment))
+            power = moment * kin.spin(self.forest.frames[load.body])
+        else:
+            force = [
+                write.let(f"{load.name}_{axis}", self._force(load, axis, value) * turned)
+                for axis, value in zip("xy", load.force, strict=True)
+            ]
+            self.balance.pulls.append(Pull(load.place, (force[0], force[1])))
+            for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
+                power = power + part * speed
+        self.load_power = self.load_power + power
+
+    def _force(self, load: Force, axis: str, value: float) -> Term:
+        return self.writer.parameter(f"{load.name}_force_{axis}") if value else ZERO
+
+    def _spring(self, load: Spring) -> None:
+        """Call of the spring's law, which gives the force on the first place and what both ends do."""
+        kin, write = self.kinematics, self.writer
+        first, second = kin.point(load.first), kin.point(load.second)
+        (x, y), (bx, by) = kin.position(first), kin.position(second)
+        (vx, vy), (ux, uy) = kin.velocity(first), kin.velocity(second)
+        numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
+        texts = [write.text(t) for t in (*numbers, x - bx, y - by, vx - ux, vy - uy)]
+        made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
+        write.line(f"{', '.join(made)} = spring_force({', '.join(texts)})")
+        fx, fy, power = map(named, made)
+        self.balance.pulls += [Pull(load.first, (fx, fy)), Pull(load.second, (-fx, -fy))]
+        self.load_power = self.load_power + power
+
+    def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
+        write = self.writer
+        torque = write.parameter(f"{drive.name}_torque")
+        if drive.table:
+            name = f"turned_{drive.name}"
+            write.when_needed((name,), f"{name} = work[{self.rows.torque_value} * W + i]")
+            torque = write.let(drive.name, torque * named(name))
+        return Column("angle", self.forest.frames[drive.body]), torque
+
+    # ---- accelerations --------------------------------------------------------------------------
+    def inverse(self, term: Term) -> Term | None:
+        """Reciprocal of a mass or an inertia, which is a parameter."""
+        entry = next((e for e in ("_mass", "_inertia") if term.name.endswith(e)), "")
+        if not (term.fixed and entry) or "_inverse_" in term.name:
+            return None
+        name = term.name.removesuffix(entry) + "_inverse" + entry
+        # a body's own have always been parameters; one about a pin is divided by unless it may be hoisted
+        known = self.writer.hoist or not term.name.endswith("_pivot_inertia")
+        return self.writer.parameter(name) if known else None
+
+    def _solved(self, torques: list[tuple[Column, Term]]) -> dict[int, Term]:
+        """Accelerations of the coordinates, then multipliers, by number."""
+        n = len(self.columns)
+        matrix: Matrix = {}
+        for k, one in enumerate(self.columns):
+            for j, two in enumerate(self.columns[: k + 1]):
+                if term := self.balance.mass(one, two):
+                    term = self.writer.let(f"m_{j}_{k}", term)
+                    matrix[k, j] = matrix[j, k] = term
+        for r, row in enumerate(self.constraints, n):
+            for column, term in row.columns.items():
+                k = self.number[column]
+                held = self.writer.let(f"j_{row.name}_{k}", term)
+                matrix[k, r] = matrix[r, k] = -held
+        right = {k: self.balance.force(column) for k, column in enumerate(self.columns)}
+        for column, torque in torques:
+            right[self.number[column]] = right[self.number[column]] + torque
+        right |= {r: -row.asked for r, row in enumerate(self.constraints, n)}
+        self.guides = [
+            Guide(joint, self.balance, self.closing, self.columns, self.constraints)
+            for joint in _rubbing(self.mechanism)
+        ]
+        found: dict[int, Term] = {}
+        ties = {
+            (guide.place, k) for guide in self.guides for k in (*guide.normal, *guide.influence)
+        }
+        for block in blocks(range(n + len(self.constraints)), matrix, ties):
+            found |= self._block(block, matrix, right, n)
+        return {k: self._accelerated(k, term) for k, term in sorted(found.items())}
+
+    def _accelerated(self, k: int, term: Term) -> Term:
+        """Write an acceleration down where the stepper reads it."""
+        if k >= len(self.columns):
+            return self.writer.let(f"hold_{self.constraints[k - len(self.columns)].name}", term)
+        name = self.forest.coordinates[k].name
+        value = self.writer.let(f"a_{name}", term, whole=True)
+        row = self.rows.accelerations + k
+        written = value
+        if self.columns[k].kind == "y" and self.columns[k].body in self.balance.falling:
+            written = value - self.writer.parameter("gravity")
+        self.writer.line(f"work[{row} * W + i] = {self.writer.text(written)}")
+        return value
+
+    def _block(
+        self, block: list[int], matrix: Matrix, right: dict[int, Term], n: int
+    ) -> dict[int, Term]:
+        rubbing = [guide for guide in self.guides if guide.place in block]
+        held = sum(k >= n for k in block)
+        for guide in rubbing:
+            guide.measure()
+            if not guide.normal:
+                guide.known(right)
+        moving = [guide for guide in rubbing if guide.normal]
+        if len(block) == 2 and not held and len(moving) == 1:
+            return moving[0].paired(block, matrix, right)
+        factored = Elimination(self.writer, matrix, block, held, self.inverse)
+        found = factored.solve(right)
+        return coupled(moving, factored, found) if moving else found
+
+    # ---- what is written down besides ------------------------------------------------------------
+    def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
+        on, write = self.on, self.writer
+        if on.ledger or on.series or on.responses:
+            moments = [self._moment(drive, found, torques) for drive in self._drives()]
+            if on.series or on.responses:
+                self._rate(at.DRIVE_MOMENT, moments[0])
+        if on.ledger:
+            power = ZERO
+            for drive, moment in zip(self._drives(), moments, strict=True):
+                power = power + moment * self.kinematics.spin(self.forest.frames[drive.body])
+            power = write.let("power", power)
+            self._rate(at.DRIVE_POWER, power)
+            write.line(
+                f"work[{self.rows.rates + at.ABS_DRIVE_POWER} * W + i] = abs({write.text(power)})"
+            )
+            loss = ZERO
+            for one in self.losses:
+                loss = loss + one
+            for guide in self.guides:
+                loss = loss + guide.force * guide.speed
+            self._rate(at.DISSIPATION, loss)
+            self._rate(at.LOAD_POWER, self.load_power)
+        if on.responses and on.follow:
+            k = self.number[Column("slide", on.follow)]
+            self._rate(at.SLIDER_ACCELERATION, found[k])
+            self._rate(at.SLIDER_SQUARE, found[k] * found[k])
+
+    def _drives(self) -> list[Drive]:
+        main = self.mechanism.period
+        return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
+
+    def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
+        """Moment of a drive: what is given, or what the prescribed angle asks for."""
+        column = Column("angle", self.forest.frames[drive.body])
+        if column in torques:
+            return torques[column]
+        names = [row.name for row in self.constraints]
+        if f"{drive.name}_angle" in names:
+            return found[len(self.columns) + names.index(f"{drive.name}_angle")]
+        return self.writer.let("moment", self.reaction(column, found), whole=True)
+
+    def reaction(self, column: Column, found: dict[int, Term]) -> Term:
+        """What has to act along a column that is prescribed."""
+        total = ZERO
+        for k, one in enumerate(self.columns):
+            total = total + self.balance.mass(column, one) * found[k]
+        for r, row in enumerate(self.constraints, len(self.columns)):
+            total = total - row.others.get(column, ZERO) * found[r]
+        return total - self.balance.force(column)
+
+    def _rate(self, row: int, term: Term) -> None:
+        text = self.writer.text(term)
+        self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
+
+
+def _rubbing(mechanism: Mechanism) -> list[Slide]:
+    return [j for j in mechanism.joints if isinstance(j, Slide) and j.friction is not None]

@@ -1,0 +1,259 @@
+"""Where points of a linkage are, how fast they move and what moves them, written in terms of a text.
+
+A point is a sum of vectors, each held in a rotating frame: what does not change there is a parameter. So its velocity
+has only products with the frames' angular velocities, and the mass matrix only cosines and sines of differences of angles.
+"""
+
+from typing import NamedTuple
+
+from hpcclear.dynamics.linkage.expression import (
+    NOWHERE,
+    ONE,
+    ZERO,
+    Term,
+    Vector,
+    Writer,
+    across,
+    named,
+    plus,
+)
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    ConstantSpeed,
+    Harmonic,
+    Slide,
+    TableDrive,
+    split,
+)
+from hpcclear.dynamics.linkage.trees import Forest
+
+CENTER = "center"
+
+
+class Move(NamedTuple):
+    """A point moves along a direction in a frame as a coordinate changes; `kind`: "x", "y", "slide" or "across" a guide."""
+
+    kind: str
+    body: str  # which the coordinate belongs to
+    frame: str
+    direction: Vector
+
+
+class Point(NamedTuple):
+    """Vectors by frame, from the ground on outwards, and what moves the point besides turning frames."""
+
+    arms: dict[str, Vector]
+    moves: tuple[Move, ...]
+
+
+class Column(NamedTuple):
+    """What makes points move: the turning of a frame, or a move."""
+
+    kind: str  # "angle" or a move's
+    body: str  # the frame's, or whose coordinate it is
+
+
+class Kinematics:
+    """Points, velocities and accelerations of a forest, as terms; `first` and `velocities`: rows of the stage in `work`."""
+
+    def __init__(
+        self, forest: Forest, writer: Writer, coordinates: int, velocities: int, time: int
+    ) -> None:
+        self.forest = forest
+        self.writer = writer
+        self._points: dict[str, Point] = {}
+        self._spins: dict[str, Term] = {}
+        self._accelerations: dict[str, Term] = {}
+        for k, one in enumerate(forest.coordinates):
+            read = "{} = work[{} * W + i]"
+            for name, row in ((one.name, coordinates + k), (self.speed_name(one), velocities + k)):
+                writer.when_needed((name,), read.format(name, row))
+        writer.when_needed(("time",), f"time = work[{time} * W + i]")
+        for frame in dict.fromkeys(forest.frames.values()):
+            if frame != GROUND:
+                self._turn(frame)
+
+    @staticmethod
+    def speed_name(coordinate: tuple[str, str, str]) -> str:
+        """Name of a coordinate's velocity."""
+        kind, body, _ = coordinate
+        return f"spin_{body}" if kind == "angle" else f"v{kind}_{body}"
+
+    # ---- frames ---------------------------------------------------------------------------------
+    def _turn(self, frame: str) -> None:
+        """Angle, angular velocity and acceleration of a frame."""
+        angle = named(f"angle_{frame}")
+        drive = self.forest.prescribed.get(frame)
+        if drive is None:
+            self._spins[frame] = named(f"spin_{frame}")
+            self._accelerations[frame] = ZERO
+        else:
+            angle, spin, acceleration = self.driven(drive, frame)
+            self._spins[frame], self._accelerations[frame] = spin, acceleration
+        names = (f"s_{frame}", f"c_{frame}")
+        self.writer.when_needed(names, f"{', '.join(names)} = sincos(angle_{frame})", (angle,))
+
+    def driven(self, drive: object, frame: str) -> tuple[Term, Term, Term]:
+        """Angle, angular velocity and acceleration that a drive prescribes."""
+        write, name = self.writer, f"angle_{frame}"
+        time = named("time")
+        if isinstance(drive, ConstantSpeed):
+            speed = write.parameter(f"{drive.name}_speed")
+            start = self._number(f"{frame}_start", self.start_of(drive, frame))
+            text = f"{drive.name}_speed * time"
+            needs: tuple[Term, ...] = (speed, time)
+            if start:
+                text, needs = f"{frame}_start + {text}", (start, speed, time)
+            write.when_needed((name,), f"{name} = {text}", needs)
+            return named(name), speed, ZERO
+        assert isinstance(drive, (Harmonic, TableDrive))
+        spin, acceleration = f"spin_{frame}", f"turn_{frame}"
+        if isinstance(drive, Harmonic):
+            numbers = tuple(
+                write.parameter(f"{drive.name}_{entry}")
+                for entry in ("mean", "amplitude", "rate", "phase")
+            )
+            given = ", ".join(term.name for term in numbers)
+            text = f"harmonic({given}, time)"
+        else:
+            numbers = ()
+            text = f"tabulated_{drive.name}(work, i, W)"
+        line = f"{name}, {spin}, {acceleration} = {text}"
+        write.when_needed((name, spin, acceleration), line, (*numbers, time))
+        return named(name), named(spin), named(acceleration)
+
+    def start_of(self, drive: ConstantSpeed, frame: str) -> float:
+        """Angle of a driven frame at time 0, rad."""
+        start = self.forest.mechanism.body(drive.body).start_angle
+        return start - self.forest.offsets[drive.body]
+
+    def trig(self, frame: str) -> Vector:
+        """Cosine and sine of a frame's angle."""
+        if frame == GROUND:
+            return ONE, ZERO
+        return named(f"c_{frame}"), named(f"s_{frame}")
+
+    def spin(self, frame: str) -> Term:
+        """Angular velocity of a frame."""
+        return ZERO if frame == GROUND else self._spins[frame]
+
+    def turn(self, frame: str) -> Term:
+        """Angular acceleration that a drive prescribes."""
+        return ZERO if frame == GROUND else self._accelerations[frame]
+
+    def given(self, frame: str) -> bool:
+        """Whether a frame's angle is prescribed."""
+        return frame in self.forest.prescribed
+
+    # ---- points ---------------------------------------------------------------------------------
+    def _number(self, name: str, value: float) -> Term:
+        """A parameter, or nought where the mechanism has nought."""
+        return ZERO if value == 0.0 else self.writer.parameter(name)
+
+    def arm(self, body: str, start: str, end: str) -> Vector:
+        """From one point of a body to another, in the body's frame; the parameters are positive lengths."""
+        m = self.forest.mechanism.body(body)
+        a, b = (m.center if point == CENTER else m.points[point] for point in (start, end))
+        x, y = (
+            self._number(f"{body}_{start}_{end}_{axis}", b[k] - a[k])
+            if b[k] >= a[k]
+            else -self._number(f"{body}_{end}_{start}_{axis}", a[k] - b[k])
+            for k, axis in enumerate(("x", "y"))
+        )
+        cosine, sine = self.offset(body)
+        return cosine * x - sine * y, sine * x + cosine * y
+
+    def offset(self, body: str) -> Vector:
+        """Cosine and sine of the angle by which a body is turned against its frame."""
+        if self.forest.offsets[body] == 0.0:
+            return ONE, ZERO
+        write = self.writer
+        return write.parameter(f"{body}_offset_cos"), write.parameter(f"{body}_offset_sin")
+
+    def center(self, body: str) -> Point:
+        """Mass centre of a body."""
+        return self.point(f"{body}.{CENTER}")
+
+    def point(self, place: str) -> Point:
+        """A place as arms and moves."""
+        if place not in self._points:
+            self._points[place] = self._found(place)
+        return self._points[place]
+
+    def _found(self, place: str) -> Point:
+        body, point = split(place)
+        forest = self.forest
+        if body == GROUND:
+            x, y = forest.mechanism.ground[point]
+            fixed = (
+                self._number(f"ground_{point}_x", x),
+                self._number(f"ground_{point}_y", y),
+            )
+            return Point({GROUND: fixed} if any(fixed) else {}, ())
+        hang, frame = forest.hangs[body], forest.frames[body]
+        if hang.joint is None:
+            moves = tuple(
+                Move(kind, body, GROUND, direction)
+                for kind, direction in (("x", (ONE, ZERO)), ("y", (ZERO, ONE)))
+            )
+            root = Point({GROUND: (named(f"x_{body}"), named(f"y_{body}"))}, moves)
+            return _extended(root, frame, self.arm(body, CENTER, point))
+        parent = self.point(hang.parent)
+        if isinstance(hang.joint, Slide):
+            along = self.offset(split(hang.joint.point)[0])
+            if hang.own != hang.joint.point:
+                along = (-along[0], -along[1])
+            s = named(f"slide_{body}")
+            moved = _extended(parent, frame, (along[0] * s, along[1] * s))
+            guide = (Move("slide", body, frame, along), Move("across", body, frame, across(along)))
+            parent = Point(moved.arms, (*moved.moves, *guide))
+        return _extended(parent, frame, self.arm(body, split(hang.own)[1], point))
+
+    def rotated(self, frame: str, vector: Vector) -> Vector:
+        """A vector of a frame along the ground's axes."""
+        if frame == GROUND:
+            return vector
+        (cosine, sine), (x, y) = self.trig(frame), vector
+        return x * cosine - y * sine, x * sine + y * cosine
+
+    def position(self, point: Point) -> Vector:
+        """Where a point is, along the ground's axes."""
+        found = NOWHERE
+        for frame, arm in point.arms.items():
+            found = plus(found, self.rotated(frame, arm))
+        return found
+
+    def velocity(self, point: Point) -> Vector:
+        """How fast it moves."""
+        found = NOWHERE
+        for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
+            for move in point.moves:
+                if move.frame == frame and move.kind != "across":
+                    name = self.speed_name((move.kind, move.body, ""))
+                    x, y = self.rotated(frame, move.direction)
+                    found = plus(found, (x * named(name), y * named(name)))
+            spin = self.spin(frame)
+            x, y = point.arms.get(frame, NOWHERE)
+            found = plus(found, self.rotated(frame, (-(y * spin), x * spin)))
+        return found
+
+    def columns(self, point: Point) -> dict[Column, tuple[str, Vector]]:
+        """Derivatives of a point by all that moves it: frame, and vector in it."""
+        found = {
+            Column("angle", frame): (frame, across(arm))
+            for frame, arm in point.arms.items()
+            if frame != GROUND and self.forest.turning(frame)
+        }
+        return found | {
+            Column(move.kind, move.body): (move.frame, move.direction) for move in point.moves
+        }
+
+    def projected(self, vector: tuple[str, Vector], axis: int) -> Term:
+        """A frame's vector along the ground's x (0) or y (1)."""
+        return self.rotated(*vector)[axis]
+
+
+def _extended(point: Point, frame: str, arm: Vector) -> Point:
+    if not any(arm):
+        return point
+    return Point(point.arms | {frame: plus(point.arms.get(frame, NOWHERE), arm)}, point.moves)

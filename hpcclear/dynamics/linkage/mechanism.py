@@ -1,0 +1,287 @@
+"""A planar mechanism as data, refused by the name of the joint, body, drive or load where it makes none."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Body,
+    Clearance,
+    Drive,
+    Fixed,
+    Harmonic,
+    Joint,
+    Load,
+    Pair,
+    Revolute,
+    Slide,
+    TableDrive,
+    split,
+)
+
+MOST_COORDINATES = 24
+MOST_CLEARANCES = 8
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies, ground points, joints, drives and loads that make one mechanism.
+
+    Raises
+    ------
+    InputError
+        If they do not: the joint, body, drive or load is named.
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    drives: tuple[Drive, ...]
+    ground: Mapping[str, Pair] = field(default_factory=lambda: {"o": (0.0, 0.0)})
+    loads: tuple[Load, ...] = ()
+
+    def __post_init__(self) -> None:
+        for check in (_names, _places, _numbers, _connected, _drives, _sizes):
+            check(self)
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def at(self, place: str) -> Pair:
+        """Where a place is, in its body's axes, m."""
+        name, point = split(place)
+        return self.ground[point] if name == GROUND else self.body(name).points[point]
+
+    @property
+    def clearances(self) -> tuple[Clearance, ...]:
+        """The joints with clearance, in file order."""
+        return tuple(joint for joint in self.joints if isinstance(joint, Clearance))
+
+    @property
+    def ideal(self) -> tuple[Joint, ...]:
+        """The joints without."""
+        return tuple(joint for joint in self.joints if not isinstance(joint, Clearance))
+
+    @property
+    def period(self) -> Drive:
+        """The drive whose turn is the revolution."""
+        return next((drive for drive in self.drives if drive.period), self.drives[0])
+
+    def drive_of(self, body: str) -> Drive | None:
+        """What drives a body."""
+        return next((drive for drive in self.drives if drive.body == body), None)
+
+
+def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
+    """Which bodies hang together by joints of some kinds: sets of names, the ground's first."""
+    groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
+    for joint in mechanism.joints:
+        if isinstance(joint, kinds):
+            names = {split(place)[0] for place in joint.places}
+            touched = [group for group in groups if group & names]
+            groups = [group for group in groups if not group & names]
+            groups.append(set().union(*touched))
+    return sorted(groups, key=lambda group: GROUND not in group)
+
+
+def _records(m: Mechanism) -> Iterator[tuple[str, Any]]:
+    for table in ("bodies", "joints", "drives", "loads"):
+        for one in getattr(m, table):
+            yield f"{table}.{one.name}", one
+
+
+def _names(m: Mechanism) -> None:
+    seen: set[str] = set()
+    for key, one in _records(m):
+        if not _NAME.fullmatch(one.name) or one.name == GROUND:
+            raise InputError(
+                key, one.name, "is no name here", "Use letters, digits and _, and not 'ground'"
+            )
+        if key in seen:
+            raise InputError(key, one.name, "stands there twice", "Give each a name of its own")
+        seen.add(key)
+        if "center" in getattr(one, "points", ()):
+            raise InputError(
+                f"{key}.points.center", one.points["center"], "is the mass centre's name",
+                "Give the point another name",
+            )  # fmt: skip
+    if not m.bodies:
+        raise InputError("bodies", None, "there is no body", "Add [bodies.NAME] with its mass")
+
+
+def _places(m: Mechanism) -> None:
+    """Joints and loads act on bodies and points that there are."""
+    known = {GROUND: set(m.ground)} | {body.name: set(body.points) for body in m.bodies}
+    for key, one in _records(m):
+        for entry in ("journal", "bearing", "point", "line", "place", "first", "second"):
+            place = getattr(one, entry, None)
+            if place is None:
+                continue
+            body, point = split(place)
+            if body not in known:
+                reason, words = f"there is no body {body!r}", set(known)
+            elif point not in known[body]:
+                reason, words = f"the body {body!r} has no point {point!r}", known[body]
+            else:
+                continue
+            listed = ", ".join(sorted(words)) or "none yet"
+            raise InputError(f"{key}.{entry}", place, reason, f"Known are: {listed}")
+        acted_on = getattr(one, "body", None)
+        if acted_on is not None and acted_on not in known.keys() - {GROUND}:
+            raise InputError(
+                f"{key}.body", acted_on, "there is no such body to act on",
+                f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
+            )  # fmt: skip
+    for joint in m.joints:
+        first, second = (split(place)[0] for place in joint.places)
+        if first == second:
+            raise InputError(
+                f"joints.{joint.name}", first, "joins a body to itself", "Name two bodies"
+            )
+        if isinstance(joint, Fixed) and second != GROUND:
+            raise InputError(
+                f"joints.{joint.name}.line", joint.line, "a body is held on the ground only",
+                "Name a point of the ground, or make one body of the two",
+            )  # fmt: skip
+        if isinstance(joint, Slide) and first == GROUND:
+            raise InputError(
+                f"joints.{joint.name}.point", joint.point, "the ground does not slide",
+                "Swap point and line",
+            )  # fmt: skip
+
+
+def _numbers(m: Mechanism) -> None:
+    """Masses, inertias, clearances and the numbers of drives that have to be positive."""
+    turns = turning(m)
+    for body in m.bodies:
+        if not body.mass > 0:
+            raise InputError(
+                f"bodies.{body.name}.mass", body.mass, "a body that moves has a mass",
+                "Write its mass in kg",
+            )  # fmt: skip
+        if body.inertia < 0 or (body.inertia == 0 and body.name in turns):
+            raise InputError(
+                f"bodies.{body.name}.inertia", body.inertia, "a body that turns has an inertia",
+                "Write the moment of inertia about its mass centre in kg m2",
+            )  # fmt: skip
+    positive = {
+        Clearance: ("clearance", "bearing_radius", "stiffness"),
+        Harmonic: ("frequency",),
+        TableDrive: ("duration",),
+    }
+    for key, one in _records(m):
+        for entry in positive.get(type(one), ()):
+            if not getattr(one, entry) > 0:
+                raise InputError(
+                    f"{key}.{entry}", getattr(one, entry), "must be above 0", "Write its size"
+                )
+        for entry in ("speed", "initial_speed", "amplitude"):
+            if getattr(one, entry, 1.0) == 0:
+                raise InputError(
+                    f"{key}.{entry}", 0.0, "nothing would turn", "Write a speed or amplitude"
+                )
+    for joint in m.clearances:
+        if joint.clearance >= joint.bearing_radius:
+            raise InputError(
+                f"joints.{joint.name}.clearance", joint.clearance,
+                f"must be smaller than the bearing radius ({joint.bearing_radius:g} m)",
+                "Write the radial clearance R_B - R_J",
+            )  # fmt: skip
+
+
+def turning(m: Mechanism) -> set[str]:
+    """Names of bodies whose angle is neither prescribed nor that of the ground."""
+    held = {drive.body for drive in m.drives if drive.prescribed}
+    still: set[str] = set()
+    for group in joined(m, (Slide, Fixed)):
+        if GROUND in group or group & held:
+            still |= group
+    return {body.name for body in m.bodies} - still
+
+
+def _connected(m: Mechanism) -> None:
+    first, *rest = joined(m)
+    if rest:
+        name = next(body.name for body in m.bodies if body.name in rest[0])
+        others = sorted(rest[0] - {name})
+        alone = f" (nor are {', '.join(others)})" if others else ""
+        raise InputError(
+            f"bodies.{name}", name, f"no joints lead from it to the ground{alone}",
+            f"Add a joint to {' or '.join(sorted(first)[:4])}",
+        )  # fmt: skip
+
+
+def _drives(m: Mechanism) -> None:
+    if not m.drives:
+        raise InputError(
+            "drives", None, "nothing drives the mechanism",
+            'Add [drives.NAME] with a kind, say "constant-speed", and a body',
+        )  # fmt: skip
+    groups = joined(m, (Slide, Fixed))
+    driven: dict[int, str] = {}
+    for drive in m.drives:
+        group = next(k for k, names in enumerate(groups) if drive.body in names)
+        if GROUND in groups[group]:
+            raise InputError(
+                f"drives.{drive.name}.body", drive.body, "this body cannot turn, its guide holds it",
+                "Drive a body on a pin",
+            )  # fmt: skip
+        if group in driven:
+            raise InputError(
+                f"drives.{drive.name}.body", drive.body,
+                f"its angle is driven by {driven[group]!r} already", "Remove one of them",
+            )  # fmt: skip
+        driven[group] = drive.name
+    _one_period(m)
+
+
+def _one_period(m: Mechanism) -> None:
+    """One drive's turn is the revolution; what the others prescribe has to repeat within it."""
+    named = [drive for drive in m.drives if drive.period]
+    if len(named) > 1:
+        raise InputError(
+            f"drives.{named[1].name}.period", True, f"{named[0].name!r} gives the period already",
+            "Leave period = true with one drive",
+        )  # fmt: skip
+    main = m.period
+    for drive in m.drives:
+        if drive is main or not (drive.prescribed and main.prescribed):
+            continue
+        times = main.seconds / drive.seconds
+        if abs(times - round(times)) > 1e-9 * times or round(times) < 1:
+            raise InputError(
+                f"drives.{drive.name}", drive.seconds,
+                f"does not repeat within the period of {main.name!r} ({main.seconds:g} s)",
+                "Make the longest one the period, and the others whole parts of it",
+            )  # fmt: skip
+
+
+def freedom(m: Mechanism) -> int:
+    """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
+    taken = {Revolute: 2, Slide: 2, Fixed: 3, Clearance: 0}
+    ideal = sum(taken[type(joint)] for joint in m.joints)
+    return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
+
+
+def _sizes(m: Mechanism) -> None:
+    free = freedom(m)
+    if free < 0:
+        last = m.ideal[-1].name if m.ideal else m.drives[-1].name
+        raise InputError(
+            f"joints.{last}", -free, "more is held than can move: ideal joints and drives take away "
+            f"{-free} too many degrees of freedom",
+            "Give a joint clearance, remove one, or remove a drive",
+        )  # fmt: skip
+    if free > MOST_COORDINATES:
+        raise InputError(
+            "bodies", free, f"more than {MOST_COORDINATES} degrees of freedom", "Use ideal joints"
+        )
+    if len(m.clearances) > MOST_CLEARANCES:
+        raise InputError(
+            "joints", len(m.clearances), f"more than {MOST_CLEARANCES} joints with clearance",
+            "Make some of them ideal",
+        )  # fmt: skip

@@ -1,0 +1,111 @@
+"""The numbers of a mechanism by the names that generated texts use: base parameters, and derived ones from their texts."""
+
+import math
+from typing import Any
+
+from hpcclear.dynamics.linkage.generator import Motion
+from hpcclear.dynamics.linkage.kinematics import CENTER
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import (
+    ConstantSpeed,
+    Force,
+    Harmonic,
+    Slide,
+    Spring,
+    Torque,
+    TorqueDrive,
+    split,
+)
+from hpcclear.dynamics.linkage.trees import Forest, forest
+
+
+def values(
+    mechanism: Mechanism, cartesian: bool = False, *, gravity: float = 0.0,
+    feedback: tuple[float, float] = (0.0, 0.0),
+) -> dict[str, Any]:  # fmt: skip
+    """Base parameters by name, SI; `feedback`: alpha and beta in 1/s (paper eq. 11)."""
+    trees = forest(mechanism, cartesian)
+    alpha, beta = feedback
+    found: dict[str, Any] = {"gravity": gravity, "alpha2": 2.0 * alpha, "beta2": beta * beta}
+    for name, (x, y) in mechanism.ground.items():
+        found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
+    _bodies(trees, found)
+    for joint in mechanism.joints:
+        if isinstance(joint, Slide):
+            angle = trees.offsets[split(joint.line)[0]] + joint.angle
+            found |= {f"{joint.name}_cos": math.cos(angle), f"{joint.name}_sin": math.sin(angle)}
+            if joint.friction is not None:
+                found[f"{joint.name}_coefficient"] = joint.friction.coefficient
+                found[f"{joint.name}_inverse_ramp"] = 1.0 / joint.friction.ramp_speed
+    _outside(trees, found)
+    return found
+
+
+def _bodies(trees: Forest, found: dict[str, Any]) -> None:
+    mechanism = trees.mechanism
+    for body in mechanism.bodies:
+        drive = mechanism.drive_of(body.name)
+        inertia = body.inertia + (drive.inertia if isinstance(drive, TorqueDrive) else 0.0)
+        if inertia == 0.0:
+            inertia = 1.0  # it does not turn
+        places = {**body.points, CENTER: body.center}
+        for a, (ax, ay) in places.items():
+            for b, (bx, by) in places.items():
+                found |= {f"{body.name}_{a}_{b}_x": bx - ax, f"{body.name}_{a}_{b}_y": by - ay}
+        angle = trees.offsets[body.name]
+        found |= {
+            f"{body.name}_mass": body.mass,
+            f"{body.name}_inverse_mass": 1.0 / body.mass,
+            f"{body.name}_inertia": inertia,
+            f"{body.name}_inverse_inertia": 1.0 / inertia,
+            f"{body.name}_offset_cos": math.cos(angle),
+            f"{body.name}_offset_sin": math.sin(angle),
+        }
+        if trees.on_ground(body.name):
+            own = body.points[split(trees.hangs[body.name].own)[1]]
+            x, y = body.center[0] - own[0], body.center[1] - own[1]
+            pivoted = inertia + body.mass * (x * x + y * y)
+            found |= {
+                f"{body.name}_pivot_inertia": pivoted,
+                f"{body.name}_pivot_inverse_inertia": 1.0 / pivoted,
+                f"{body.name}_moment_x": body.mass * x,
+                f"{body.name}_moment_y": body.mass * y,
+            }
+
+
+def _outside(trees: Forest, found: dict[str, Any]) -> None:
+    """Drives and loads."""
+    for drive in trees.mechanism.drives:
+        frame = trees.frames[drive.body]
+        start = trees.mechanism.body(drive.body).start_angle - trees.offsets[drive.body]
+        found |= {f"{frame}_start": start, f"{drive.name}_drive_start": start}
+        match drive:
+            case ConstantSpeed():
+                found[f"{drive.name}_speed"] = drive.speed
+            case Harmonic():
+                found[f"{drive.name}_mean"] = drive.mean - trees.offsets[drive.body]
+                found[f"{drive.name}_amplitude"] = drive.amplitude
+                found[f"{drive.name}_rate"] = 2 * math.pi * drive.frequency
+                found[f"{drive.name}_phase"] = drive.phase
+            case TorqueDrive():
+                found[f"{drive.name}_torque"] = drive.torque
+    for load in trees.mechanism.loads:
+        match load:
+            case Force():
+                found[f"{load.name}_force_x"], found[f"{load.name}_force_y"] = load.force
+            case Torque():
+                found[f"{load.name}_torque"] = load.torque
+            case Spring():
+                found[f"{load.name}_stiffness"] = load.stiffness
+                found[f"{load.name}_damping"] = load.damping
+                found[f"{load.name}_length"] = load.length
+
+
+def row_of(motion: Motion, base: dict[str, Any]) -> dict[int, Any]:
+    """Values by row of `par`: base parameters as they are, derived ones worked out from their texts."""
+    found = {}
+    for name, row in motion.parameters.items():
+        text = motion.derived.get(name)
+        # the text is the generator's own arithmetic of names
+        found[row] = base[name] if text is None else eval(text, {"__builtins__": {}}, base)
+    return found

@@ -1,0 +1,212 @@
+"""What a planar mechanism is made of: bodies, joints, drives and loads, each a frozen record in SI units.
+
+A place is ``"body.point"``; the ground is the body ``ground``. Points and centres are given in the body's own axes,
+angles count counter-clockwise.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+GROUND = "ground"
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: mass in kg, inertia about its mass centre in kg m2, centre and points in its own axes in m.
+
+    `start_angle` (rad) is a rough one: the assembly starts from it. A body that cannot turn needs no inertia.
+    """
+
+    name: str
+    mass: float
+    inertia: float = 0.0
+    center: Pair = (0.0, 0.0)
+    points: Mapping[str, Pair] = field(default_factory=dict)
+    start_angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class Revolute:
+    """A pin without play between two places."""
+
+    name: str
+    journal: str
+    bearing: str
+
+    @property
+    def places(self) -> tuple[str, str]:
+        """Both places: journal, bearing."""
+        return self.journal, self.bearing
+
+
+@dataclass(frozen=True)
+class Clearance(Revolute):
+    """A journal that moves freely in a bearing larger than itself by the clearance, m."""
+
+    clearance: float = 0.0
+    bearing_radius: float = 0.0
+    stiffness: float = 0.0
+    start_eccentricity: Pair = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class GuideFriction:
+    """Friction of a guide over its reaction, and the sliding speed (m/s) below which it falls linearly to 0."""
+
+    coefficient: float
+    ramp_speed: float
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A guide: the point moves along a line of the ground or of another body, its body keeping its x axis along the line.
+
+    `line` is a place on the carrier; `angle` the line's direction in the carrier's axes, rad.
+    """
+
+    name: str
+    point: str
+    line: str
+    angle: float = 0.0
+    friction: GuideFriction | None = None
+
+    @property
+    def places(self) -> tuple[str, str]:
+        """Both places: of the body that slides, of the one that carries the line."""
+        return self.point, self.line
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A body held on the ground, its x axis at an angle (rad) to the ground's."""
+
+    name: str
+    point: str
+    line: str
+    angle: float = 0.0
+
+    @property
+    def places(self) -> tuple[str, str]:
+        """Both places: of the body, of the ground."""
+        return self.point, self.line
+
+
+Joint = Revolute | Clearance | Slide | Fixed
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """The body's angle is prescribed: it turns at a constant speed, rad/s."""
+
+    name: str
+    body: str
+    speed: float
+    period: bool = False
+    prescribed: ClassVar[bool] = True
+
+    @property
+    def seconds(self) -> float:
+        """One turn, s."""
+        return 2 * math.pi / abs(self.speed)
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """The body's angle is ``mean + amplitude sin(2 pi frequency t + phase)``; rad and 1/s."""
+
+    name: str
+    body: str
+    amplitude: float
+    frequency: float
+    mean: float = 0.0
+    phase: float = 0.0
+    period: bool = False
+    prescribed: ClassVar[bool] = True
+
+    @property
+    def seconds(self) -> float:
+        """One swing to and fro, s."""
+        return 1 / self.frequency
+
+
+@dataclass(frozen=True)
+class TableDrive:
+    """The body's angle (rad) is tabulated over `duration` (s) and repeats: pairs (time, angle)."""
+
+    name: str
+    body: str
+    rows: tuple[Pair, ...]
+    duration: float
+    period: bool = False
+    prescribed: ClassVar[bool] = True
+
+    @property
+    def seconds(self) -> float:
+        """One pass of the table, s."""
+        return self.duration
+
+
+@dataclass(frozen=True)
+class TorqueDrive:
+    """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle."""
+
+    name: str
+    body: str
+    torque: float
+    initial_speed: float
+    inertia: float = 0.0
+    table: bool = False
+    period: bool = False
+    prescribed: ClassVar[bool] = False
+
+    @property
+    def seconds(self) -> float:
+        """One turn at the initial speed, s."""
+        return 2 * math.pi / abs(self.initial_speed)
+
+
+Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
+
+
+@dataclass(frozen=True)
+class Force:
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the period's body's turn."""
+
+    name: str
+    place: str
+    force: Pair
+    table: bool = False
+
+
+@dataclass(frozen=True)
+class Torque:
+    """A torque on a body, N m; `table` as of a force."""
+
+    name: str
+    body: str
+    torque: float
+    table: bool = False
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring (N/m, free length in m) and damper (N s/m) between two places."""
+
+    name: str
+    first: str
+    second: str
+    stiffness: float
+    length: float = 0.0
+    damping: float = 0.0
+
+
+Load = Force | Torque | Spring
+
+
+def split(place: str) -> tuple[str, str]:
+    """Body and point of a place."""
+    body, _, point = place.partition(".")
+    return body, point

@@ -1,0 +1,161 @@
+"""Where a mechanism is cut: trees of ideal joints, their coordinates and frames, and the joints that close loops.
+
+A joint with clearance is a force, so it is cut. What is left is a forest: its trees hang on the ground or on a free body
+(x, y of the mass centre). Angles are absolute: a frame is an angle that one body has, or several whose guides keep them
+parallel. Guides enter the trees before pins, so that what closes a loop is a pin where that can be had. In Cartesian
+coordinates every body is free, and every ideal joint and prescribed angle is a constraint (the paper's eq. 11).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import GROUND, Drive, Fixed, Joint, Revolute, Slide, split
+
+
+class Coordinate(NamedTuple):
+    """One coordinate: "x" or "y" of a free body's mass centre, "angle" of a frame, "slide" along a guide."""
+
+    kind: str
+    body: str
+    joint: str = ""
+
+    @property
+    def name(self) -> str:
+        """A name for the text."""
+        return f"{self.kind}_{self.body}"
+
+
+class Hang(NamedTuple):
+    """How a body hangs in its tree: by a joint, from a place of its parent, at a place of its own; free without joint."""
+
+    joint: Joint | None
+    parent: str = ""
+    own: str = ""
+
+
+@dataclass(frozen=True)
+class Forest:
+    """Trees, coordinates and frames of a mechanism.
+
+    Attributes
+    ----------
+    hangs : dict
+        How each body hangs, parents before children.
+    frames : dict
+        Which body's angle each body has, or the ground's.
+    offsets : dict
+        By how much each body is turned against its frame, rad.
+    coordinates : tuple of Coordinate
+        In the bodies' order; the angle of the body that the period's drive turns comes last.
+    prescribed : dict
+        Drives by frame, where the angle is given.
+    closures : tuple of Joint or Drive
+        What is left as a constraint.
+    """
+
+    mechanism: Mechanism
+    hangs: dict[str, Hang]
+    frames: dict[str, str]
+    offsets: dict[str, float]
+    coordinates: tuple[Coordinate, ...]
+    prescribed: dict[str, Drive]
+    closures: tuple[Joint | Drive, ...]
+
+    def index(self, kind: str, body: str) -> int | None:
+        """Which coordinate it is, if it is one."""
+        for k, one in enumerate(self.coordinates):
+            if one.kind == kind and one.body == body:
+                return k
+        return None
+
+    def turning(self, frame: str) -> bool:
+        """Whether a frame ever turns."""
+        return frame in self.prescribed or self.index("angle", frame) is not None
+
+    def on_ground(self, body: str) -> bool:
+        """Whether a body hangs on a pin of the ground."""
+        hang = self.hangs[body]
+        return isinstance(hang.joint, Revolute) and split(hang.parent)[0] == GROUND
+
+
+def forest(mechanism: Mechanism, cartesian: bool = False) -> Forest:
+    """Cut a mechanism into trees; `cartesian`: into single bodies."""
+    edges, closures = ([], list(mechanism.ideal)) if cartesian else _spanning(mechanism)
+    if cartesian:
+        edges = [joint for joint in closures if isinstance(joint, Fixed)]
+        closures = [joint for joint in closures if not isinstance(joint, Fixed)]
+    hangs = _hung(mechanism, edges)
+    frames, offsets = _frames(mechanism, hangs)
+    prescribed = {frames[d.body]: d for d in mechanism.drives if d.prescribed and not cartesian}
+    ends = [d for d in mechanism.drives if d.prescribed] if cartesian else []
+    return Forest(
+        mechanism, hangs, frames, offsets, _coordinates(mechanism, hangs, frames, prescribed),
+        prescribed, (*closures, *ends),
+    )  # fmt: skip
+
+
+def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
+    """Ideal joints of the trees, and those that close loops."""
+    group = {name: name for name in (GROUND, *(body.name for body in m.bodies))}
+    edges: list[Joint] = []
+    closures: list[Joint] = []
+    order = {Fixed: 0, Slide: 1, Revolute: 2}
+    for joint in sorted(m.ideal, key=lambda joint: order[type(joint)]):
+        one, two = (group[split(place)[0]] for place in joint.places)
+        if one == two:
+            closures.append(joint)
+            continue
+        edges.append(joint)
+        group = {name: one if held == two else held for name, held in group.items()}
+    return edges, closures
+
+
+def _hung(m: Mechanism, edges: list[Joint]) -> dict[str, Hang]:
+    """How each body hangs; the ground is the first root, then the first body of each tree without it."""
+    hangs: dict[str, Hang] = {}
+    for root in (GROUND, *(body.name for body in m.bodies)):
+        if root in hangs:
+            continue
+        if root != GROUND:
+            hangs[root] = Hang(None)
+        waiting = [root]
+        while waiting:
+            here = waiting.pop(0)
+            for joint in edges:
+                first, second = joint.places
+                for own, parent in ((first, second), (second, first)):
+                    body = split(own)[0]
+                    if split(parent)[0] == here and body not in hangs and body != GROUND:
+                        hangs[body] = Hang(joint, parent, own)
+                        waiting.append(body)
+    return hangs
+
+
+def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[str, float]]:
+    """Whose angle each body has, and by how much it is turned against that frame, rad."""
+    frames, offsets = {GROUND: GROUND}, {GROUND: 0.0}
+    for body, hang in hangs.items():
+        parent = split(hang.parent)[0]
+        if isinstance(hang.joint, (Slide, Fixed)):
+            turned = hang.joint.angle if hang.own == hang.joint.point else -hang.joint.angle
+            frames[body], offsets[body] = frames[parent], offsets[parent] + turned
+        else:
+            frames[body], offsets[body] = body, 0.0
+    return frames, offsets
+
+
+def _coordinates(
+    m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, Drive]
+) -> tuple[Coordinate, ...]:
+    found: list[Coordinate] = []
+    for body in m.bodies:
+        joint = hangs[body.name].joint
+        if joint is None:
+            found += [Coordinate("x", body.name), Coordinate("y", body.name)]
+        if frames[body.name] == body.name and body.name not in prescribed:
+            found.append(Coordinate("angle", body.name))
+        if isinstance(joint, Slide):
+            found.append(Coordinate("slide", body.name, joint.name))
+    main = Coordinate("angle", frames[m.period.body])
+    return (*(c for c in found if c != main), *(c for c in found if c == main))

@@ -1,0 +1,281 @@
+"""Any planar linkage by the textbook, for comparison with generated motions: three coordinates a body, dense matrices.
+
+Shares no formula with the package: constraints are functions of the coordinates, differentiated by Taylor arithmetic;
+forces act at points given in the plane; one dense system gives accelerations and multipliers. `Dense` reads the
+mechanism's data only.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hpcclear.dynamics.linkage import parts as m
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+
+
+class Jet:
+    """Value, first and second derivative along one direction."""
+
+    def __init__(self, *parts):
+        self.parts = (*parts, 0.0, 0.0)[:3]
+
+    def __add__(self, other):
+        other = other if isinstance(other, Jet) else Jet(other)
+        return Jet(*(a + b for a, b in zip(self.parts, other.parts, strict=True)))
+
+    def __mul__(self, other):
+        (a, da, dda), (b, db, ddb) = (
+            self.parts,
+            (other if isinstance(other, Jet) else Jet(other)).parts,
+        )
+        return Jet(a * b, da * b + a * db, dda * b + 2 * da * db + a * ddb)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self):
+        return self * -1.0
+
+    def __sub__(self, other):
+        return self + (-other)
+
+    def __rsub__(self, other):
+        return (-self) + other
+
+
+def sine(x, shift=0.0):
+    if not isinstance(x, Jet):
+        return math.sin(x + shift)
+    a, d, dd = x.parts
+    s, c = math.sin(a + shift), math.cos(a + shift)
+    return Jet(s, c * d, c * dd - s * d * d)
+
+
+def turned(vector, angle):
+    c, s = sine(angle, math.pi / 2), sine(angle)
+    return [vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c]
+
+
+@dataclass
+class Contact:
+    """Laws of one joint with clearance."""
+
+    factor: Any  # 1 + damping as a function of the penetration rate
+    friction: Any  # friction over normal force as a function of the sliding speed
+    active: float = 1.0
+
+
+@dataclass
+class Dense:
+    """Bodies, constraints and forces of a mechanism."""
+
+    mechanism: Mechanism
+    contacts: list = field(default_factory=list)
+    gravity: float = 0.0
+    alpha: float = 0.0
+    beta: float = 0.0
+    curve: float = 1.0  # what tables of loads and torques say
+    seen: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        self.first = {body.name: 3 * k for k, body in enumerate(self.mechanism.bodies)}
+        self.n = 3 * len(self.first)
+
+    def place(self, q, place):
+        name, point = m.split(place)
+        if name == m.GROUND:
+            return list(self.mechanism.ground[point])
+        body, k = self.mechanism.body(name), self.first[name]
+        arm = np.subtract(body.points[point], body.center)
+        x, y = turned(arm, q[k + 2])
+        return [q[k] + x, q[k + 1] + y]
+
+    def angle(self, q, place):
+        name = m.split(place)[0]
+        return 0.0 if name == m.GROUND else q[self.first[name] + 2]
+
+    def driven(self, drive, t):
+        if isinstance(drive, m.ConstantSpeed):
+            return self.mechanism.body(drive.body).start_angle + drive.speed * t
+        return drive.mean + drive.amplitude * sine(2 * math.pi * drive.frequency * t + drive.phase)
+
+    def constraints(self, q, t):
+        """Rows by name: x and y of a pin; across and angle of a guide; the angle of a drive."""
+        rows = {}
+        for joint in self.mechanism.ideal:
+            (x, y), (bx, by) = (self.place(q, place) for place in joint.places)
+            if isinstance(joint, m.Revolute):
+                rows |= {(joint.name, "x"): x - bx, (joint.name, "y"): y - by}
+                continue
+            tilt = self.angle(q, joint.line) + joint.angle
+            dx, dy = turned((1.0, 0.0), tilt)
+            rows[joint.name, "across"] = dx * (y - by) - dy * (x - bx)
+            rows[joint.name, "angle"] = self.angle(q, joint.point) - tilt
+            if isinstance(joint, m.Fixed):
+                rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
+        for drive in self.mechanism.drives:
+            if drive.prescribed:
+                rows[drive.name, "drive"] = q[self.first[drive.body] + 2] - self.driven(drive, t)
+        return rows
+
+    def along(self, q, v, t, rate=1.0):
+        """Constraints, first and second derivatives along v, time running at a rate: each (rows,)."""
+        jets = [Jet(a, b) for a, b in zip(q, v, strict=True)]
+        rows = self.constraints(jets, Jet(t, rate)).values()
+        parts = [row.parts if isinstance(row, Jet) else (row, 0.0, 0.0) for row in rows]
+        return np.array(parts).reshape(-1, 3).T
+
+    def jacobian(self, q, t):
+        return np.array([self.along(q, e, t, 0.0)[1] for e in np.eye(self.n)]).T
+
+    def motion_of(self, q, v, place):
+        """Position and velocity of a place, and the Jacobian of its position."""
+        name = m.split(place)[0]
+        here = np.array(self.place(q, place), float)
+        J = np.zeros((2, self.n))
+        if name != m.GROUND:
+            k = self.first[name]
+            J[0, k] = J[1, k + 1] = 1.0
+            J[:, k + 2] = -(here[1] - q[k + 1]), here[0] - q[k]
+        return here, J @ v, J
+
+    def point_on(self, q, name, where):
+        """Jacobian of the point of a body that is at `where` now."""
+        J = np.zeros((2, self.n))
+        if name != m.GROUND:
+            k = self.first[name]
+            J[0, k] = J[1, k + 1] = 1.0
+            J[:, k + 2] = -(where[1] - q[k + 1]), where[0] - q[k]
+        return J
+
+    def contact(self, joint, laws, q, v):
+        """Generalised forces of one contact."""
+        centre_j, speed_j, _ = self.motion_of(q, v, joint.journal)
+        centre_b, speed_b, _ = self.motion_of(q, v, joint.bearing)
+        e = centre_j - centre_b
+        distance = np.linalg.norm(e)
+        n = e / distance
+        t = np.array([-n[1], n[0]])
+        gap = distance - joint.clearance
+        depth = max(gap, 0.0)
+        where = centre_b + (joint.bearing_radius + depth / 2) * n
+        on_j, on_b = (
+            self.point_on(q, m.split(place)[0], where) for place in (joint.journal, joint.bearing)
+        )
+        rate = (speed_j - speed_b) @ n
+        sliding = t @ (on_j - on_b) @ v
+        elastic = laws.active * joint.stiffness * depth**1.5
+        normal = max(elastic * laws.factor(rate), 0.0)
+        tangential = normal * laws.friction(sliding)
+        force = normal * n + tangential * t  # on the bearing
+        loss = (normal - elastic) * rate + tangential * sliding
+        self.seen[joint.name] = {
+            "gap": gap, "normal": normal, "rate": rate, "loss": loss, "elastic": elastic * rate,
+        }  # fmt: skip
+        return (on_b - on_j).T @ force
+
+    def loads(self, q, v):
+        Q, power = np.zeros(self.n), 0.0
+        for load in self.mechanism.loads:
+            own = np.zeros(self.n)
+            if isinstance(load, m.Force):
+                own = self.motion_of(q, v, load.place)[2].T @ np.array(load.force)
+            elif isinstance(load, m.Torque):
+                own[self.first[load.body] + 2] = load.torque
+            else:
+                (a, va, Ja), (b, vb, Jb) = (
+                    self.motion_of(q, v, place) for place in (load.first, load.second)
+                )
+                length = np.linalg.norm(a - b)
+                n = (a - b) / length
+                pull = load.stiffness * (length - load.length) + load.damping * (va - vb) @ n
+                own = (Jb - Ja).T @ (n * pull)
+            if getattr(load, "table", False):
+                own = own * self.curve
+            Q, power = Q + own, power + own @ v
+        self.seen["load_power"] = power
+        return Q
+
+    def masses(self):
+        """Diagonal of the mass matrix; what cannot turn may have any inertia."""
+        found = np.zeros(self.n)
+        for body in self.mechanism.bodies:
+            drive = self.mechanism.drive_of(body.name)
+            k = self.first[body.name]
+            found[k : k + 2] = body.mass
+            found[k + 2] = (body.inertia or 0.7) + getattr(drive, "inertia", 0.0)
+        return found
+
+    def accelerations(self, q, v, t=0.0):
+        """Accelerations; forces, powers and multipliers stay in `seen`."""
+        M, self.seen = np.diag(self.masses()), {}
+        Q = self.loads(q, v)
+        Q[1::3] -= self.masses()[1::3] * self.gravity
+        for drive in self.mechanism.drives:
+            if not drive.prescribed:
+                Q[self.first[drive.body] + 2] += drive.torque * (self.curve if drive.table else 1.0)
+        for joint, laws in zip(self.mechanism.clearances, self.contacts, strict=True):
+            Q += self.contact(joint, laws, q, v)
+        J = self.jacobian(q, t)
+        c, dc, turning = self.along(q, v, t)
+        right = -turning - 2 * self.alpha * dc - self.beta**2 * c
+        names = list(self.constraints(q, t))
+        guides = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
+        for signs in itertools.product((1.0, -1.0), repeat=len(guides)):
+            K = np.block([[M, -J.T], [J, np.zeros((len(c), len(c)))]])
+            loss, ok = 0.0, True
+            rubbing = []
+            for joint, sign in zip(guides, signs, strict=True):
+                tilt = self.angle(q, joint.line) + joint.angle
+                d = np.array(turned((1.0, 0.0), tilt))
+                where = np.array(self.place(q, joint.point), float)
+                on, under = (self.point_on(q, m.split(p)[0], where) for p in joint.places)
+                influence = d @ (on - under)
+                speed = influence @ v
+                x = speed / joint.friction.ramp_speed
+                ratio = joint.friction.coefficient * min(max(x, -1.0), 1.0)
+                k = self.n + names.index((joint.name, "across"))
+                K[: self.n, k] += sign * ratio * influence
+                rubbing.append((k, sign, ratio * speed))
+            solution = np.linalg.solve(K, np.concatenate([Q, right]))
+            ok = all(sign * solution[k] >= 0.0 for k, sign, _ in rubbing)
+            loss = sum(power * abs(solution[k]) for k, _, power in rubbing)
+            if ok:
+                break
+        assert ok
+        self.seen["multipliers"] = dict(zip(names, solution[self.n :], strict=True))
+        self.seen["guide_loss"] = loss
+        return solution[: self.n]
+
+
+def assembled(dense, guess, t, eccentricities):
+    """Coordinates near a guess that meet the constraints and put journals where they are asked to be."""
+    q = np.array(guess, float)
+    clear = dense.mechanism.clearances
+    for _ in range(60):
+        c = dense.along(q, np.zeros(dense.n), t)[0] if dense.constraints(q, t) else np.zeros(0)
+        J = dense.jacobian(q, t).reshape(-1, dense.n)
+        rows, jacobians = [c], [J]
+        for joint, e in zip(clear, eccentricities, strict=True):
+            (a, _, Ja), (b, _, Jb) = (
+                dense.motion_of(q, np.zeros(dense.n), place) for place in joint.places
+            )
+            rows.append(a - b - e)
+            jacobians.append(Ja - Jb)
+        c = np.concatenate(rows)
+        if np.abs(c).max() < 1e-15:
+            break
+        q = q - np.linalg.lstsq(np.vstack(jacobians), c, rcond=None)[0]
+    assert np.abs(c).max() < 1e-12, np.abs(c).max()
+    return q
+
+
+def admissible(dense, q, wanted, t):
+    """Velocities closest to `wanted` that the constraints allow."""
+    J = dense.jacobian(q, t).reshape(-1, dense.n)
+    if not len(J):
+        return wanted
+    given = -dense.along(q, np.zeros(dense.n), t)[1]
+    return wanted - np.linalg.lstsq(J, J @ wanted - given, rcond=None)[0]

@@ -1,0 +1,258 @@
+"""Twenty linkages for the tests, as data: engines, four-bars, presses, a shaper, parallel robots."""
+
+import math
+
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import (
+    Body,
+    Clearance,
+    ConstantSpeed,
+    Fixed,
+    Force,
+    GuideFriction,
+    Harmonic,
+    Revolute,
+    Slide,
+    Spring,
+    Torque,
+    TorqueDrive,
+)
+
+MOTOR = ConstantSpeed("motor", "crank", 40.0)
+ENGINE = TorqueDrive("engine", "crank", torque=3.0, initial_speed=40.0, inertia=2e-3)
+
+
+def bar(name, length, mass, start=0.0, *, off=0.0, **points):
+    """A bar from a to b with further points, its mass centre a little off the line if asked to."""
+    given = {"a": (0.0, 0.0), "b": (length, 0.0), **points}
+    return Body(name, mass, mass * length**2 / 10, (0.45 * length, off), given, start)
+
+
+def pin(name, journal, bearing, *, open_pins=()):
+    """A pin, with clearance if it is named among the open ones."""
+    if name in open_pins:
+        return Clearance(name, journal, bearing, 2e-4, 0.01, 2e9)
+    return Revolute(name, journal, bearing)
+
+
+def pins(open_pins, *rows):
+    return tuple(pin(*row, open_pins=open_pins) for row in rows)
+
+
+def slider_crank(*open_pins, drive=MOTOR, tilt=0.0, offset=0.0, friction=None, off=0.0, loads=()):
+    turn = tilt
+    bodies = (
+        bar("crank", 0.05, 0.3, turn + 0.3, off=off),
+        bar("rod", 0.12, 0.21, turn - 0.1, off=off),
+        Body("slider", 0.14, points={"pin": (0.0, 0.0), "top": (0.03, 0.01)}, start_angle=turn),
+    )
+    shift = (-offset * math.sin(turn), offset * math.cos(turn))
+    return Mechanism(
+        bodies,
+        (
+            Slide("guide", "slider.pin", "ground.line", tilt, friction),
+            *pins(
+                open_pins,
+                ("o14", "crank.a", "ground.o"),
+                ("o12", "crank.b", "rod.a"),
+                ("o23", "slider.pin", "rod.b"),
+            ),
+        ),
+        (drive,),
+        {"o": (0.0, 0.0), "line": shift},
+        loads,
+    )
+
+
+def four_bar(*open_pins, drive=MOTOR, off=0.0, loads=()):
+    bodies = (
+        bar("crank", 0.04, 0.2, 0.4, off=off),
+        bar("coupler", 0.12, 0.3, 0.5, off=off, tip=(0.06, 0.05)),
+        bar("rocker", 0.08, 0.25, 1.6, off=off),
+    )
+    rows = (
+        ("o1", "crank.a", "ground.o"),
+        ("o2", "crank.b", "coupler.a"),
+        ("o3", "coupler.b", "rocker.b"),
+        ("o4", "rocker.a", "ground.p"),
+    )
+    return Mechanism(
+        bodies, pins(open_pins, *rows), (drive,), {"o": (0.0, 0.0), "p": (0.13, 0.01)}, loads
+    )
+
+
+def v_twin(*open_pins, drive=MOTOR, friction=None):
+    bank = math.radians(35)
+    bodies = [bar("crank", 0.04, 0.8, 1.3)]
+    joints = [pin("main", "crank.a", "ground.o")]
+    loads = []
+    for side, tilt in (("left", math.pi / 2 + bank), ("right", math.pi / 2 - bank)):
+        lean = 0.2 if side == "left" else -0.2
+        bodies += [
+            bar(f"rod_{side}", 0.13, 0.3, tilt + lean),
+            Body(f"piston_{side}", 0.4, points={"pin": (0.0, 0.0)}, start_angle=tilt),
+        ]
+        joints += [
+            Slide(f"bore_{side}", f"piston_{side}.pin", "ground.o", tilt, friction),
+            pin(f"big_{side}", "crank.b", f"rod_{side}.a", open_pins=open_pins),
+            pin(f"small_{side}", f"piston_{side}.pin", f"rod_{side}.b", open_pins=open_pins),
+        ]
+        gas = (-90 * math.cos(tilt), -90 * math.sin(tilt))
+        loads.append(Force(f"gas_{side}", f"piston_{side}.pin", gas, table=True))
+    return Mechanism(tuple(bodies), tuple(joints), (drive,), loads=tuple(loads))
+
+
+def six_bar(*open_pins, friction=None):
+    """A crank-rocker whose rocker drives a ram."""
+    base = four_bar(*open_pins)
+    bodies = (
+        *base.bodies,
+        bar("link", 0.15, 0.2, math.pi / 2 - 0.1),
+        Body("ram", 1.5, points={"pin": (0.0, 0.0)}, start_angle=math.pi / 2),
+    )
+    joints = (
+        *base.joints,
+        Slide("bed", "ram.pin", "ground.bed", math.pi / 2, friction),
+        *pins(open_pins, ("o5", "rocker.b", "link.a"), ("o6", "ram.pin", "link.b")),
+    )
+    loads = (Force("work", "ram.pin", (0.0, -200.0)),)
+    return Mechanism(bodies, joints, base.drives, {**base.ground, "bed": (0.13, 0.0)}, loads)
+
+
+def quick_return(*open_pins, friction=None):
+    """Crank, block on a rocking lever, and the lever's pin on the ground."""
+    bodies = (
+        bar("crank", 0.05, 0.3, 0.4),
+        Body("block", 0.1, 2e-5, points={"pin": (0.0, 0.0), "edge": (0.01, 0.004)}),
+        bar("lever", 0.25, 0.6, 1.1, top=(0.25, 0.02)),
+    )
+    joints = (
+        *pins(
+            open_pins,
+            ("o1", "crank.a", "ground.o"),
+            ("o2", "crank.b", "block.pin"),
+            ("o3", "lever.a", "ground.p"),
+        ),
+        Slide("slot", "block.pin", "lever.a", 0.0, friction),
+    )
+    loads = (Spring("return_spring", "lever.top", "ground.o", 300.0, 0.1, 2.0),)
+    return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.0, -0.1)}, loads)
+
+
+def three_rrr(*open_pins):
+    """A platform on three legs, each with a harmonic drive."""
+    radius, corner = 0.25, 0.08
+    bodies = [
+        Body(
+            "platform", 1.0, 4e-3, (0.0, 0.0),
+            {f"p{k}": (corner * math.cos(2.1 * k), corner * math.sin(2.1 * k)) for k in range(3)},
+        )
+    ]  # fmt: skip
+    joints, drives, ground = [], [], {}
+    for k in range(3):
+        angle = 2.1 * k
+        ground[f"g{k}"] = (radius * math.cos(angle), radius * math.sin(angle))
+        bodies += [
+            bar(f"arm{k}", 0.12, 0.2, angle + 2.2),
+            bar(f"leg{k}", 0.14, 0.15, angle + 3.9),
+        ]
+        joints += pins(
+            open_pins,
+            (f"base{k}", f"arm{k}.a", f"ground.g{k}"),
+            (f"knee{k}", f"arm{k}.b", f"leg{k}.a"),
+            (f"tip{k}", f"leg{k}.b", f"platform.p{k}"),
+        )
+        drives.append(
+            Harmonic(f"servo{k}", f"arm{k}", 0.2, 2.0 * (1 + k % 2), angle + 2.2, 0.4 * k, k == 0)
+        )
+    return Mechanism(tuple(bodies), tuple(joints), tuple(drives), ground)
+
+
+def pendulum_chain():
+    """Three bars in a row, the first driven by a torque, the last held by a spring."""
+    bodies = tuple(
+        bar(name, 0.1, 0.2, 0.3 * k, off=0.004) for k, name in enumerate(("crank", "two", "three"))
+    )
+    joints = pins(
+        (), ("o1", "crank.a", "ground.o"), ("o2", "two.a", "crank.b"), ("o3", "three.a", "two.b")
+    )
+    loads = (Spring("band", "three.b", "ground.q", 50.0, 0.05, 0.3), Torque("brake", "two", -0.4))
+    return Mechanism(bodies, joints, (ENGINE,), {"o": (0.0, 0.0), "q": (0.2, 0.2)}, loads)
+
+
+def two_stage(*open_pins):
+    """A guide on a moving carriage, which a crank pushes along the ground: guides in a row."""
+    base = slider_crank(*open_pins)
+    bodies = (
+        *base.bodies,
+        Body("tool", 0.2, points={"grip": (0.0, 0.0)}, start_angle=0.9),
+        bar("strut", 0.16, 0.1, 2.0),
+    )
+    joints = (
+        *base.joints,
+        Slide("feed", "tool.grip", "slider.top", 0.9),
+        *pins(open_pins, ("o5", "tool.grip", "strut.b"), ("o6", "strut.a", "ground.r")),
+    )
+    return Mechanism(bodies, joints, base.drives, {**base.ground, "r": (0.22, -0.05)}, base.loads)
+
+
+def turning_slide(*open_pins):
+    """A block on a driven arm, pulled along it by a link: the guide turns with the drive."""
+    bodies = (
+        Body("crank", 0.4, 1e-3, (0.02, 0.01), {"a": (0.0, 0.0), "c": (0.01, 0.0)}, 0.3),
+        Body("block", 0.1, 2e-5, (0.002, 0.001), {"pin": (0.0, 0.0)}),
+        bar("link", 0.09, 0.1, 2.5),
+    )
+    joints = (
+        *pins(
+            open_pins,
+            ("o1", "crank.a", "ground.o"),
+            ("o2", "block.pin", "link.b"),
+            ("o3", "link.a", "ground.p"),
+        ),
+        Slide("arm", "block.pin", "crank.c", 0.25),
+    )
+    return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.06, 0.01)})
+
+
+def held_frame(*open_pins):
+    """A four-bar whose base plate is a body held on the ground, askew."""
+    base = four_bar(*open_pins)
+    plate = Body("plate", 5.0, points={"o": (0.0, 0.0), "p": (0.13, 0.01)})
+    joints = tuple(
+        type(j)(**{**j.__dict__, "bearing": j.bearing.replace("ground.", "plate.")})
+        for j in base.joints
+    )
+    return Mechanism(
+        (*base.bodies, plate), (*joints, Fixed("bolts", "plate.o", "ground.o", 0.2)), base.drives
+    )
+
+
+RUB = GuideFriction(0.15, 0.1)
+PUSH = (Force("push", "slider.top", (-30.0, 7.0)), Torque("twist", "rod", 0.3))
+
+LINKAGES = {
+    "slider-crank, two": slider_crank("o12", "o23", loads=PUSH),
+    "slider-crank, three, torque": slider_crank("o14", "o12", "o23", drive=ENGINE, off=0.003),
+    "slider-crank, tilted, one": slider_crank("o12", tilt=0.5, offset=0.01, friction=RUB, off=0.004),
+    "slider-crank, offset, far": slider_crank("o23", offset=0.02, drive=ENGINE, friction=RUB, loads=PUSH),
+    "slider-crank, ideal": slider_crank(friction=RUB),
+    "slider-crank, ideal, torque": slider_crank(drive=ENGINE, friction=RUB, off=0.002, loads=PUSH),
+    "four-bar, none": four_bar(loads=(Force("tip", "coupler.tip", (4.0, -9.0)),)),
+    "four-bar, one": four_bar("o3", off=0.006),
+    "four-bar, two": four_bar("o2", "o3", drive=ENGINE),
+    "four-bar, four": four_bar("o1", "o2", "o3", "o4"),
+    "v-twin, four": v_twin("big_left", "big_right", "small_left", "small_right", friction=RUB),
+    "v-twin, two, torque": v_twin("big_left", "small_right", drive=ENGINE, friction=RUB),
+    "v-twin, ideal, torque": v_twin(drive=ENGINE, friction=RUB),
+    "six-bar, two": six_bar("o3", "o6", friction=RUB),
+    "six-bar, one, a loop": six_bar("o5"),
+    "quick-return": quick_return("o2", friction=RUB),
+    "quick-return, ideal": quick_return(friction=RUB),
+    "3-RRR, three": three_rrr("tip0", "tip1", "tip2"),
+    "3-RRR, one": three_rrr("knee1"),
+    "chain": pendulum_chain(),
+    "two stages": two_stage("o23"),
+    "turning slide": turning_slide("o2"),
+    "held frame": held_frame("o2"),
+}  # fmt: skip

@@ -1,0 +1,159 @@
+"""Generated motions as plain Python, and random states of their linkages."""
+
+import math
+import types
+
+import numpy as np
+from dense_linkage import Contact, Jet, admissible, assembled, turned
+
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import elements, motion
+from hpcclear.dynamics.linkage.generator import On, Rows, generate
+from hpcclear.dynamics.linkage.numbers import row_of, values
+from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.physics import angles, friction
+
+CHI, MU, RAMP = 0.5, 0.1, 0.3
+GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
+EFFECTS = at.Effects(fixed=1, coulomb=1, ledger=1, series=1)
+EVERYTHING = On(friction=True, gravity=True, ledger=True, series=True)
+CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
+FREE = 500  # rows of what the joints write
+
+
+def plain(function, made=None):
+    """A compiled function as ordinary Python, and all that it calls."""
+    made = {} if made is None else made
+    code = function.py_func
+    if code not in made:
+        names = {}
+        made[code] = types.FunctionType(code.__code__, names)
+        for name, value in code.__globals__.items():
+            names[name] = plain(value, made) if hasattr(value, "py_func") else value
+    return made[code]
+
+
+def joints_of(mechanism):
+    """Rows of the joints in `work` and `par`."""
+    return tuple(
+        at.Joint(10 * k, *(FREE + 20 * k + j - at.RATE_NOW for j in range(5)),
+                 FREE + 20 * k + 6, FREE + 20 * k + 7, 0, 0, 0)
+        for k, _ in enumerate(mechanism.clearances)
+    )  # fmt: skip
+
+
+class Lane:
+    """A generated motion as plain Python, with the rates where the layout has them."""
+
+    def __init__(self, mechanism, on=EVERYTHING, **options):
+        self.mechanism = mechanism
+        rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, 401, 402, free=100)
+        self.text = generate(mechanism, on, rows, **options)
+        names = {
+            "joint_force": plain(motion.joint_force),
+            "sincos": plain(angles.sincos),
+            "saturated": plain(friction.saturated),
+            "spring_force": plain(elements.spring_force),
+            "harmonic": plain(elements.harmonic),
+        }
+        exec(self.text.source, names)
+        self.run = names["lane"]
+        feedback = (ALPHA, BETA)
+        base = values(
+            mechanism, options.get("cartesian", False), gravity=GRAVITY, feedback=feedback
+        )
+        self.par = np.zeros(1000)
+        for row, value in row_of(self.text, base).items():
+            self.par[row] = value
+        for k, joint in enumerate(mechanism.clearances):
+            block = self.par[10 * k : 10 * k + 10]
+            block[at.CLEARANCE] = joint.clearance
+            block[at.CONTACT_STIFFNESS] = joint.stiffness
+            block[at.DAMPING] = CHI
+            block[at.BEARING_RADIUS] = joint.bearing_radius
+            block[at.JOURNAL_RADIUS] = joint.bearing_radius - joint.clearance
+            block[at.FRICTION], block[at.INVERSE_RAMP] = MU, 1 / RAMP
+
+    def __call__(self, q, v, t):
+        work = np.zeros(2000)
+        n = len(q)
+        work[:n], work[100 : 100 + n], work[400] = q, v, t
+        work[401] = work[402] = 1.0
+        self.run(EFFECTS, joints_of(self.mechanism), work, self.par, 0, 1)
+        return work[200 : 200 + n], work
+
+
+def guess_of(mechanism):
+    """A rough pose: bodies at their start angles, hung one after the other on what is placed already."""
+    where = {GROUND: (np.zeros(2), 0.0)}
+    bodies = {body.name: body for body in mechanism.bodies}
+
+    def put(name, point, at_place):
+        body = bodies[name]
+        arm = np.subtract(body.center, body.points[point])
+        c, s = math.cos(body.start_angle), math.sin(body.start_angle)
+        offset = np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+        where[name] = (at_place + offset, body.start_angle)
+
+    def place(text):
+        name, point = split(text)
+        if name == GROUND:
+            return np.array(mechanism.ground[point])
+        (centre, angle), body = where[name], bodies[name]
+        arm = np.subtract(body.points[point], body.center)
+        c, s = math.cos(angle), math.sin(angle)
+        return centre + np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+
+    for _ in bodies:
+        for joint in mechanism.joints:
+            for own, other in (joint.places, joint.places[::-1]):
+                body, point = split(own)
+                if body not in where and split(other)[0] in where:
+                    put(body, point, place(other))
+    return np.concatenate([[*where[name][0], where[name][1]] for name in bodies])
+
+
+def random_states(dense, rng, count):
+    """States that meet the constraints, journals about a clearance off centre, and their times."""
+    mechanism = dense.mechanism
+    guess = guess_of(mechanism)
+    for _ in range(count):
+        t = rng.uniform(0, 0.01)
+        offsets = [
+            joint.clearance * rng.uniform(0.7, 1.3) * np.array([math.cos(a), math.sin(a)])
+            for joint, a in zip(mechanism.clearances, rng.uniform(0, 6, 9), strict=False)
+        ]
+        q = assembled(
+            dense,
+            guess + 0.03 * rng.normal(size=dense.n) * np.tile([0.02, 0.02, 1], dense.n // 3),
+            t,
+            offsets,
+        )
+        wanted = rng.normal(size=dense.n) * np.tile([2.0, 2.0, 50.0], dense.n // 3)
+        yield q, admissible(dense, q, wanted, t), t
+
+
+def sliding(dense, q, v, a):
+    """Displacement, velocity and acceleration along each guide."""
+    jets = [Jet(*parts) for parts in zip(q, v, a, strict=True)]
+    found = {}
+    for joint in dense.mechanism.ideal:
+        if hasattr(joint, "friction"):
+            (x, y), (bx, by) = (dense.place(jets, p) for p in joint.places)
+            dx, dy = turned((1.0, 0.0), dense.angle(jets, joint.line) + joint.angle)
+            s = dx * (x - bx) + dy * (y - by)
+            found[joint.name] = s.parts
+    return found
+
+
+def coordinates(lane, dense, q, v, a):
+    """Coordinates of the text, their velocities and accelerations, from those of all bodies."""
+    slides = sliding(dense, q, v, a)
+    rows = []
+    for kind, body, joint in lane.text.forest.coordinates:
+        if kind == "slide":
+            rows.append(slides[joint])
+        else:
+            k = dense.first[body] + ("x", "y", "angle").index(kind)
+            rows.append((q[k], v[k], a[k]))
+    return np.array(rows).T

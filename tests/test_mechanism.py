@@ -1,0 +1,224 @@
+"""Mechanisms as data: broken ones are refused by name, and where good ones are cut."""
+
+from dataclasses import replace
+
+import pytest
+from linkages import LINKAGES, MOTOR, bar, four_bar, pins, slider_crank
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
+from hpcclear.dynamics.linkage.parts import (
+    Body,
+    Clearance,
+    ConstantSpeed,
+    Fixed,
+    Force,
+    Harmonic,
+    Revolute,
+    Slide,
+    Spring,
+    TorqueDrive,
+)
+from hpcclear.dynamics.linkage.trees import forest
+
+BASE = four_bar("o2", "o3")
+
+
+def with_body(name, **changes):
+    """The four-bar with a changed body."""
+    bodies = tuple(replace(body, **changes) if body.name == name else body for body in BASE.bodies)
+    return lambda: replace(BASE, bodies=bodies)
+
+
+def with_joint(name, **changes):
+    """The four-bar with a changed joint."""
+    joints = tuple(
+        replace(joint, **changes) if joint.name == name else joint for joint in BASE.joints
+    )
+    return lambda: replace(BASE, joints=joints)
+
+
+def with_more(table, *more):
+    """The four-bar with further entries of a table."""
+    return lambda: replace(BASE, **{table: (*getattr(BASE, table), *more)})
+
+
+LONE = Body("lone", 0.1, 1e-5, points={"a": (0.0, 0.0)})
+SECOND = replace(LONE, name="second")
+DEAD = Harmonic("swing", "rocker", 0.2, 9.0)
+
+BROKEN = {
+    "a joint to no body": (with_joint("o2", bearing="cupler.a"), "joints.o2.bearing", "no body"),
+    "a joint to no point": (with_joint("o4", bearing="ground.x"), "joints.o4.bearing", "no point"),
+    "a joint without a point": (with_joint("o1", journal="crank"), "joints.o1.journal", "no point"),
+    "a joint of one body": (with_joint("o2", bearing="crank.a"), "joints.o2", "to itself"),
+    "no joint at all": (with_more("bodies", LONE), "bodies.lone", "no joints lead"),
+    "two bodies by themselves": (
+        lambda: replace(
+            BASE,
+            bodies=(*BASE.bodies, LONE, SECOND),
+            joints=(*BASE.joints, Revolute("o9", "lone.a", "second.a")),
+        ),
+        "bodies.lone",
+        "second",
+    ),
+    "nothing on the ground": (
+        lambda: replace(BASE, joints=BASE.joints[1:3]), "bodies.crank", "to the ground",
+    ),
+    "no body": (lambda: replace(BASE, bodies=()), "bodies", "no body"),
+    "no drive": (lambda: replace(BASE, drives=()), "drives", "nothing drives"),
+    "a drive of no body": (
+        lambda: replace(BASE, drives=(replace(MOTOR, body="crnk"),)), "drives.motor.body", "no such",
+    ),
+    "a drive of the ground": (
+        lambda: replace(BASE, drives=(replace(MOTOR, body="ground"),)),
+        "drives.motor.body",
+        "no such",
+    ),
+    "a drive of a guided body": (
+        lambda: replace(slider_crank("o12"), drives=(replace(MOTOR, body="slider"),)),
+        "drives.motor.body",
+        "guide holds it",
+    ),
+    "two drives of one body": (
+        with_more("drives", Harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
+    ),
+    "two that give the period": (
+        lambda: replace(
+            BASE, drives=(replace(MOTOR, period=True), replace(DEAD, period=True))
+        ),
+        "drives.swing.period",
+        "already",
+    ),
+    "two periods": (with_more("drives", DEAD), "drives.swing", "does not repeat"),
+    "a drive that stands": (
+        lambda: replace(BASE, drives=(ConstantSpeed("motor", "crank", 0.0),)),
+        "drives.motor.speed",
+        "nothing would turn",
+    ),
+    "a torque at rest": (
+        lambda: replace(BASE, drives=(TorqueDrive("motor", "crank", 1.0, 0.0),)),
+        "drives.motor.initial_speed",
+        "nothing would turn",
+    ),
+    "no mass": (with_body("coupler", mass=0.0), "bodies.coupler.mass", "has a mass"),
+    "no inertia": (with_body("rocker", inertia=0.0), "bodies.rocker.inertia", "has an inertia"),
+    "a negative inertia": (with_body("crank", inertia=-1.0), "bodies.crank.inertia", "inertia"),
+    "a point named like the centre": (
+        with_body("crank", points={"a": (0, 0), "b": (1, 0), "center": (0, 0)}),
+        "bodies.crank.points.center",
+        "mass centre",
+    ),
+    "a name with a blank": (
+        lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="a b"))),
+        "bodies.a b",
+        "no name",
+    ),
+    "a body named ground": (
+        lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="ground"))),
+        "bodies.ground",
+        "no name",
+    ),
+    "a name twice": (with_more("bodies", BASE.bodies[0]), "bodies.crank", "twice"),
+    "no clearance": (with_joint("o2", clearance=0.0), "joints.o2.clearance", "above 0"),
+    "no journal left": (with_joint("o3", clearance=0.02), "joints.o3.clearance", "smaller"),
+    "a soft contact": (with_joint("o3", stiffness=-1.0), "joints.o3.stiffness", "above 0"),
+    "over-constrained": (
+        lambda: replace(
+            four_bar(),
+            bodies=(*BASE.bodies, bar("brace", 0.1, 0.1)),
+            joints=(
+                *four_bar().joints,
+                *pins((), ("o5", "brace.a", "crank.b"), ("o6", "brace.b", "ground.p")),
+            ),
+        ),
+        "joints.o6",
+        "too many degrees of freedom",
+    ),
+    "too many drives": (
+        lambda: replace(four_bar(), drives=(MOTOR, ConstantSpeed("other", "rocker", 40.0))),
+        "joints.o4",
+        "remove a drive",
+    ),
+    "held on a body": (
+        with_more("joints", Fixed("weld", "rocker.b", "coupler.b")),
+        "joints.weld.line",
+        "on the ground only",
+    ),
+    "a ground that slides": (
+        with_more("joints", Slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
+    ),
+    "a load nowhere": (
+        with_more("loads", Force("gas", "piston.pin", (1.0, 0.0))), "loads.gas.place", "no body",
+    ),
+    "a spring nowhere": (
+        with_more("loads", Spring("band", "crank.a", "crank.z", 1.0)), "loads.band.second", "no point",
+    ),
+    "too many joints with clearance": (
+        lambda: Mechanism(
+            tuple(bar(f"bar{k}", 0.1, 0.1) for k in range(9)),
+            (
+                Revolute("o", "bar0.a", "ground.o"),
+                *(Clearance(f"o{k}", f"bar{k}.a", "bar0.b", 1e-4, 1e-2, 1e9) for k in range(1, 9)),
+                Clearance("o9", "bar8.b", "ground.o", 1e-4, 1e-2, 1e9),
+            ),
+            (ConstantSpeed("motor", "bar0", 1.0),),
+        ),
+        "joints",
+        "more than 8",
+    ),
+    "too many degrees of freedom": (
+        lambda: Mechanism(
+            tuple(bar(f"bar{k}", 0.1, 0.1) for k in range(26)),
+            tuple(
+                Revolute(f"o{k}", f"bar{k}.a", f"bar{k - 1}.b" if k else "ground.o")
+                for k in range(26)
+            ),
+            (ConstantSpeed("motor", "bar0", 1.0),),
+        ),
+        "bodies",
+        "more than 24",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_makes_no_mechanism_is_refused_by_name(case):
+    make, key, said = BROKEN[case]
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.key == key
+    assert said in str(caught.value)
+    assert len(caught.value.remedy) > 5
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_coordinates_less_closures_are_the_degrees_of_freedom(name):
+    mechanism = LINKAGES[name]
+    for cartesian in (False, True):
+        trees = forest(mechanism, cartesian)
+        rows = sum(2 if hasattr(one, "places") else 1 for one in trees.closures)
+        assert len(trees.coordinates) - rows == freedom(mechanism)
+        assert len(set(trees.coordinates)) == len(trees.coordinates)
+
+
+@pytest.mark.parametrize(
+    ("open_pins", "names"),
+    [
+        (("o12", "o23"), "x_rod y_rod angle_rod slide_slider"),
+        (("o12",), "angle_rod slide_slider"),
+        (("o23",), "angle_rod slide_slider"),
+        (("o14", "o12", "o23"), "x_crank y_crank x_rod y_rod angle_rod slide_slider"),
+    ],
+)
+def test_coordinates_of_the_slider_crank(open_pins, names):
+    found = forest(slider_crank(*open_pins)).coordinates
+    assert [one.name for one in found] == names.split()
+
+
+def test_guides_enter_the_trees_before_pins():
+    """So that what closes a loop is a pin, whose rows have no angle."""
+    for name in ("slider-crank, ideal", "v-twin, ideal, torque", "quick-return, ideal"):
+        closures = forest(LINKAGES[name]).closures
+        assert closures
+        assert all(isinstance(one, Revolute) for one in closures)
