@@ -120,8 +120,8 @@ class Verification(Table):
     """Rounds of added points at most."""
     infill_samples: Annotated[int, Count(1, 10**5)] = 40
     """Points added a round."""
-    response_clearance: Annotated[float, Quantity("m", above=0)] = 3e-4
-    """Clearance of the responses that are compared, m (Fig. 10)."""
+    response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
+    """Clearance of all joints in the responses that are compared, m; default those of the scene and the design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2
     """Steady revolutions of these responses."""
     response_windows: Annotated[int, Count(2, 1000)] = 10

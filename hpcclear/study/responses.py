@@ -1,4 +1,4 @@
-"""Responses of the original and the optimised designs at one clearance (the paper's Fig. 10)."""
+"""Responses of the original and the optimised designs, side by side (the paper's Fig. 10)."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulate
-from hpcclear.results.dataset import variable_name
+from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study
 from hpcclear.study.optimisation import Choice
@@ -35,13 +35,14 @@ def simulations(study: Study) -> int:
 
 
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
-    """The scene of one design, at the clearance of the comparison, without a study."""
+    """The scene of one design, at the clearance of the comparison if the study names one, without a study."""
     settings = run.study.verification
     changes: dict[str, object] = {"study": None, "numerics.averaged_revolutions": revolutions}
     for name, value in choice.design.items():
         changes |= dict.fromkeys(run.study.variable(name).paths, value)
-    for joint in run.scene.clearance_joints():
-        changes[f"joints.{joint}.clearance"] = settings.response_clearance
+    if settings.response_clearance is not None:
+        for joint in run.scene.clearance_joints():
+            changes[f"joints.{joint}.clearance"] = settings.response_clearance
     return run.scene.with_(changes)
 
 
@@ -76,8 +77,9 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
             content = _steady(scene, simulate(scene), name)
-        content.attrs["design"] = name
-        run.write(content, f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc")
+        made_by = provenance(scene.to_toml(), scene.hash, scene.references)
+        file = f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc"
+        run.write(content, file, {**made_by, "design": name})
 
 
 def _steady(scene: Scene, response: xr.Dataset, name: str) -> xr.Dataset:

@@ -98,8 +98,10 @@ class StudyRun:
         """Whether the samples that a kept stage stands on are there; a file of them may be damaged."""
         return np.count_nonzero(self.checkpoint.completed()["sample"] < count) == count
 
-    def write(self, content: xr.Dataset, name: str) -> None:
-        """Write a result file, with what made it."""
-        content.attrs.update(self.checkpoint.attributes)
+    def write(
+        self, content: xr.Dataset, name: str, attributes: Mapping[str, str] | None = None
+    ) -> None:
+        """Write a result file, with what made it; `attributes` where that differs from the study's."""
+        content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)
