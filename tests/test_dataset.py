@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status, failed
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.names import KINDS
@@ -139,7 +140,7 @@ def test_units_have_the_right_dimension():
         "objective": "[length]",
     }
     for name, dimension in expected.items():
-        assert registry.parse_units(found[name].units).dimensionality == (
+        assert registry.parse_units(found[name].of(MEAN_GAP).units).dimensionality == (
             registry.get_dimensionality(dimension)
         )
     inertia = dataset.DESIGN_VARIABLES["I2"][0]

@@ -5,16 +5,27 @@ import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from own_engine import engine
 
+import hpcclear
+from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.cli.printing import describe_samples, describe_statistics
+from hpcclear.ensemble.samples import run_sample
+from hpcclear.ensemble.session import Options
+from hpcclear.ensemble.statistics import run_statistics
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.html import sections
+from hpcclear.report.html.content import read
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.study import responses
+from hpcclear.scene.plausibility import implausible
+from hpcclear.study import responses, run_study
 from hpcclear.study.optimisation import Choice
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-import formula  # noqa: E402
+import formula
 
 JOBS = Path(__file__).parent.parent / "jobs"
 PLAYS = ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
@@ -44,9 +55,6 @@ def test_the_papers_jobs_name_the_play_their_responses_are_compared_at(job):
 def test_a_response_says_what_was_simulated(tmp_path, monkeypatch):
     """Its scene is that of its design, and simulating that scene again gives the response again."""
     formula.replace_dynamics(monkeypatch.setattr)
-    from hpcclear.ranks.boundary import alone
-    from hpcclear.study import run_study
-
     run_study(engine(), tmp_path / "out", alone(), progress_style="quiet")
     front = dataset.read(tmp_path / "out" / "verification.nc")
     for path in (tmp_path / "out" / "responses").glob("*.nc"):
@@ -57,3 +65,102 @@ def test_a_response_says_what_was_simulated(tmp_path, monkeypatch):
         name = found.attrs["design"]
         design = front.sel(design="worn original" if name == "original" else name)
         assert scene.number("mechanism.rod.mass") == pytest.approx(float(design["shank"]))
+
+
+QUICK = ("numerics.rtol=1e-5", "study.samples=32", "numerics.responses=true")
+UNITS = {
+    "mean-gap": "m",
+    "mean-contact-force": "N",
+    "peak-contact-force": "N",
+    "peak-crank-moment": "N m",
+    "slider-acceleration-deviation": "m/s^2",
+}
+
+
+def of_response(found, name: str) -> float:
+    """The objective worked out from what else a file holds."""
+    if name == "mean-gap":
+        return float(np.sqrt((found["mean_gap"] ** 2).sum("joint")))
+    if name.endswith("contact-force"):
+        return float(found[name.replace("-", "_")].max("joint"))
+    return float(found[name.replace("-", "_")])
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_the_objective_asked_for_is_what_sample_evaluate_and_simulate_call_objective(
+    tmp_path, name
+):
+    scene = engine(*QUICK, f"study.objective={name}")
+    made = run_sample(scene, tmp_path / "samples.nc", alone(), options=Options(style="quiet"))
+    evaluated = hpcclear.evaluate(scene, {"play": [30e-6]})
+    for found in (made.content, dataset.read(tmp_path / "samples.nc"), evaluated):
+        assert found["objective"].attrs["units"] == UNITS[name]
+        assert found["objective"].attrs["long_name"] == f"objective f, {OBJECTIVES[name].words}"
+        one = found.isel(sample=-1)
+        assert float(one["objective"]) == pytest.approx(of_response(one, name), rel=1e-12)
+        if name != "mean-gap":  # how f scatters says nothing of it
+            assert found["objective_spread"].isnull().all()
+    response = hpcclear.simulate(scene.with_({"joints.crank_rod.clearance": 30e-6}))
+    assert response["objective"].attrs["units"] == UNITS[name]
+    assert float(response["objective"]) == pytest.approx(float(evaluated["objective"][0]), rel=0.05)
+
+
+def test_streamed_statistics_are_of_the_objective_asked_for(tmp_path):
+    more = ("study.objective=peak-contact-force", "study.method=monte-carlo")
+    scene = engine(*QUICK, *more)
+    samples = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")).content
+    found = run_statistics(scene, tmp_path / "b.nc", alone(), options=Options(style="quiet"))
+    mean = float(samples["objective"].mean())
+    assert float(found.content["objective_mean"]) == pytest.approx(mean, rel=1e-12)
+    assert found.content["objective_mean"].attrs["units"] == "N"
+    assert int(found.content["objective_spread_count"]) == 0
+    describe_statistics(found)
+    describe_samples(run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")))
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_report_and_summary_call_the_objective_by_its_name(tmp_path, monkeypatch, capsys, name):
+    scene = engine(*QUICK, f"study.objective={name}")
+    made = run_sample(scene, tmp_path / "samples.nc", alone(), options=Options(style="quiet"))
+    describe_samples(made)
+    printed = " ".join(capsys.readouterr().out.split())
+    words = sections.summary(read(tmp_path))["words"]
+    unit = UNITS[name].split("/")[0]
+    assert OBJECTIVES[name].words in printed
+    assert any(OBJECTIVES[name].words in one and unit in one for one in words)
+    if name != "mean-gap":
+        assert "clearance circle" not in " ".join([printed, *words])
+        assert " mm" not in printed
+
+
+def test_long_names_say_what_a_variable_drives():
+    found = hpcclear.evaluate(engine(*QUICK), {"m1": [0.05], "play": [30e-6], "shank": [0.4]})
+    meant = "position of the mass centre of the rod, from its first joint"
+    assert found["m1"].attrs["long_name"] == meant
+    assert found["play"].attrs["long_name"] == "radial clearance of the joint crank_rod"
+    assert found["shank"].attrs["long_name"] == "mass of the rod"
+
+
+@pytest.mark.parametrize(
+    ("change", "fragments"),
+    [
+        ("drive.speed=5000", ["drive.speed = 5000 rad/s is 47746 rpm", '"5000 rpm"']),
+        ("joints.crank_rod.bearing.youngs_modulus=0.5", ["= 0.5 Pa is softer than rubber", "GPa"]),
+        ("joints.rod_slider.journal.youngs_modulus=210e12", ["stiffer than diamond", "GPa"]),
+        ("joints.rod_slider.clearance=0.003", ["27% of the bearing's radius", "radial play"]),
+        ("mechanism.slider.mass=400", ["mechanism.slider.mass = 400 kg", '"400 g"']),
+        ("mechanism.rod.length=140", ["mechanism.rod.length = 140 m", '"140 mm"']),
+        ("mechanism.rod.inertia=1100", ["mechanism.rod.inertia = 1100 kg m2", "mind the unit"]),
+        ("effects.gravity=9810", ["effects.gravity = 9810", "9.81"]),
+    ],
+)
+def test_a_slip_of_units_is_warned_of_in_a_line_with_a_remedy(change, fragments):
+    assert engine(study=False).warnings == ()
+    first, *_ = engine(change, study=False).warnings
+    for fragment in fragments:
+        assert fragment in first
+
+
+@pytest.mark.parametrize("job", sorted(path.name for path in JOBS.glob("*.toml")))
+def test_what_is_meant_is_not_warned_of(job):
+    assert not list(implausible(load_scene(JOBS / job)))

@@ -154,6 +154,14 @@ def test_one_response_makes_a_report(tmp_path: Path) -> None:
     assert list(json.loads(tree.content["content"])["motions"]) == ["mine"]
 
 
+def test_what_accuracy_costs_makes_a_report_that_misses_nothing(tmp_path: Path) -> None:
+    dataset.write(data.accuracy(), tmp_path / "accuracy.nc")
+    tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
+    assert "What accuracy costs was measured" in tree.text
+    for words in ("nothing was sampled", "no design was sampled", "What is not here"):
+        assert words not in tree.text
+
+
 def test_all_samples_failed_is_reported(tmp_path: Path) -> None:
     dataset.write(data.samples(20, failed=20), tmp_path / "samples.nc")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))

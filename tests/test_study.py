@@ -30,7 +30,6 @@ from hpcclear.study import (
     paper,
     responses,
     run_study,
-    simulations,
     surrogates,
 )
 from hpcclear.study.paper import claims, readings
@@ -236,9 +235,9 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
         made[re.sub(r"(-\d+| check)?: simulations", "", task.name)] += len(points)
         return run_points(self, task, points, **options)
 
-    def respond(one):
+    def respond(one, *rest):
         responded["all"] += 1
-        return formula.respond(one)
+        return formula.respond(one, *rest)
 
     monkeypatch.setattr(Ranks, "run_points", counted)
     monkeypatch.setattr(responses, "simulate", respond)
@@ -409,7 +408,8 @@ def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, m
     scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
     run_study(scene, place, alone(), progress_style="quiet")
     samples = dataset.read(place / "samples.nc")
-    assert samples["objective"].attrs["units"] == samples["mean_gap"].attrs["units"] == "m"
+    assert samples["objective"].attrs["units"] == scene.objective.unit
+    assert samples["mean_gap"].attrs["units"] == "m"
     assert not (place / "claims.nc").exists()
     assert not (place / "readings.nc").exists()
     assert "mean_paper" not in dataset.read(place / "verification.nc")
@@ -501,6 +501,7 @@ def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
 
 
 OF_THE_OBJECTIVE = {
+    "samples.nc": "objective objective_spread objective_uncertainty",
     "sensitivity.nc": (
         "sensitivity standard_error best_sensitivity uncertainty influence mean_objective "
         "mean_objective_error"
@@ -532,7 +533,7 @@ def test_units_follow_the_objective_and_nothing_else_does(
     for path in sorted(place.rglob("*.nc")):
         found = dataset.read(path)
         table = KINDS[found.attrs["hpcclear_kind"]]
-        theirs = OF_THE_OBJECTIVE.get(path.name, "").split()
+        theirs = OF_THE_OBJECTIVE.get(path.name, OF_THE_OBJECTIVE["samples.nc"]).split()
         for variable, content in found.data_vars.items():
             if variable in theirs:
                 assert content.attrs["units"] == unit, (path.name, variable)
@@ -547,11 +548,10 @@ def test_units_follow_the_objective_and_nothing_else_does(
 def test_of_contact_forces_the_larger_is_the_objective():
     for which in ("mean", "peak"):
         scene = scene_of(f"study.objective={which}-contact-force")
-        unit, function = simulations.objective_of(scene)
         records = np.zeros(2, [(f"{which}_contact_force", float, 2)])
         records[f"{which}_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
-        assert unit == "N"
-        assert function(records).tolist() == [3.0, 5.0]
+        assert scene.objective.unit == "N"
+        assert scene.objective.of(records).tolist() == [3.0, 5.0]
 
 
 # -- parts ------------------------------------------------------------------------------------------

@@ -18,7 +18,6 @@ from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
-from hpcclear.study.simulations import objective_of
 from hpcclear.study.surrogates import coordinate
 
 SURROGATES = ("response surface", "Kriging")
@@ -94,7 +93,7 @@ def simulated(scene: Scene, region: Box, coordinates: Array, ranks: Ranks) -> tu
 def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:
     """The study's objective at points, shape (n,), SI, NaN where failed, and core-seconds of one of them."""
     records = sample_points(scene, points, ranks, stage=stage)
-    values = objective_of(scene)[1](records)
+    values = records["objective"]
     busy = float(ranks.stage_seconds[stage][:, 0].sum())
     return np.where(records["status"] == Status.OK, values, np.nan), busy / len(points)
 

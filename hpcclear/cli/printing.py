@@ -1,5 +1,6 @@
 """What the commands print: tables that fit 80 columns, plain when piped."""
 
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.figures import labels
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
@@ -39,8 +41,18 @@ def table(title: str, rows: list[tuple[str, str]]) -> Table:
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A number for people, "nan" where there is none."""
-    return f"{value:.{digits}g} {unit}".strip()
+    """A number for people in a unit of a readable size, "nan" where there is none."""
+    scale = labels.scale(unit, value)
+    shown = "" if scale.unit == "–" else scale.unit
+    if "utf" not in (sys.stdout.encoding or "").lower():
+        shown = shown.replace("µ", "u").replace("²", "^2")
+    return f"{value * scale.factor:.{digits}g} {shown}".strip()
+
+
+def objective_of(content: xr.Dataset) -> tuple[str, str]:
+    """What f is in a file of results, in words, and its unit."""
+    unit = content.get("objective", content.get("objective_mean")).attrs["units"]  # type: ignore[union-attr]
+    return labels.objective(content), str(unit)
 
 
 def describe_scene(scene: Scene, cost: bool) -> None:
@@ -147,18 +159,28 @@ def describe_response(response: xr.Dataset, output: Path) -> None:
     if status is not Status.OK:
         rows.append(("remedy", status.remedy))
     f, spread = float(response["objective"]), float(response["objective_spread"])
-    rows += [
-        ("objective f", quantity(f * 1e3, "mm", 6)),
-        ("its spread between revolutions", quantity(spread * 1e3, "mm", 2)),
-        ("force evaluations", f"{int(response['rhs_evaluations'])}"),
-    ]
+    words, unit = objective_of(response)
+    rows.append(("objective f", f"{quantity(f, unit, 6)}: {words}"))
+    if np.isfinite(spread):
+        rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
+    rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
     for k, joint in enumerate(response["joint"].to_numpy()):
         peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
-        rows.append((f"{joint}", f"mean gap {gap * 1e3:.4g} mm, peak contact force {peak:.4g} N"))
+        told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
+        rows.append((f"{joint}", told + _at_instants(response, k)))
     out.print(table("Response", rows))
     for text in flag_remarks(int(response["flags"])):
         out.print(f"[yellow]Mind:[/] {text}")
     out.print(f"written  {output}")
+
+
+def _at_instants(response: xr.Dataset, joint: int) -> str:
+    """The largest force that the time series shows, where the true peak lies between its instants."""
+    peak = float(response["peak_contact_force"][joint])
+    shown = float(response["contact_force"][:, joint].max())
+    if not peak > shown * 1.001:
+        return ""
+    return f" (between instants of the series, which shows {quantity(shown, 'N')})"
 
 
 REMARKS = {
@@ -187,10 +209,13 @@ def describe_statistics(found: "Finished") -> None:
     total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
     rows = [("simulated", f"{good} of {total} without failure")]
     if int(content["objective_count"]) > 1:
-        mean, deviation = (float(content[f"objective_{n}"]) * 1e3 for n in ("mean", "deviation"))
+        mean, deviation = (float(content[f"objective_{n}"]) for n in ("mean", "deviation"))
         error = deviation / int(content["objective_count"]) ** 0.5
-        rows.append(("mean of f", f"{mean:.6g} mm, standard error {error:.1e} mm"))
-        rows.append(("deviation of f", f"{deviation:.4g} mm"))
+        words, unit = objective_of(content)
+        rows.append(("f", words))
+        shown = f"{quantity(mean, unit, 6)}, standard error {quantity(error, unit, 2)}"
+        rows.append(("mean of f", shown))
+        rows.append(("deviation of f", quantity(deviation, unit)))
     out.print(table("Statistics", rows + _load(found)))
     out.print(f"statistics {found.output}")
 
@@ -208,13 +233,11 @@ def describe_samples(found: "Finished") -> None:
         if count and code is not Status.OK:
             rows.append((f"  {code.name.lower()}", f"{count}: {code.message}; {code.remedy}"))
     if len(good):
-        rows.append(
-            (
-                "f",
-                f"{good.min() * 1e3:.4g} to {good.max() * 1e3:.4g} mm, median {np.median(good) * 1e3:.4g} mm",
-            )
-        )
+        words, unit = objective_of(samples)
+        low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
+        rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
         spread = samples["objective_spread"].to_numpy()[status == Status.OK] / good
+    if len(good) and np.isfinite(spread).any():
         rows.append(
             (
                 "spread of f between revolutions",

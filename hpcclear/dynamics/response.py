@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Records
+from hpcclear.base.objectives import Objective, asked
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.evaluator import outcome_records
 from hpcclear.dynamics.lanes import Lanes
@@ -67,7 +68,7 @@ def integrate(scene: Scene) -> tuple[Steps, Records, Array]:
         rows[:, s + n : s + 2 * n],
         rows[:, s + 2 * n :],
     )
-    return steps, outcome_records(labels, out, finished), par[0]
+    return steps, outcome_records(labels, out, finished, bool(problem.effects.responses)), par[0]
 
 
 def _first_row(problem: Problem, par: Array, start: Start, n: int) -> Array:
@@ -141,12 +142,15 @@ def instants(scene: Scene, steps: Steps) -> Array:
     return np.append(np.concatenate(parts), borders[-1])
 
 
-def simulate(scene: Scene) -> xr.Dataset:
+def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
     """Simulate one scene; time series of the motion, forces and energies.
 
     Parameters
     ----------
     scene : Scene
+    objective : Objective, optional
+        What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
+        need ``numerics.responses`` where there is no study that asks for them.
 
     Returns
     -------
@@ -162,7 +166,9 @@ def simulate(scene: Scene) -> xr.Dataset:
     named = scene
     scene, reason = resolve(scene)
     simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
+    objective = named.objective if objective is None else objective
     times, data, record = simulated(scene)
+    record = asked(record, objective)
     names = (
         "objective",
         "objective_spread",
@@ -179,15 +185,18 @@ def simulate(scene: Scene) -> xr.Dataset:
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(reason)
         | {"integrator": integrator_of(scene, single=True)},
+        objective,
     )
 
 
 def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
-    lanes = ClosedForm(problem_of(scene))
+    problem = problem_of(scene)
+    lanes = ClosedForm(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    return *ideal_series(scene), outcome_records(*lanes.collect())
+    record = outcome_records(*lanes.collect(), bool(problem.effects.responses))
+    return *ideal_series(scene), record
 
 
 def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:

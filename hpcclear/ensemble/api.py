@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluator import evaluate_records
 from hpcclear.dynamics.target import recorded, resolve
 from hpcclear.results import dataset
@@ -73,7 +74,7 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     """
     designs = as_points(scene, points)
     chosen, reason = resolve(scene, designs)
-    records = evaluate_records(chosen, designs)
+    records = asked(evaluate_records(chosen, designs), scene.objective)
     return dataset.samples_dataset(
         designs.names,
         designs.values,
@@ -81,4 +82,6 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
         records,
         dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
         | recorded(reason),
+        scene.objective,
+        designs.words,
     )

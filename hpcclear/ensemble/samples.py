@@ -85,5 +85,13 @@ def _simulate(scene: Scene, points: Points, session: Session) -> xr.Dataset:
     progress = Progress("samples", session.options.style)
     records = sample_points(chosen, points, session.ranks, checkpoint, progress)
     return session.write(
-        dataset.samples_dataset(points.names, points.values, units, records, session.attributes)
+        dataset.samples_dataset(
+            points.names,
+            points.values,
+            units,
+            records,
+            session.attributes,
+            scene.objective,
+            points.words,
+        )
     )

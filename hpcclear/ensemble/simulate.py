@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcclear.base.objectives import OBJECTIVES, Objective, asked
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks, Task
@@ -32,6 +33,7 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     content.pop("study", None)
     content["numerics"]["responses"] = scene.responses_asked()
     return {
+        "objective": scene.objective.name,
         "scene": content,
         "names": points.names,
         "paths": points.paths,
@@ -39,7 +41,25 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     }
 
 
-def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Evaluator":
+class Judge:
+    """A rank's worker: an evaluator whose records hold the objective that was asked for; see `ranks.schedule.Worker`."""
+
+    def __init__(self, evaluator: "Evaluator", objective: Objective) -> None:
+        self._evaluator, self._objective = evaluator, objective
+        self.lanes = evaluator.lanes
+        self.submit = evaluator.submit
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished."""
+        return self._evaluator.pending
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """Work for about `seconds`; records of what finished meanwhile."""
+        return asked(self._evaluator.advance(seconds), self._objective)
+
+
+def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
     """A rank's worker; the kernel is compiled by one rank of each node and loaded by the others."""
     from hpcclear.dynamics.evaluator import Evaluator
     from hpcclear.scene import load_scene
@@ -49,7 +69,7 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Evaluator":
     columns = Points(payload["names"], nothing, payload["paths"])
     evaluator = Evaluator(load_scene(payload["scene"]), columns, payload["lanes"])
     ranks.first_on_node(lambda: evaluator.advance(0.0))  # without samples it only compiles
-    return evaluator
+    return Judge(evaluator, OBJECTIVES[payload["objective"]])
 
 
 @contextmanager

@@ -9,6 +9,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
 from hpcclear.ensemble.identity import statistics_key
 from hpcclear.ensemble.parts import (
@@ -118,6 +119,7 @@ class _Streaming:
         chosen = session.described(scene, few)
         self._payload = payload_of(chosen, few)
         self._design = chosen.resolved()
+        self._objective = scene.objective
         self._points = points
         self._session = session
         self._raw = raw
@@ -137,7 +139,10 @@ class _Streaming:
             seconds = self._run_samples()
             if not self._sums.complete:
                 self._run_parts(seconds)
-        return self._session.write(statistics_dataset(self._sums, self._session.attributes))
+        return self._session.write(self._dataset())
+
+    def _dataset(self) -> xr.Dataset:
+        return statistics_dataset(self._sums, self._session.attributes, self._objective)
 
     def _keep_raw(self, number: int, records: np.ndarray) -> None:
         """Write a block of samples, if they are wanted."""
@@ -145,7 +150,13 @@ class _Streaming:
             page = self._points.page(number)
             units = dict(zip(page.names, page.units, strict=True))
             content = dataset.samples_dataset(
-                page.names, page.values, units, records, self._session.attributes
+                page.names,
+                page.values,
+                units,
+                records,
+                self._session.attributes,
+                self._objective,
+                page.words,
             )
             dataset.write(content, self._raw / f"samples-{number:08d}.nc")
 
@@ -207,7 +218,11 @@ class _Streaming:
             self._sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
 
 
-def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = None) -> xr.Dataset:
+def statistics_dataset(
+    sums: Accumulator,
+    attributes: dict[str, str] | None = None,
+    objective: Objective = MEAN_GAP,
+) -> xr.Dataset:
     """A complete accumulator as a dataset of kind ``statistics``."""
     summary, edges = sums.result(), sums.edges
     assert edges is not None  # it is complete
@@ -224,7 +239,7 @@ def statistics_dataset(sums: Accumulator, attributes: dict[str, str] | None = No
     }
     for name in dict(ROWS):
         data |= _of_quantity(name, summary, edges)
-    return dataset.dataset("statistics", coords, data, attributes)
+    return dataset.dataset("statistics", coords, data, attributes, objective=objective)
 
 
 def _of_quantity(name: str, summary: Summary, edges: Array) -> dict[str, np.ndarray]:

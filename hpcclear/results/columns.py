@@ -1,11 +1,13 @@
 """The tables of `hpcclear.results.names`: what stands in every result file, a row each.
 
 A row named as its only dimension is a coordinate. ``objective`` in the place of a unit, and
-``objective^2``, stand for the unit of the study's objective (`Column.unit`). Units are written so
+``objective^2``, stand for the unit of the study's objective (`Column.of`). Units are written so
 that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
 from typing import NamedTuple
+
+from hpcclear.base.objectives import MEAN_GAP, Objective
 
 Dims = tuple[str, ...]
 
@@ -14,7 +16,7 @@ class Column(NamedTuple):
     """A row of the table: what one variable of a file is."""
 
     dims: Dims
-    units: str  # "" for text and flags, which have none; see `unit`
+    units: str  # "" for text and flags, which have none; see `of`
     long_name: str
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
@@ -26,6 +28,11 @@ class Column(NamedTuple):
         if self.units == "objective^2":
             return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
         return self.units
+
+    def of(self, objective: Objective) -> "Column":
+        """The row in a file of results for that objective: its unit, and its words in place of the mean gap's."""
+        words = self.long_name.replace(MEAN_GAP.words, objective.words)
+        return self._replace(units=self.unit(objective.unit), long_name=words)
 
 
 Columns = dict[str, Column]
@@ -56,10 +63,10 @@ def _outcome(*per_sample: str) -> Columns:
     per_joint = (*per_sample, "joint")
     # fmt: off
     return {
-        "objective": number(per_sample, "m", "objective f, mean distance from the clearance circle", required=True),
-        "objective_spread": number(per_sample, "m",
+        "objective": number(per_sample, "objective", f"objective f, {MEAN_GAP.words}", required=True),
+        "objective_spread": number(per_sample, "objective",
         "standard deviation of f between averaged revolutions", required=True),
-        "objective_uncertainty": number(per_sample, "m", "scatter of f over kicked copies"),
+        "objective_uncertainty": number(per_sample, "objective", "scatter of f over kicked copies"),
         "mean_gap": number(per_joint, "m", "time mean of the distance from the clearance circle"),
         "peak_contact_force": number(per_joint, "N", "largest contact force over the averaged revolutions"),
         "mean_contact_force": number(per_joint, "N", "mean contact force over the averaged revolutions"),
@@ -272,8 +279,8 @@ STATISTICS: Columns = {
     "flags": flag(("flags",), "with which care a result is to be read"),
     "samples_by_status": count(("outcome",), "number of samples that ended so", required=True),
     "samples_by_flag": count(("flags",), "number of samples with this flag", required=True),
-    **_statistics_of("objective", (), "m", "objective"),
-    **_statistics_of("objective_spread", (), "m", "deviation between revolutions"),
+    **_statistics_of("objective", (), "objective", "objective"),
+    **_statistics_of("objective_spread", (), "objective", "deviation between revolutions"),
     **_statistics_of("mean_gap", ("joint",), "m", "mean gap"),
     **_statistics_of("peak_contact_force", ("joint",), "N", "peak contact force"),
     **_statistics_of("rhs_evaluations", (), "1", "number of force evaluations"),

@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, Status
 from hpcclear.results import netcdf
 from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
@@ -37,7 +38,8 @@ def dataset(
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     units: Mapping[str, str] | None = None,
-    objective_unit: str = "m",
+    objective: Objective = MEAN_GAP,
+    words: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """A dataset of one kind of result file, with every attribute the table knows.
 
@@ -54,8 +56,11 @@ def dataset(
         Further global attributes, text or numbers; see `provenance`.
     units : mapping of str to str, optional
         Units of design variables; those of the paper's (`DESIGN_VARIABLES`) are known.
-    objective_unit : str
-        Unit of the study's objective, of everything that the table says has it.
+    objective : Objective
+        Of the study: its unit is that of everything that the table says has it, and its words say what f is, in a
+        global attribute ``objective`` too where it is not the mean gap.
+    words : mapping of str to str, optional
+        Long names of design variables: what they drive, whatever they are called.
 
     Returns
     -------
@@ -76,25 +81,23 @@ def dataset(
         raise ValueError(f"{kind} lacks {sorted(missing)}")
     sizes = {name: np.shape(coords[name])[0] for name in table.coords}
     variables = {
-        name: _variable(name, row, coords[name], sizes, row.units)
-        for name, row in table.coords.items()
+        name: _variable(name, row, coords[name], sizes) for name, row in table.coords.items()
     }
     for name, values in data.items():
         if name in table.data:
-            row = table.data[name]
-            variables[name] = _variable(name, row, values, sizes, row.unit(objective_unit))
+            variables[name] = _variable(name, table.data[name].of(objective), values, sizes)
         else:
-            row, marks = _design_row(name, data, units or {}, table)
-            variable = _variable(name, row, values, sizes, row.units)
+            row, marks = _design_row(name, data, units or {}, words or {}, table)
+            variable = _variable(name, row, values, sizes)
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
+    if objective is not MEAN_GAP:
+        fixed["objective"] = objective.words
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 
 
-def _variable(
-    name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int], unit: str
-) -> xr.Variable:
+def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> xr.Variable:
     array = np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
@@ -108,23 +111,31 @@ def _variable(
             raise ValueError(f"{name} does not fit into {row.dtype}")
         array = exact
     attributes: dict[str, object] = {"long_name": row.long_name}
-    if unit:
-        attributes["units"] = unit
+    if row.units:
+        attributes["units"] = row.units
     return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
 
 
 def _design_row(
-    name: str, data: Mapping[str, ArrayLike], units: Mapping[str, str], table: Kind
+    name: str,
+    data: Mapping[str, ArrayLike],
+    units: Mapping[str, str],
+    words: Mapping[str, str],
+    table: Kind,
 ) -> tuple[Column, dict[str, str]]:
     """Row and further attributes of a design variable, or of a limit of one."""
-    dims, base, words, role = table.design_dims, name, "", _ROLE
+    dims, base, start, role = table.design_dims, name, "", _ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
-        dims, base, words, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", _LIMIT
+        dims, base, start, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", _LIMIT
     unit, long_name = DESIGN_VARIABLES.get(base, (None, f"design variable {base}"))
     unit = units.get(base, unit)
+    unit = "1" if unit == "" else unit
     if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    return Column(dims, unit, words + long_name, "f8"), {"role": role, "scene_path": base}
+    return Column(dims, unit, start + words.get(base, long_name), "f8"), {
+        "role": role,
+        "scene_path": base,
+    }
 
 
 def variable_name(name: str, kind: str = "samples") -> str:
@@ -151,6 +162,8 @@ def samples_dataset(
     units: Mapping[str, str],
     records: np.ndarray,
     attributes: Mapping[str, object] | None = None,
+    objective: Objective = MEAN_GAP,
+    words: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """Outcome records and the designs they belong to, by growing sample number.
 
@@ -166,6 +179,10 @@ def samples_dataset(
         In any order, each sample once.
     attributes : mapping, optional
         Further global attributes.
+    objective : Objective
+        What ``objective`` is in the records.
+    words : mapping of str to str, optional
+        Long names of the design variables.
 
     Returns
     -------
@@ -194,7 +211,7 @@ def samples_dataset(
     left_out = {"sample", *ON_REQUEST} - asked
     data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
     coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
-    return dataset("samples", coords, data, attributes, units)
+    return dataset("samples", coords, data, attributes, units, objective, words)
 
 
 def records(samples: xr.Dataset) -> np.ndarray:
@@ -219,9 +236,11 @@ def response_dataset(
     time: ArrayLike,
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
+    objective: Objective = MEAN_GAP,
 ) -> xr.Dataset:
     """One response: series of shape (t,) or (t, 2), scalars, values of shape (2,) at the joints."""
-    return dataset("response", {"time": time, "joint": np.array(JOINTS)}, data, attributes)
+    coords = {"time": time, "joint": np.array(JOINTS)}
+    return dataset("response", coords, data, attributes, objective=objective)
 
 
 def timing_dataset(

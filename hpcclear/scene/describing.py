@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
 from hpcclear.scene.paths import flatten
+from hpcclear.scene.plausibility import implausible
 from hpcclear.scene.tables import SceneTables
 
 NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
@@ -47,6 +48,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
 
 def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
+    yield from implausible(scene)
     for name in ("crank", "rod"):
         link = getattr(scene.mechanism, name)
         least = slender_inertia(link.mass, link.length)

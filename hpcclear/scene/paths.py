@@ -1,7 +1,7 @@
 """Dotted paths: which entries of a scene are physical numbers, in which unit, and how to read or
 replace one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, get_args
 
@@ -54,6 +54,23 @@ def quantities() -> Mapping[str, Quantity]:
     return {
         path: quantity for top, model in PHYSICAL.items() for path, quantity in _entries(model, top)
     }
+
+
+_WORDS = {
+    "mass_center": "position of the mass centre of the {0}, from its first joint",
+    "inertia": "inertia of the {0} about its mass centre",
+    "clearance": "radial clearance of the joint {0}",
+}
+
+
+def described(paths: Sequence[str]) -> str:
+    """What entries are, in words: "mass of the rod"; of several that are alike, what they have in common."""
+    found = []
+    for path in paths:
+        *_, owner, leaf = path.split(".")
+        found.append(_WORDS.get(leaf, leaf.replace("_", " ") + " of the {0}").format(owner))
+    alike = {text.split(" of the joint ")[0] for text in found}
+    return alike.pop() if len(paths) > 1 and len(alike) == 1 else " and ".join(found)
 
 
 def replace(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import entries
-from hpcclear.scene.paths import quantities
+from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
 
 
@@ -51,6 +51,11 @@ class Points:
     def units(self) -> tuple[str, ...]:
         """SI unit of each column, "" for none."""
         return tuple(quantities()[paths[0]].unit for paths in self.paths)
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What each column is, by its name: a file's long names."""
+        return {name: described(paths) for name, paths in zip(self.names, self.paths, strict=True)}
 
     def column(self, name: str) -> Array:
         """Values of one column, shape (n,)."""

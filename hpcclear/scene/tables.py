@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective
 from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
@@ -107,11 +108,14 @@ class SceneTables(Table):
             )
         return self.study
 
+    @property
+    def objective(self) -> Objective:
+        """What each sample is judged by: the study's objective, f where there is no study."""
+        return MEAN_GAP if self.study is None else OBJECTIVES[self.study.objective]
+
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        asked = {name.replace("_", "-") for name in RESPONSES}
-        by_study = self.study is not None and self.study.objective in asked
-        return self.numerics.responses or by_study
+        return self.numerics.responses or self.objective.name.replace("-", "_") in RESPONSES
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23."""

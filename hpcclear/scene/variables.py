@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from hpcclear.base.normal import TAIL
 from hpcclear.base.outcome import ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, invalid, nearest
-from hpcclear.scene.paths import quantities
+from hpcclear.scene.paths import described, quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
     "m1": ("mechanism.crank.mass",),
@@ -158,6 +158,18 @@ class Variable(NamedInput):
     def unit(self) -> str:
         """SI unit of its value, "" for none."""
         return quantities()[self.paths[0]].unit
+
+    @property
+    def words(self) -> str:
+        """What it drives, in words: "mass of the rod"."""
+        return described(self.paths)
+
+    @property
+    def ratio_words(self) -> str:
+        """The same of the ratio that an inertia is given as."""
+        link = self.paths[0].split(".")[1]
+        number = {"crank": 1, "rod": 2}[link]
+        return f"inertia of the {link} over that of a slender rod, m{number} L{number}^2/12"
 
     @property
     def bounds(self) -> Range:

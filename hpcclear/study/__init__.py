@@ -184,7 +184,14 @@ def _write_samples(run: StudyRun) -> None:
     records, values = run.checkpoint.contents()
     before = records["sample"] < run.simulations.next
     units = {variable.name: variable.unit for variable in run.study.variables}
-    content = dataset.samples_dataset(run.study.names, values[before], units, records[before])
+    content = dataset.samples_dataset(
+        run.study.names,
+        values[before],
+        units,
+        records[before],
+        objective=run.scene.objective,
+        words=run.words,
+    )
     run.write(content, "samples.nc")
 
 

@@ -289,5 +289,5 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice]) -> None:
         "solution": np.arange(solutions),
     }
     units = {name: run.study.variable(name).unit or "1" for name in used}
-    content = dataset.dataset("front", coords, data, units=units, objective_unit=run.objective_unit)
+    content = dataset.dataset("front", coords, data, None, units, run.scene.objective, run.words)
     run.write(content, "front.nc")

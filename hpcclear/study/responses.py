@@ -37,7 +37,11 @@ def simulations(study: Study) -> int:
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
     """The scene of one design, at the clearance of the comparison if the study names one, without a study."""
     settings = run.study.verification
-    changes: dict[str, object] = {"study": None, "numerics.averaged_revolutions": revolutions}
+    changes: dict[str, object] = {
+        "study": None,
+        "numerics.averaged_revolutions": revolutions,
+        "numerics.responses": run.scene.responses_asked(),
+    }
     for name, value in choice.design.items():
         changes |= dict.fromkeys(run.study.variable(name).paths, value)
     if settings.response_clearance is not None:
@@ -65,7 +69,12 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     for name, choice in chosen:
         run.ranks.raise_if_stopped()
         scene = scene_of(run, choice, settings.response_revolutions * settings.response_windows)
-        table.append(_statistics(_steady(scene, simulate(scene), name), settings.response_windows))
+        table.append(
+            _statistics(
+                _steady(scene, simulate(scene, run.scene.objective), name),
+                settings.response_windows,
+            )
+        )
     return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
 
 
@@ -76,7 +85,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
-            content = _steady(scene, simulate(scene), name)
+            content = _steady(scene, simulate(scene, run.scene.objective), name)
         made_by = provenance(scene.to_toml(), scene.hash, scene.references)
         file = f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc"
         run.write(content, file, {**made_by, "design": name})

@@ -15,7 +15,7 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import generator
 from hpcclear.scene.study import Study
-from hpcclear.study.simulations import Simulations, objective_of
+from hpcclear.study.simulations import Simulations
 
 Result = dict[str, np.ndarray]
 
@@ -49,9 +49,12 @@ class StudyRun:
         return self.scene.required_study
 
     @property
-    def objective_unit(self) -> str:
-        """SI unit of what the study makes small."""
-        return objective_of(self.scene)[0]
+    def words(self) -> dict[str, str]:
+        """What the study variables are, by their names, and the ratios of inertias among them."""
+        variables = self.study.variables
+        return {one.name: one.words for one in variables} | {
+            f"{one.name}_ratio": one.ratio_words for one in variables if one.ratio is not None
+        }
 
     def rng(self, *labels: str) -> np.random.Generator:
         """A stream of random numbers for one purpose."""

@@ -89,8 +89,10 @@ def write(run: StudyRun, result: Result) -> None:
         "parameter": np.array(run.study.names),
     }
     content: xr.Dataset = dataset.dataset(
-        "sensitivity", coords, data, objective_unit=run.objective_unit
+        "sensitivity", coords, data, objective=run.scene.objective
     )
+    held = run.study.variable(parameter(run))
+    content["clearance"].attrs.update(long_name=held.words, units=held.unit or "1")
     content.attrs["failed_simulations"] = int(result["failed"])
     content.attrs["inertias"] = "varied as the ratio to m L^2/12 where the study gives a ratio"
     run.write(content, "sensitivity.nc")

@@ -1,6 +1,6 @@
 """The true function of a study: designs to objectives, through the dynamics, on all ranks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,29 +15,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
-
-OBJECTIVES: dict[str, tuple[str, Callable[[np.ndarray], Array]]] = {
-    "mean-gap": ("m", lambda records: records["objective"]),
-    "mean-contact-force": ("N", lambda records: records["mean_contact_force"].max(axis=1)),
-    "peak-contact-force": ("N", lambda records: records["peak_contact_force"].max(axis=1)),
-    "peak-crank-moment": ("N m", lambda records: records["peak_crank_moment"]),
-    "slider-acceleration-deviation": (
-        "m/s^2",
-        lambda records: records["slider_acceleration_deviation"],
-    ),
-}
-"""Unit of each objective, and what it is of a sample's record."""
-
-
-def objective_of(scene: Scene) -> tuple[str, Callable[[np.ndarray], Array]]:
-    """Unit of the study's objective and the function of the records.
-
-    Raises
-    ------
-    InputError
-        The scene has no study.
-    """
-    return OBJECTIVES[scene.required_study.objective]
 
 
 class Simulations:
@@ -69,7 +46,6 @@ class Simulations:
         self._ranks = ranks
         self._checkpoint = checkpoint
         self._style = style
-        self._unit, self._objective = objective_of(scene)
         self._variables = scene.required_study.variables
 
     def designs(self, names: Sequence[str], coordinates: Array) -> Points:
@@ -146,7 +122,7 @@ class Simulations:
 
     def objective(self, records: np.ndarray) -> Array:
         """The study's objective in records, NaN where the simulation failed."""
-        return np.where(records["status"] == Status.OK, self._objective(records), np.nan)
+        return np.where(records["status"] == Status.OK, records["objective"], np.nan)
 
     def values(self, names: Sequence[str], coordinates: Array, stage: str) -> Array:
         """Objectives of designs in sampling coordinates, shape (n,), NaN where failed."""

@@ -179,7 +179,7 @@ def write(run: StudyRun, result: Result) -> None:
         "parameter": np.array(parameters),
     }
     content = dataset.dataset(
-        "kriging", coords, data, units=_units(run), objective_unit=run.objective_unit
+        "kriging", coords, data, None, _units(run), run.scene.objective, run.words
     )
     run.write(content, "kriging.nc")
 

@@ -164,7 +164,7 @@ def write(
     units = {name: study.variable(name).unit or "1" for name in used}
     coords = {"design": np.array([choice.name for choice in choices])}
     content = dataset.dataset(
-        "verification", coords, data, units=units, objective_unit=run.objective_unit
+        "verification", coords, data, None, units, run.scene.objective, run.words
     )
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["remarks"] = " ".join(remarks) if remarks else "none"

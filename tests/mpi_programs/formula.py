@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, asked
 from hpcclear.base.outcome import OUTCOME, Status, failed
 from hpcclear.ensemble import compiling, simulate
 from hpcclear.ranks.stopping import Stopped
@@ -112,6 +113,7 @@ class FormulaWorker:
     lanes = 4
 
     def __init__(self, payload: dict[str, Any]) -> None:
+        self._objective = OBJECTIVES[payload["objective"]]
         self._scene = load_scene(payload["scene"])
         self._paths = payload["paths"]
         self._queue: list[tuple[int, np.ndarray]] = []
@@ -141,7 +143,7 @@ class FormulaWorker:
             like = (-1, *(1 for _ in OUTCOME[FIELD].shape))
             records[FIELD][fine] = objective(column)[fine].reshape(like)
         records["status"][fine] = Status.OK
-        return records
+        return asked(records, self._objective)
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -158,7 +160,7 @@ def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
     """Takes the place of the compilers."""
 
 
-def respond(scene: Scene):
+def respond(scene: Scene, judged_by: Objective = MEAN_GAP):
     """A response whose forces and accelerations are the objective times a wave."""
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     angle = np.linspace(0.0, 2 * np.pi * turns, 40 * turns + 1)
@@ -170,7 +172,7 @@ def respond(scene: Scene):
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    return dataset.response_dataset(angle / 523.0, {**data, **scalars})
+    return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=judged_by)
 
 
 def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from hpcclear.base.objectives import MEAN_GAP
+
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -69,6 +71,11 @@ def words(variable: xr.DataArray) -> str:
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
 
 
+def objective(content: xr.Dataset) -> str:
+    """What f is in a file of results, in words."""
+    return str(content.attrs.get("objective", MEAN_GAP.words))
+
+
 def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
     """The design variables of a dataset in its order."""
     return [v for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"]
@@ -77,8 +84,7 @@ def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
 def clearance(content: xr.Dataset) -> xr.DataArray | None:
     """The design variable that is a clearance, if there is one."""
     for variable in design_variables(content):
-        path = str(variable.attrs.get("scene_path", ""))
-        if path == "C" or path.rpartition(".")[2] == "clearance":
+        if str(variable.attrs.get("long_name", "")).startswith("radial clearance"):
             return variable
     return None
 

@@ -8,6 +8,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
+from hpcclear.results.names import DESIGN_VARIABLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +25,7 @@ _MEANINGS = {
     "m3": "slider mass $m_3$",
     "C": "clearance $C$",
 }
+"""Of the short names of a scene, for a variable that is what its short name says."""
 
 
 @style.drawn
@@ -79,7 +81,8 @@ def symbol(variable: xr.DataArray) -> str:
     """What a design variable is called on an axis, short enough for half a column."""
     name = str(variable.attrs["scene_path"])
     short = name if len(name) < 24 else "…" + name[-23:]
-    return _MEANINGS.get(name, labels.literal(short))
+    is_short = DESIGN_VARIABLES.get(name, ("", ""))[1] == variable.attrs.get("long_name")
+    return _MEANINGS[name] if is_short and name in _MEANINGS else labels.literal(short)
 
 
 def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.DataArray) -> "Axes":

@@ -34,7 +34,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
         panel.set_title(f"surface in {_surface(surface)}")
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("slope × range"))
-    _finish_grid(axes, len(surfaces), across.label("clearance $C$"))
+    _finish_grid(axes, len(surfaces), across.label(_held(sensitivity)))
     style.settle(figure.axes, 4)
     return figure
 
@@ -96,7 +96,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
         )  # below 0 a mean is the better fit
         line[1].set_ylim(0.0, min(2.0, line[1].get_ylim()[1]))
     for panel in axes[-1]:
-        panel.set_xlabel(across.label("clearance $C$"))
+        panel.set_xlabel(across.label(_held(sensitivity)))
     handles, words = axes[0, 0].get_legend_handles_labels()
     title = "length of the interval, share of the whole"
     figure.legend(
@@ -250,6 +250,12 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     _finish_grid(axes, len(found), unit.label("$f$ by the dynamics"))
     style.settle(figure.axes, 4)
     return figure
+
+
+def _held(sensitivity: xr.Dataset) -> str:
+    """What is held fixed for each surface: the clearance, unless a study says otherwise."""
+    words = labels.words(sensitivity["clearance"])
+    return "clearance $C$" if words == "radial clearance" else labels.literal(words)
 
 
 def _surface(name: str) -> str:

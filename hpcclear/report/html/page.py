@@ -104,6 +104,8 @@ def _sections(content: Content) -> Iterator[Section]:
 
 
 def _missing(content: Content) -> list[str] | None:
+    if set(content.files) <= {"accuracy", "timing"} and "accuracy" in content.files:
+        return list(content.troubles) or None  # a directory of `accuracy` lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]
     if not content.responses:
         words.append(

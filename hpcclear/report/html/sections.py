@@ -5,6 +5,7 @@ import xarray as xr
 
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels
+from hpcclear.report.html import costs
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 
@@ -23,6 +24,7 @@ def summary(content: Content) -> dict[str, object]:
         *_samples_words(content),
         *_designs_words(content),
         *_claims_words(content),
+        *costs.words(content),
         *_time_words(content),
     ]
     if not words:
@@ -41,7 +43,7 @@ def _samples_words(content: Content) -> list[str]:
     if bool(f.notnull().any()):
         low, high = (str(quantity(float(end), str(f.attrs["units"]))) for end in (f.min(), f.max()))
         words.append(
-            f"The objective f, the mean distance from the clearance circle, lies between {low} and {high}."
+            f"The objective f, {labels.objective(samples)}, lies between {low} and {high}."
         )
     return words
 
@@ -136,7 +138,10 @@ def designs(content: Content) -> dict[str, object] | None:
     main = sorted(
         (k for k in range(len(names)) if k not in spread), key=lambda k: _place(verified, k)
     )
-    words = "Mean and deviation of f by direct simulation, with confidence limits; and by the surrogate."
+    words = (
+        f"Mean and deviation of f, {labels.objective(verified)}, by direct simulation, with confidence limits; and by the "
+        "surrogate."
+    )
     caption = "The original and the optimised designs"
     if content.is_compared:
         words = (

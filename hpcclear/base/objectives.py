@@ -1,0 +1,72 @@
+"""What a study may make small: each objective's name, unit and words, and what it is of a sample's record.
+
+The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` puts the objective that was asked for in its
+place, on the rank that simulated it, and everybody after that reads ``objective``.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Records
+from hpcclear.base.outcome import OUTCOME
+
+
+class Objective(NamedTuple):
+    """One objective: `name` in a scene file, SI `unit`, `words` for people, and its value `of` records (n,)."""
+
+    name: str
+    unit: str
+    words: str
+    of: Callable[[Records], Array]
+
+
+_ALL = (
+    Objective("mean-gap", "m", "mean distance from the clearance circle", lambda r: r["objective"]),
+    Objective(
+        "mean-contact-force",
+        "N",
+        "mean contact force, of the joint where it is larger",
+        lambda r: r["mean_contact_force"].max(axis=1),
+    ),
+    Objective(
+        "peak-contact-force",
+        "N",
+        "peak contact force, of the joint where it is larger",
+        lambda r: r["peak_contact_force"].max(axis=1),
+    ),
+    Objective(
+        "peak-crank-moment",
+        "N m",
+        "peak moment of the drive on the crank",
+        lambda r: r["peak_crank_moment"],
+    ),
+    Objective(
+        "slider-acceleration-deviation",
+        "m/s^2",
+        "standard deviation in time of the slider acceleration",
+        lambda r: r["slider_acceleration_deviation"],
+    ),
+)
+OBJECTIVES = {one.name: one for one in _ALL}
+"""Every objective by its name."""
+
+MEAN_GAP = OBJECTIVES["mean-gap"]
+"""f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
+
+_OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("objective_"))
+
+
+def asked(records: Records, objective: Objective) -> Records:
+    """Records (n,) as the kernel leaves them, with the objective that was asked for as ``objective``.
+
+    How far f scatters between revolutions and copies says nothing of another objective, so that is NaN then.
+    """
+    if objective is MEAN_GAP:
+        return records
+    found = records.copy()
+    found["objective"] = objective.of(records)
+    for name in _OF_THE_GAP:
+        found[name] = np.nan
+    return found

@@ -1,0 +1,91 @@
+"""Numbers that are allowed and hardly meant: rad/s taken for rpm, Pa for GPa, mm for m, grams for kilograms.
+
+Limits lie well beyond what is built, so that a warning is worth reading; each says what would be plausible and what to write.
+"""
+
+import math
+from collections.abc import Iterator
+
+from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
+from hpcclear.scene.tables import SceneTables
+
+FASTEST = 30.0
+"""Mean slider speed of the fastest engines that are built, m/s: racing engines reach 26."""
+MOST_TURNS = 30_000.0
+"""Revolutions a minute: small model engines reach as many."""
+SOFTEST, STIFFEST = 1e6, 1.3e12
+"""Young's moduli of soft rubber and of diamond, Pa."""
+WIDEST = 0.1
+"""Clearance over bearing radius; worn bearings reach a hundredth, the mechanisms that publications study a twentieth."""
+LONGEST = 5.0
+"""Of a crank or rod, m."""
+STEEL = 7850.0
+"""kg/m3."""
+
+
+def implausible(scene: SceneTables) -> Iterator[str]:
+    """A sentence for each number that is likely a slip of units."""
+    yield from _drive(scene)
+    yield from _bodies(scene)
+    yield from _joints(scene)
+    effects = scene.effects
+    if effects.gravity > 100.0:
+        yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
+    if (effects.friction.coefficient or 0.0) > 1.0:
+        yield (
+            f"effects.friction.coefficient = {effects.friction.coefficient:g} is above 1; "
+            "lubricated bearings have 0.001 to 0.1"
+        )
+
+
+def _drive(scene: SceneTables) -> Iterator[str]:
+    drive = scene.drive
+    key = "initial_speed" if isinstance(drive, TorqueDrive) else "speed"
+    speed = float(getattr(drive, key))
+    turns = speed / (2.0 * math.pi)
+    mean = 4.0 * scene.mechanism.crank.length * turns
+    if mean > FASTEST or 60.0 * turns > MOST_TURNS:
+        yield (
+            f"drive.{key} = {speed:.6g} rad/s is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; engines "
+            f'stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
+        )
+
+
+def _bodies(scene: SceneTables) -> Iterator[str]:
+    mechanism = scene.mechanism
+    heaviest = 5.0 * STEEL * mechanism.rod.length**3
+    for name in ("crank", "rod"):
+        link = getattr(mechanism, name)
+        if link.length > LONGEST:
+            yield f'mechanism.{name}.length = {link.length:g} m; if mm are meant, write "{link.length:g} mm"'
+        if link.inertia > 100.0 * link.mass * link.length**2:
+            yield (
+                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is {link.inertia / (link.mass * link.length**2):.2g} "
+                "times mass times length squared; mind the unit, or give a flywheel as drive.flywheel_inertia"
+            )
+    for name in ("crank", "rod", "slider"):
+        mass = getattr(mechanism, name).mass
+        if mass > heaviest:
+            yield (
+                f"mechanism.{name}.mass = {mass:g} kg is more than five steel cubes as long as the rod "
+                f'({heaviest:.3g} kg); if grams are meant, write "{mass:g} g"'
+            )
+
+
+def _joints(scene: SceneTables) -> Iterator[str]:
+    for name in scene.clearance_joints():
+        joint = getattr(scene.joints, name)
+        assert isinstance(joint, ClearanceJoint)
+        for part in ("bearing", "journal"):
+            modulus = getattr(joint, part).youngs_modulus
+            if not SOFTEST <= modulus <= STIFFEST:
+                what = "softer than rubber" if modulus < SOFTEST else "stiffer than diamond"
+                yield (
+                    f"joints.{name}.{part}.youngs_modulus = {modulus:g} Pa is {what}; "
+                    'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'
+                )
+        if joint.clearance > WIDEST * joint.bearing_radius:
+            yield (
+                f"joints.{name}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
+                "bearing's radius; write the radial play, half of the difference of the diameters"
+            )
