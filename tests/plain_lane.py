@@ -55,6 +55,7 @@ class Lane:
             "saturated": plain(friction.saturated),
             "spring_force": plain(elements.spring_force),
             "harmonic": plain(elements.harmonic),
+            "sign_of": plain(elements.sign_of),
         }
         exec(self.text.source, names)
         self.run = names["lane"]

@@ -10,6 +10,7 @@ from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, r
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import motion, rhs
+from hpcclear.dynamics.linkage.elements import sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.slider_crank import joints_of, motion_of
 from hpcclear.dynamics.physics.angles import sincos
@@ -180,7 +181,12 @@ def slider_crank_lanes(effects, coordinates, rng, W):
 def test_the_slider_crank_has_the_bits_of_the_motions_by_hand(W, on):
     effects = at.Effects(**on)
     text = motion_of(effects)
-    names = {"joint_force": motion.joint_force, "sincos": sincos, "saturated": saturated}
+    names = {
+        "joint_force": motion.joint_force,
+        "sincos": sincos,
+        "saturated": saturated,
+        "sign_of": sign_of,
+    }
     exec(text.source, names)
     generated, by_hand = compiled(lane_function(names["lane"]), effects, W)
     rng = np.random.default_rng(1)

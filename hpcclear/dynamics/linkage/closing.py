@@ -34,13 +34,16 @@ from hpcclear.dynamics.linkage.parts import (
 class Row(NamedTuple):
     """One constraint: derivatives by columns, and the sum of these times accelerations that is asked for.
 
-    `others`: derivatives by what is prescribed or held, for its reactions.
+    `others`: derivatives by what is prescribed or held, for its reactions; `error` and `rate`: the constraint and its
+    first derivative.
     """
 
     name: str
     columns: dict[Column, Term]
     asked: Term
     others: dict[Column, Term]
+    error: Term
+    rate: Term
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,8 @@ class Closing:
             if turns and given:
                 asked = asked - term * self.kinematics.turn(column.body)
         alpha2, beta2 = write.parameter("alpha2"), write.parameter("beta2")
-        return Row(name, free, asked - alpha2 * rate - beta2 * error, others)
+        asked = asked - alpha2 * rate - beta2 * error
+        return Row(name, free, asked, others, error, rate)
 
     def _pin(self, joint: Revolute) -> list[Row]:
         kin = self.kinematics

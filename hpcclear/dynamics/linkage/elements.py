@@ -1,9 +1,8 @@
-"""Springs, dampers and harmonic drives, a lane at a time: what generated motions call besides the contact law."""
+"""Springs, dampers and harmonic drives: what generated motions call besides the contact law. Uncompiled, they take arrays."""
 
-import math
+import numpy as np
 
 from hpcclear.base.jit import lane_function
-from hpcclear.dynamics.physics.angles import sincos
 
 _TINY = 1e-300  # keeps the direction of a spring without length defined (and nought)
 
@@ -15,7 +14,7 @@ def spring_force(stiffness, damping, length, ex, ey, vx, vy):
     Returns both components in N, and the power that both ends are given in W (what it stores and loses, negative).
     """
     square = ex * ex + ey * ey + _TINY
-    inverse = 1.0 / math.sqrt(square)
+    inverse = 1.0 / np.sqrt(square)
     nx = ex * inverse
     ny = ey * inverse
     rate = vx * nx + vy * ny
@@ -24,7 +23,12 @@ def spring_force(stiffness, damping, length, ex, ey, vx, vy):
 
 
 @lane_function
-def harmonic(mean, amplitude, rate, phase, time):
-    """Angle (rad), angular velocity and acceleration of a harmonic drive, ``rate`` in rad/s."""
-    s, c = sincos(rate * time + phase)
-    return mean + amplitude * s, amplitude * rate * c, -amplitude * rate * rate * s
+def sign_of(value):
+    """1 for what is not negative, -1 for the rest."""
+    return 1.0 if value >= 0.0 else -1.0
+
+
+@lane_function
+def harmonic(mean, amplitude, rate, sine, cosine):
+    """Angle (rad), angular velocity and acceleration of a harmonic drive, ``rate`` in rad/s, at a phase."""
+    return mean + amplitude * sine, amplitude * rate * cosine, -amplitude * rate * rate * sine

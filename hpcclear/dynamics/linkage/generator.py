@@ -53,6 +53,7 @@ class Rows:
     time: int = at.STAGE_TIME
     torque_value: int = at.TORQUE_VALUE
     load_value: int = at.LOAD_VALUE
+    holds: int | None = None  # first of the multipliers, where they are asked for
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
 
@@ -264,7 +265,12 @@ class _Generator:
     def _accelerated(self, k: int, term: Term) -> Term:
         """Write an acceleration down where the stepper reads it."""
         if k >= len(self.columns):
-            return self.writer.let(f"hold_{self.constraints[k - len(self.columns)].name}", term)
+            r = k - len(self.columns)
+            value = self.writer.let(f"hold_{self.constraints[r].name}", term)
+            if self.rows.holds is not None:
+                text = self.writer.text(value)
+                self.writer.line(f"work[{self.rows.holds + r} * W + i] = {text}")
+            return value
         name = self.forest.coordinates[k].name
         value = self.writer.let(f"a_{name}", term, whole=True)
         row = self.rows.accelerations + k

@@ -97,7 +97,7 @@ class Guide:
         _, determinant, given = equations(self.ratio)
         other = write.let("guess", (first * c - b * given) / determinant)
         flip = write.fresh("flip")
-        write.line(f"{flip} = 1.0 if {write.text(rest + slope * other)} >= 0.0 else -1.0")
+        write.line(f"{flip} = sign_of({write.text(rest + slope * other)})")
         ratio = write.let("ratio", self.ratio * named(flip))
         coupled, determinant, given = equations(ratio)
         other = write.let(f"z_{o}", (first * c - b * given) / determinant)
@@ -128,7 +128,7 @@ def coupled(
             push = push + slope * found[k]
         push = write.let(f"push_{guide.joint.name}", push)
         flip = write.fresh(f"flip_{guide.joint.name}")
-        write.line(f"{flip} = 1.0 if {write.text(push)} >= 0.0 else -1.0")
+        write.line(f"{flip} = sign_of({write.text(push)})")
         flips.append(named(flip))
         pushes.append(push)
     for g, guide in enumerate(guides):

@@ -22,7 +22,7 @@ from hpcclear.dynamics.linkage.parts import (
     ConstantSpeed,
     Harmonic,
     Slide,
-    TableDrive,
+    TorqueDrive,
     split,
 )
 from hpcclear.dynamics.linkage.trees import Forest
@@ -97,7 +97,7 @@ class Kinematics:
         """Angle, angular velocity and acceleration that a drive prescribes."""
         write, name = self.writer, f"angle_{frame}"
         time = named("time")
-        if isinstance(drive, ConstantSpeed):
+        if isinstance(drive, (ConstantSpeed, TorqueDrive)):  # the latter where it starts
             speed = write.parameter(f"{drive.name}_speed")
             start = self._number(f"{frame}_start", self.start_of(drive, frame))
             text = f"{drive.name}_speed * time"
@@ -106,23 +106,21 @@ class Kinematics:
                 text, needs = f"{frame}_start + {text}", (start, speed, time)
             write.when_needed((name,), f"{name} = {text}", needs)
             return named(name), speed, ZERO
-        assert isinstance(drive, (Harmonic, TableDrive))
-        spin, acceleration = f"spin_{frame}", f"turn_{frame}"
-        if isinstance(drive, Harmonic):
-            numbers = tuple(
-                write.parameter(f"{drive.name}_{entry}")
-                for entry in ("mean", "amplitude", "rate", "phase")
-            )
-            given = ", ".join(term.name for term in numbers)
-            text = f"harmonic({given}, time)"
-        else:
-            numbers = ()
-            text = f"tabulated_{drive.name}(work, i, W)"
-        line = f"{name}, {spin}, {acceleration} = {text}"
-        write.when_needed((name, spin, acceleration), line, (*numbers, time))
+        assert isinstance(drive, Harmonic)
+        spin, acceleration, phase = f"spin_{frame}", f"turn_{frame}", f"phase_{frame}"
+        mean, amplitude, rate, shift = (
+            write.parameter(f"{drive.name}_{entry}")
+            for entry in ("mean", "amplitude", "rate", "phase")
+        )
+        line = f"s_{phase}, c_{phase} = sincos({rate.name} * time + {shift.name})"
+        write.when_needed((f"s_{phase}", f"c_{phase}"), line, (rate, time, shift))
+        given = f"{mean.name}, {amplitude.name}, {rate.name}, s_{phase}, c_{phase}"
+        line = f"{name}, {spin}, {acceleration} = harmonic({given})"
+        needs = (mean, amplitude, rate, named(f"s_{phase}"))
+        write.when_needed((name, spin, acceleration), line, needs)
         return named(name), named(spin), named(acceleration)
 
-    def start_of(self, drive: ConstantSpeed, frame: str) -> float:
+    def start_of(self, drive: ConstantSpeed | TorqueDrive, frame: str) -> float:
         """Angle of a driven frame at time 0, rad."""
         start = self.forest.mechanism.body(drive.body).start_angle
         return start - self.forest.offsets[drive.body]

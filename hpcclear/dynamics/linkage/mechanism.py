@@ -18,7 +18,6 @@ from hpcclear.dynamics.linkage.parts import (
     Pair,
     Revolute,
     Slide,
-    TableDrive,
     split,
 )
 
@@ -171,7 +170,6 @@ def _numbers(m: Mechanism) -> None:
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
         Harmonic: ("frequency",),
-        TableDrive: ("duration",),
     }
     for key, one in _records(m):
         for entry in positive.get(type(one), ()):

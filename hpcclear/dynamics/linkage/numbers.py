@@ -89,6 +89,7 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
                 found[f"{drive.name}_phase"] = drive.phase
             case TorqueDrive():
                 found[f"{drive.name}_torque"] = drive.torque
+                found[f"{drive.name}_speed"] = drive.initial_speed
     for load in trees.mechanism.loads:
         match load:
             case Force():

@@ -133,23 +133,6 @@ class Harmonic:
 
 
 @dataclass(frozen=True)
-class TableDrive:
-    """The body's angle (rad) is tabulated over `duration` (s) and repeats: pairs (time, angle)."""
-
-    name: str
-    body: str
-    rows: tuple[Pair, ...]
-    duration: float
-    period: bool = False
-    prescribed: ClassVar[bool] = True
-
-    @property
-    def seconds(self) -> float:
-        """One pass of the table, s."""
-        return self.duration
-
-
-@dataclass(frozen=True)
 class TorqueDrive:
     """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle."""
 
@@ -168,7 +151,7 @@ class TorqueDrive:
         return 2 * math.pi / abs(self.initial_speed)
 
 
-Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
+Drive = ConstantSpeed | Harmonic | TorqueDrive
 
 
 @dataclass(frozen=True)

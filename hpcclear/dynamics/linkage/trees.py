@@ -79,16 +79,20 @@ class Forest:
         return isinstance(hang.joint, Revolute) and split(hang.parent)[0] == GROUND
 
 
-def forest(mechanism: Mechanism, cartesian: bool = False) -> Forest:
-    """Cut a mechanism into trees; `cartesian`: into single bodies."""
-    edges, closures = ([], list(mechanism.ideal)) if cartesian else _spanning(mechanism)
+def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) -> Forest:
+    """Cut a mechanism into trees; `cartesian`: into single bodies.
+
+    `closed`, of single bodies only: as if no joint had clearance and no drive gave way.
+    """
+    joints = list(mechanism.joints if closed else mechanism.ideal)
+    edges, closures = ([], joints) if cartesian else _spanning(mechanism)
     if cartesian:
         edges = [joint for joint in closures if isinstance(joint, Fixed)]
         closures = [joint for joint in closures if not isinstance(joint, Fixed)]
     hangs = _hung(mechanism, edges)
     frames, offsets = _frames(mechanism, hangs)
     prescribed = {frames[d.body]: d for d in mechanism.drives if d.prescribed and not cartesian}
-    ends = [d for d in mechanism.drives if d.prescribed] if cartesian else []
+    ends = [d for d in mechanism.drives if d.prescribed or closed] if cartesian else []
     return Forest(
         mechanism, hangs, frames, offsets, _coordinates(mechanism, hangs, frames, prescribed),
         prescribed, (*closures, *ends),

@@ -1,0 +1,113 @@
+"""Constraints of a mechanism as numbers, for Newton's method: errors, rates and Jacobian in Cartesian coordinates.
+
+The terms are those of `closing.Closing`, evaluated by Python or, for many instants at once, by numpy.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics.linkage import elements
+from hpcclear.dynamics.linkage.closing import Closing
+from hpcclear.dynamics.linkage.expression import Writer
+from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.numbers import values
+from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.dynamics.physics.friction import saturated
+
+
+def sincos(angle: Any) -> tuple[Any, Any]:
+    """Sine and cosine of numbers or arrays, any shape."""
+    return np.sin(angle), np.cos(angle)
+
+
+def sign_of(value: Any) -> Any:
+    """`elements.sign_of` for arrays, any shape."""
+    return np.where(value >= 0.0, 1.0, -1.0)
+
+
+WORDS: dict[str, Callable[..., Any]] = {
+    "sincos": sincos,
+    "sign_of": sign_of,
+    "harmonic": elements.harmonic.py_func,
+    "spring_force": elements.spring_force.py_func,
+    "saturated": saturated.py_func,
+}
+"""What texts call, for arrays."""
+
+
+class State(NamedTuple):
+    """Constraints at a pose: errors (rows,), rates (rows,), Jacobian (rows, n)."""
+
+    error: Array
+    rate: Array
+    jacobian: Array
+
+
+class Loops:
+    """Constraints of a mechanism's bodies, three coordinates each; `closed`: joints with clearance centred, torque drives at
+    their initial speed.
+
+    Attributes
+    ----------
+    owners : tuple of str
+        Which joint or drive each row belongs to, "joints.NAME" or "drives.NAME".
+    scales : ndarray, shape (n,)
+        What a coordinate's unit step means: a typical length for x and y, 1 for angles.
+    """
+
+    def __init__(self, mechanism: Mechanism, closed: bool = False) -> None:
+        self.mechanism = mechanism
+        self.forest = forest(mechanism, cartesian=True, closed=closed)
+        columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
+        self.size = n = len(columns)
+        writer = Writer({}, 0, hoist=False)
+        kinematics = Kinematics(self.forest, writer, 0, n, 2 * n)
+        closing = Closing(kinematics, writer)
+        owners: list[str] = []
+        texts: list[str] = []
+        places: list[tuple[int, int]] = []
+        for one in self.forest.closures:
+            table = "joints" if hasattr(one, "places") else "drives"
+            for row in closing.rows(one):
+                r = len(owners)
+                owners.append(f"{table}.{one.name}")
+                texts += [f"error[{r}] = {writer.text(row.error)}"]
+                texts += [f"rate[{r}] = {writer.text(row.rate)}"]
+                for column, term in row.columns.items():
+                    places.append((r, columns.index(column)))
+                    texts.append(f"entries[{len(places) - 1}] = {writer.text(term)}")
+        self.owners = tuple(owners)
+        self._places = tuple(np.array(places, int).reshape(-1, 2).T)
+        lines = "\n    ".join([*writer.lines, *texts, "pass"])
+        names: dict[str, Any] = dict(WORDS)
+        exec(f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}", names)
+        self._evaluate = names["closed"]
+        base = values(mechanism, cartesian=True)
+        self._par = {writer.rows[name]: base[name] for name in writer.read}
+        length = typical_length(mechanism)
+        self.scales = np.array([1.0 if c.kind == "angle" else length for c in columns])
+
+    def at(self, q: Array, v: Array, time: float) -> State:
+        """Constraints of coordinates and velocities (n,) at a time in s."""
+        rows = len(self.owners)
+        error, rate = np.zeros(rows), np.zeros(rows)
+        entries = np.zeros(len(self._places[0]))
+        self._evaluate([*q, *v, time], self._par, error, rate, entries)
+        jacobian = np.zeros((rows, self.size))
+        jacobian[self._places] = entries
+        return State(error, rate, jacobian)
+
+
+def typical_length(mechanism: Mechanism) -> float:
+    """The largest distance between points of a body, or of the ground, m."""
+    groups = [list(mechanism.ground.values())]
+    groups += [[*body.points.values(), body.center] for body in mechanism.bodies]
+    return (
+        max((math.dist(a, b) for points in groups for a in points for b in points), default=0.0)
+        or 1.0
+    )

@@ -1,0 +1,238 @@
+"""Assembly from rough angles, motions that drives prescribe, and what is refused, by the name of the joint."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dense_linkage import Dense
+from linkages import (
+    LINKAGES,
+    MOTOR,
+    RUB,
+    bar,
+    four_bar,
+    pins,
+    quick_return,
+    six_bar,
+    slider_crank,
+    three_rrr,
+    v_twin,
+)
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import ideal
+from hpcclear.dynamics.linkage.assembly import assemble, open_gaps
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import Body, ConstantSpeed, GuideFriction, Slide
+from hpcclear.dynamics.linkage.prescribed import prescribed_motion
+
+PRESCRIBED = {
+    "slider-crank": slider_crank(tilt=0.3, offset=0.01, friction=RUB, off=0.003),
+    "four-bar": four_bar(off=0.004),
+    "v-twin": v_twin(friction=RUB),
+    "six-bar": six_bar(friction=RUB),
+    "quick-return": quick_return(friction=RUB),
+    "3-RRR": three_rrr(),
+}
+
+
+def in_dense_order(dense, assembly, rows):
+    """Values (..., n) of the assembly's coordinates, bodies in file order, x, y and angle each; 0 for held bodies."""
+    found = np.zeros((*rows.shape[:-1], dense.n))
+    for k, one in enumerate(assembly.loops.forest.coordinates):
+        place = dense.first[one.body] + ("x", "y", "angle").index(one.kind)
+        found[..., place] = rows[..., k]
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in LINKAGES if name != "held frame"])
+def test_every_linkage_is_assembled_as_it_was_meant(name):
+    mechanism = LINKAGES[name]
+    assembly = assemble(mechanism)
+    dense = Dense(mechanism)
+    q, v = (in_dense_order(dense, assembly, x) for x in (assembly.q, assembly.v))
+    c, dc, _ = dense.along(q, v, 0.0)
+    assert np.abs(c).max(initial=0.0) < 1e-13
+    assert np.abs(dc).max(initial=0.0) < 1e-10
+    assert all(gap < 1e-12 for gap in open_gaps(assembly).values())
+    for body in mechanism.bodies:
+        if isinstance(mechanism.drive_of(body.name), ConstantSpeed):
+            assert assembly.angle(body.name) == pytest.approx(body.start_angle)
+    assert len(assembly.report()) == len(mechanism.bodies)
+
+
+def test_journals_start_where_they_are_put():
+    mechanism = slider_crank("o12", "o23")
+    joints = tuple(
+        replace(joint, start_eccentricity=(1e-4, -5e-5)) if joint.name == "o12" else joint
+        for joint in mechanism.joints
+    )
+    gaps = open_gaps(assemble(replace(mechanism, joints=joints)))
+    assert gaps["o12"] == pytest.approx(math.hypot(1e-4, 5e-5))
+    assert gaps["o23"] < 1e-12
+
+
+@pytest.mark.parametrize(("make", "most"), [(four_bar, 2), (slider_crank, 2), (six_bar, 4)])
+def test_random_start_angles_lead_to_one_of_the_assemblies(make, most):
+    rng = np.random.default_rng(3)
+    base, poses = make(), set()
+    for _ in range(25):
+        bodies = tuple(
+            body if base.drive_of(body.name) else replace(body, start_angle=rng.uniform(-3, 3))
+            for body in base.bodies
+        )
+        assembly = assemble(replace(base, bodies=bodies))
+        x = [k for k, one in enumerate(assembly.loops.forest.coordinates) if one.kind != "angle"]
+        poses.add(tuple(np.round(assembly.q[x], 9) + 0.0))
+    assert 1 <= len(poses) <= most
+
+
+@pytest.mark.parametrize("name", PRESCRIBED)
+def test_prescribed_motion_is_the_dense_model_s(name):
+    mechanism = PRESCRIBED[name]
+    motion = prescribed_motion(mechanism, np.linspace(0.0, 0.2, 25), gravity=9.81)
+    dense = Dense(mechanism, gravity=9.81)
+    q, v, a = (in_dense_order(dense, motion.assembly, x) for x in (motion.q, motion.v, motion.a))
+    for k, time in enumerate(motion.times):
+        c, dc, _ = dense.along(q[k], v[k], time)
+        assert np.abs(c).max() < 1e-12
+        assert np.abs(dc).max() < 1e-9
+        expected = dense.accelerations(q[k], v[k], time)
+        np.testing.assert_allclose(a[k], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+        scale = max(map(abs, dense.seen["multipliers"].values()))
+        for (joint, row), value in dense.seen["multipliers"].items():
+            name = f"{joint}_{'angle' if row == 'drive' else row}"
+            assert motion.holds[name][k] == pytest.approx(value, rel=1e-8, abs=1e-9 * scale)
+        assert motion.loss[k] == pytest.approx(dense.seen["guide_loss"], rel=1e-8, abs=1e-8)
+        assert motion.load_power[k] == pytest.approx(dense.seen["load_power"], rel=1e-9, abs=1e-9)
+    assert motion.margin.min() > 1e-3
+
+
+def test_the_slider_crank_without_clearance_is_that_of_the_closed_form():
+    mechanism = slider_crank(friction=GuideFriction(0.1, 0.2))
+    bodies = tuple(replace(body, start_angle=0.0) for body in mechanism.bodies)
+    mechanism = replace(mechanism, bodies=bodies)
+    crank, rod, slider = bodies
+    par = np.ones(at.PARAMETERS)
+    given = {
+        at.SPEED: MOTOR.speed, at.CRANK_LENGTH: 0.05, at.ROD_LENGTH: 0.12, at.GRAVITY: 9.81,
+        at.ROD_NEAR: rod.center[0], at.ROD_FAR: 0.12 - rod.center[0], at.ROD_MASS: rod.mass,
+        at.ROD_INERTIA: rod.inertia, at.SLIDER_MASS: slider.mass, at.CRANK_MASS: crank.mass,
+        at.CRANK_NEAR: crank.center[0], at.CRANK_MOMENT: crank.mass * crank.center[0],
+        at.CRANK_INERTIA: crank.inertia + crank.mass * crank.center[0] ** 2,
+        at.GUIDE_COEFFICIENT: 0.1, at.GUIDE_INVERSE_RAMP: 5.0,
+    }  # fmt: skip
+    for row, value in given.items():
+        par[row] = value
+    times = np.linspace(0.0, 2 * math.pi / MOTOR.speed, 100)
+    exact = ideal.ideal_response(at.Effects(gravity=1, guide=1), par, None, MOTOR.speed * times)
+    motion = prescribed_motion(mechanism, times, gravity=9.81)
+    forest = motion.assembly.loops.forest
+    x, angle = forest.index("x", "slider"), forest.index("angle", "rod")
+    for got, row, scale in (
+        (motion.q[:, x], ideal.SLIDER_X, 0.1),
+        (motion.v[:, x], ideal.SLIDER_V, 1.0),
+        (motion.a[:, x], ideal.SLIDER_A, 100.0),
+        (motion.q[:, angle], ideal.ROD_ANGLE, 1.0),
+        (motion.holds["o12_x"], ideal.FORCE_12_X, -100.0),  # ours is on the crank
+        (motion.holds["o23_y"], ideal.FORCE_23_Y, -100.0),
+        (motion.holds["guide_across"], ideal.GUIDE_FORCE, 100.0),
+        (motion.holds["motor_angle"], ideal.CRANK_MOMENT, 10.0),
+    ):
+        np.testing.assert_allclose(
+            got, np.sign(scale) * exact[row], rtol=0, atol=1e-12 * abs(scale)
+        )
+
+
+# ---- what is refused ----------------------------------------------------------------------------
+def stretched(length, **points):
+    """The four-bar with a coupler of another length."""
+    base = four_bar()
+    coupler = bar("coupler", length, 0.3, 0.5, tip=(0.06, 0.05))
+    return replace(base, bodies=(base.bodies[0], coupler, base.bodies[2]))
+
+
+def on_two_rails():
+    """A carriage on two parallel guides, and a bar that swings freely."""
+    carriage = Body(
+        "carriage", 1.0, 1e-3, points={"a": (0.0, 0.0), "b": (0.1, 0.1), "pin": (0.0, 0.05)}
+    )
+    return Mechanism(
+        (
+            bar("crank", 0.05, 0.1, 0.4),
+            carriage,
+            bar("rod", 0.2, 0.1, 0.1),
+            bar("tail", 0.1, 0.1, -1.0),
+        ),
+        (
+            *pins((), ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "rod.a")),
+            Slide("rail", "carriage.a", "ground.o"),
+            Slide("second", "carriage.b", "ground.high"),
+            *pins(("o3",), ("o3", "carriage.pin", "rod.b"), ("o4", "tail.a", "rod.b")),
+        ),
+        (MOTOR,),
+        {"o": (0.0, 0.0), "high": (0.0, 0.1)},
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "key", "said"),
+    [
+        (lambda: stretched(0.01), "joints.o3", "does not close"),
+        (lambda: stretched(0.4), "joints.", "does not close"),
+        (lambda: slider_crank(offset=0.4), "joints.", "does not close"),
+        (on_two_rails, "joints.second", "a joint too many"),
+    ],
+)
+def test_what_cannot_be_assembled_is_refused(make, key, said):
+    with pytest.raises(InputError) as caught:
+        assemble(make())
+    assert caught.value.key.startswith(key)
+    assert said in str(caught.value)
+
+
+def test_a_start_in_a_dead_centre_is_refused():
+    """Coupler and rocker in line: the crank cannot push them."""
+    base = four_bar()
+    reach = 0.12 + 0.08
+    crank = replace(base.bodies[0], start_angle=math.pi)
+    far = math.sqrt(reach**2) - 0.04
+    mechanism = replace(
+        base,
+        bodies=(
+            crank,
+            replace(base.bodies[1], start_angle=0.0),
+            replace(base.bodies[2], start_angle=math.pi),
+        ),
+        ground={"o": (0.0, 0.0), "p": (far, 0.0)},
+    )
+    with pytest.raises(InputError, match="dead centre") as caught:
+        assemble(mechanism)
+    assert caught.value.key.startswith("joints.o")
+
+
+def test_a_crank_that_cannot_turn_through_is_stopped_at_its_dead_centre():
+    mechanism = stretched(0.07)
+    with pytest.raises(InputError) as caught:
+        prescribed_motion(mechanism, np.linspace(0, 0.16, 50))
+    assert caught.value.key.startswith("joints.o")
+
+
+def test_what_is_left_free_has_no_prescribed_motion():
+    for mechanism in (four_bar("o2"), LINKAGES["chain"]):
+        with pytest.raises(InputError, match="left free"):
+            prescribed_motion(mechanism, np.zeros(1))
+
+
+def test_a_second_drive_of_constant_speed_may_turn_twice_as_fast():
+    base = three_rrr()
+    drives = tuple(
+        ConstantSpeed(f"servo{k}", f"arm{k}", 0.2 * (1 + k % 2), period=k == 0) for k in range(3)
+    )
+    motion = prescribed_motion(replace(base, drives=drives), np.linspace(0, 0.3, 7))
+    forest = motion.assembly.loops.forest
+    for k in range(3):
+        spins = motion.v[:, forest.index("angle", f"arm{k}")]
+        np.testing.assert_allclose(spins, 0.2 * (1 + k % 2), rtol=1e-9)
