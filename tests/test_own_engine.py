@@ -164,3 +164,27 @@ def test_a_slip_of_units_is_warned_of_in_a_line_with_a_remedy(change, fragments)
 @pytest.mark.parametrize("job", sorted(path.name for path in JOBS.glob("*.toml")))
 def test_what_is_meant_is_not_warned_of(job):
     assert not list(implausible(load_scene(JOBS / job)))
+
+
+RIGID = ("joints.crank_rod.kind=ideal", "joints.rod_slider.kind=ideal")
+
+
+@pytest.mark.parametrize("more", [(), RIGID], ids=["with play", "without"])
+def test_a_response_holds_the_load_that_was_applied(more):
+    """Through every row of the table, between the rows, and its work is the work that the balance knows."""
+    found = hpcclear.simulate(engine(*more, study=False))
+    angle, load = found.crank_angle.to_numpy(), found.slider_load.to_numpy()
+    for degrees, force in ((0, -9000.0), (40, -3000.0), (180, -200.0)):
+        for turn in (0, 1):
+            at = np.interp(np.radians(degrees) + 2 * np.pi * turn, angle, load)
+            assert at == pytest.approx(force, abs=30.0)
+    assert load.min() >= -9000.0 - 1e-6
+    assert load.max() <= -200.0 + 1e-6
+    work = np.trapezoid(load * found.slider_velocity, found.time)
+    assert work == pytest.approx(float(found.load_work[-1] - found.load_work[0]), rel=1e-3)
+    assert found.slider_load.attrs["units"] == "N"
+    assert np.allclose(found.crank_speed, 100 * np.pi)
+
+
+def test_no_load_no_column():
+    assert "slider_load" not in hpcclear.simulate(engine("effects.slider_load=none", study=False))

@@ -259,10 +259,11 @@ def run(
     Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
     """
 
-    def program(ranks: "Ranks") -> int | None:
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_study
         from hpcclear.study import run_study
 
-        return run_study(
+        place = run_study(
             _scene(file, overrides),
             _place(output),
             ranks,
@@ -270,6 +271,7 @@ def run(
             progress_style=progress,
             tell=lambda text: click.echo(text, err=True),
         )
+        describe_study(place)
 
     return _on_ranks(program, time_limit)
 

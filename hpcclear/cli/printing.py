@@ -13,7 +13,9 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.answer import answer
 from hpcclear.report.figures import labels
+from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,11 +44,14 @@ def table(title: str, rows: list[tuple[str, str]]) -> Table:
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """A number for people in a unit of a readable size, "nan" where there is none."""
-    scale = labels.scale(unit, value)
-    shown = "" if scale.unit == "–" else scale.unit
-    if "utf" not in (sys.stdout.encoding or "").lower():
-        shown = shown.replace("µ", "u").replace("²", "^2")
-    return f"{value * scale.factor:.{digits}g} {shown}".strip()
+    return fitting(labels.quantity(value, unit, digits)) if np.isfinite(value) else "nan"
+
+
+def fitting(text: str) -> str:
+    """A text as the terminal can show it: units in plain letters where it has no others."""
+    if "utf" in (sys.stdout.encoding or "").lower():
+        return text
+    return text.replace("µ", "u").replace("²", "^2").replace("–", "-")
 
 
 def objective_of(content: xr.Dataset) -> tuple[str, str]:
@@ -218,6 +223,15 @@ def describe_statistics(found: "Finished") -> None:
         rows.append(("deviation of f", quantity(deviation, unit)))
     out.print(table("Statistics", rows + _load(found)))
     out.print(f"statistics {found.output}")
+
+
+def describe_study(place: Path) -> None:
+    """Print the answer of a finished study in ten lines, and where its files are."""
+    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in ("samples", "verification")}
+    out = console()
+    lines = [(line.label, fitting(line.text)) for line in answer(found, str(place))]
+    out.print(table("The answer", lines))
+    out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
 
 
 def describe_samples(found: "Finished") -> None:

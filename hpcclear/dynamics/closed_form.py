@@ -86,6 +86,7 @@ def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     none = np.zeros((len(angle), 2))
     return angle / p.speed, {
         "crank_angle": angle,
+        "crank_speed": omega,
         "slider_position": seen[ideal.SLIDER_X],
         "slider_velocity": seen[ideal.SLIDER_V],
         "slider_acceleration": seen[ideal.SLIDER_A],

@@ -14,6 +14,7 @@ from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.views import Parameters, Settings
 from hpcclear.scene import Scene
+from hpcclear.scene.fields import Curve
 
 LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""
@@ -211,6 +212,17 @@ def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = CELLS) -
     height[-1], slope[-1] = height[0], slope[0]
     d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
     return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
+
+
+def curve_at(curve: Curve, angle: Array) -> Array:
+    """A torque or load at crank angles (n,) in rad, as the kernel reads it."""
+    if not isinstance(curve, tuple):
+        return np.full(len(angle), curve)
+    place = np.mod(angle, at.TURN) * (CELLS / at.TURN)
+    cell = np.minimum(place.astype(int), CELLS - 1)
+    s = place - cell
+    c0, c1, c2, c3 = periodic_cells(curve).reshape(-1, 4)[cell].T
+    return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
 
 
 def implicit_method(scene: Scene) -> str:

@@ -16,7 +16,13 @@ from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
-from hpcclear.dynamics.problem import Problem, coordinate_count, integrator_of, problem_of
+from hpcclear.dynamics.problem import (
+    Problem,
+    coordinate_count,
+    curve_at,
+    integrator_of,
+    problem_of,
+)
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.target import recorded, resolve
@@ -169,6 +175,8 @@ def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
     objective = named.objective if objective is None else objective
     times, data, record = simulated(scene)
     record = asked(record, objective)
+    if scene.effects.slider_load is not None:
+        data["slider_load"] = curve_at(scene.effects.slider_load, data["crank_angle"])
     names = (
         "objective",
         "objective_spread",
@@ -231,7 +239,11 @@ def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
         slider = rigid[ideal.SLIDER_A]
     m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
     data |= _series(scene, m, par, rates, contacts, works)
-    return times, data | {"crank_angle": phi, "slider_acceleration": slider}, record
+    return (
+        times,
+        data | {"crank_angle": phi, "crank_speed": omega, "slider_acceleration": slider},
+        record,
+    )
 
 
 def _in_turn(q: Array, revolution: Array, turning: bool) -> Array:

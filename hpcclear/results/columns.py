@@ -118,6 +118,8 @@ RESPONSE: Columns = {
     "time": number(("time",), "s", "time since the start"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "crank_angle": number(("time",), "rad", "crank angle"),
+    "crank_speed": number(("time",), "rad/s", "crank speed"),
+    "slider_load": number(("time",), "N", "force applied to the slider, along +x"),
     "slider_position": number(("time",), "m", "slider position"),
     "slider_velocity": number(("time",), "m/s", "slider velocity"),
     "slider_acceleration": number(("time",), "m/s^2", "slider acceleration"),
@@ -236,6 +238,9 @@ VERIFICATION: Columns = {
     "deviation_paper": number(("design",), "m", "deviation as printed in the paper, its Table 4"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),
+    "beyond_hertz": count(("design",), "number of simulations whose penetration left the range of Hertz theory"),
+    "random": text(("design",), "random inputs of its case"),
+    "on_bounds": text(("design",), "variables that sit on a bound of the study, and on which"),
 }
 
 CLAIMS: Columns = {

@@ -48,7 +48,7 @@ def run_study(
     fresh: bool = False,
     progress_style: Style = "auto",
     tell: Callable[[str], object] = lambda text: None,
-) -> int | None:
+) -> Path:
     """Carry a study through; call it on root, under `hpcclear.ranks.boundary.run_on_ranks`.
 
     Parameters
@@ -67,8 +67,8 @@ def run_study(
 
     Returns
     -------
-    None
-        When all is done.
+    Path
+        The directory of the results, when all is done.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def run_study(
         else:
             _carry_out(scene, session)
         session.close(session.attributes)
-    return None
+    return place.output
 
 
 def _carry_out(scene: Scene, session: Session) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Flag
 from hpcclear.results import dataset
-from hpcclear.scene.domain import to_coordinates
+from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
@@ -17,6 +18,9 @@ from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
 
 _COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
+
+ON_BOUND = 5e-3
+"""Share of a variable's range within which a design sits on its bound."""
 
 
 def original(run: StudyRun) -> list[Choice]:
@@ -43,7 +47,7 @@ def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verifi
 
 
 def simulate(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
-    """True mean and deviation of designs with standard errors, arrays over the designs.
+    """True mean and deviation of designs with standard errors, and counts, arrays over the designs.
 
     Raises
     ------
@@ -55,9 +59,12 @@ def simulate(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
     points = Points(
         batches[0].names, np.concatenate([batch.values for batch in batches]), batches[0].paths
     )
-    values = run.simulations.objective(run.simulations.records(points, stage))
+    records = run.simulations.records(points, stage)
+    values = run.simulations.objective(records)
     table = np.array([moments(one) for one in values.reshape(len(choices), count)])
-    return {name: table[:, k] for k, name in enumerate(_COLUMNS)}
+    beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
+    found = {name: table[:, k] for k, name in enumerate(_COLUMNS)}
+    return found | {"beyond_hertz": beyond.reshape(len(choices), count).sum(axis=1)}
 
 
 def moments(values: Array) -> tuple[float, float, float, float, int]:
@@ -102,6 +109,20 @@ def misses(
                 f"deviation {100 * errors[1]:+.1f} % off the true one."
             )
     return missed, texts
+
+
+def _on_bounds(run: StudyRun, choice: Choice) -> str:
+    """Variables of a design that sit on a bound, and on which: "m2 lower, u2 upper"."""
+    names = tuple(choice.design)
+    region = box(run.scene, names)
+    values = np.array([list(choice.design.values())])
+    place = (to_coordinates(run.scene, names, values)[0] - region.lower) / (
+        region.upper - region.lower
+    )
+    ends = np.where(
+        abs(place) < ON_BOUND, "lower", np.where(abs(place - 1) < ON_BOUND, "upper", "")
+    )
+    return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
 
 
 def infill_points(run: StudyRun, choices: Sequence[Choice], label: str) -> Array:
@@ -160,6 +181,9 @@ def write(
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     data["failed"] = true["failed"].astype(np.int64)
+    data["beyond_hertz"] = true["beyond_hertz"]
+    data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
+    data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])
     data["samples"] = np.full(len(choices), study.verification.samples)
     units = {name: study.variable(name).unit or "1" for name in used}
     coords = {"design": np.array([choice.name for choice in choices])}

@@ -61,6 +61,15 @@ def scale(units: str, values: ArrayLike) -> Scale:
     return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
 
 
+def quantity(value: float, units: str, digits: int = 4) -> str:
+    """A number with its unit in a readable size, a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    chosen = scale(units, value)
+    unit = "" if chosen.unit == "–" else f" {chosen.unit}"
+    return f"{value * chosen.factor:.{digits}g}{unit}"
+
+
 def of(variable: xr.DataArray) -> Scale:
     """The scale of a variable of a dataset."""
     return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())

@@ -99,8 +99,4 @@ def number(value: float, digits: int = 4) -> Number:
 
 def quantity(value: float, units: str, digits: int = 4) -> Number:
     """A number with its unit, in a readable size."""
-    if not np.isfinite(value):
-        return Number("–")
-    scale = labels.scale(units, value)
-    unit = "" if scale.unit == "–" else f" {scale.unit}"
-    return Number(f"{value * scale.factor:.{digits}g}{unit}")
+    return Number(labels.quantity(value, units, digits))

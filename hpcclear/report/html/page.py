@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
+from hpcclear.report.answer import answer
 from hpcclear.report.html import costs, gallery, origin, picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.markup import Section, render
@@ -85,6 +86,8 @@ def _policy() -> str:
 def _sections(content: Content) -> Iterator[Section]:
     """All sections in the page's order, those with nothing to show among them."""
     beside = " beside the paper's" if content.is_compared else ""
+    lines = answer(content.files, str(content.directory))
+    yield Section("answer", "The answer", "answer.html", lines or None)
     yield Section("summary", "Summary", "summary.html", sections.summary(content))
     yield Section(
         "designs", f"Optimised designs{beside}", "designs.html", sections.designs(content)

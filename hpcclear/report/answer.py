@@ -1,0 +1,190 @@
+"""The answer of a study in ten lines, from its files alone: which design to take, how sure that is, what to do next.
+
+What the command prints at its end, and what stands on top of the page.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.figures import labels
+
+SPAN = 2.0
+"""Deviations above the mean that a design is judged by: some 98 of 100 machines that are made stay below."""
+
+MANY = 0.05
+"""Share of samples beyond the range of the theory from which it is said first."""
+
+NAMED = 3
+"""Designs named before the rest is counted."""
+
+
+class Line(NamedTuple):
+    """One line of the answer: what it is about, and what is said."""
+
+    label: str
+    text: str
+
+
+def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
+    """The lines, best first; empty where no design was verified.
+
+    Parameters
+    ----------
+    files : mapping of str to xarray.Dataset
+        Result files by their kind.
+    place : str
+        Directory they are in, as the reader knows it.
+    """
+    verified = files.get("verification")
+    if verified is None or not np.isfinite(verified["mean_true"]).any():
+        return []
+    ours = _ours(verified)
+    best = ours.isel(design=int(_judged(ours).argmin()))
+    original = _original(ours)
+    return [
+        Line("take", _named(best)),
+        Line("why", f"{labels.objective(verified)}: least mean + {SPAN:g} deviations of "
+             f"{ours.sizes['design']} designs simulated, case {_case(best)}"),
+        Line("its values", _values(best)),
+        Line("true mean", _moment(best, "mean", original)),
+        Line("true deviation", _moment(best, "deviation", original)),
+        Line("as good as it", _alike(ours, best)),
+        Line("on a bound", _bounds(best)),
+        Line("theory", _left(files, best)),
+        Line("how sure", _sure(best, verified)),
+        Line("next", "; ".join(_next(ours, best, place))),
+    ]  # fmt: skip
+
+
+def _ours(verified: xr.Dataset) -> xr.Dataset:
+    """Designs of the case in which most is random, the original among them, without those a publication prints."""
+    rows = [k for k in range(verified.sizes["design"]) if _counts(verified.isel(design=k))]
+    if "case" in verified:
+        cases = [str(case) for case in verified["case"].to_numpy()]
+        chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
+        rows = [k for k in rows if cases[k] == chosen]
+    return verified.isel(design=rows)
+
+
+def _random_inputs(verified: xr.Dataset, k: int) -> int:
+    return len(str(verified["random"].to_numpy()[k]).split()) if "random" in verified else 0
+
+
+def _counts(one: xr.Dataset) -> bool:
+    finite = np.isfinite(float(one["mean_true"])) and np.isfinite(float(one["deviation_true"]))
+    return finite and not labels.is_printed(one)
+
+
+def _original(ours: xr.Dataset) -> xr.Dataset | None:
+    for k, name in enumerate(ours["design"].to_numpy()):
+        if str(name).rpartition(" ")[2] == "original":
+            return ours.isel(design=k)
+    return None
+
+
+def _judged(ours: xr.Dataset) -> np.ndarray:
+    return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
+
+
+def _named(best: xr.Dataset) -> str:
+    name = str(best["design"].item())
+    if name.rpartition(" ")[2] == "original":
+        return f"{name}: keep the design as it is, nothing that was simulated is better"
+    return name
+
+
+def _case(best: xr.Dataset) -> str:
+    return str(best["case"].item()) if "case" in best else "of the study"
+
+
+def _values(best: xr.Dataset) -> str:
+    shown = [
+        f"{labels.words(v)} = {labels.quantity(float(v), str(v.attrs['units']))}"
+        for v in labels.design_variables(best)
+        if np.isfinite(float(v))
+    ]
+    return ", ".join(shown)
+
+
+def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
+    """A true moment with its limits, and against the original's."""
+    one = best[f"{word}_true"]
+    unit = str(one.attrs["units"])
+    text = labels.quantity(float(one), unit)
+    if f"{word}_lower" in best and np.isfinite(float(best[f"{word}_lower"])):
+        ends = (labels.quantity(float(best[f"{word}_{end}"]), unit) for end in ("lower", "upper"))
+        text += " (" + " to ".join(ends) + ")"
+    if original is None or str(original["design"].item()) == str(best["design"].item()):
+        return text
+    before = float(original[f"{word}_true"])
+    change = float(one) / before - 1.0
+    return f"{text}: {abs(change):.0%} {'less' if change < 0 else 'more'} than the original's {labels.quantity(before, unit)}"
+
+
+def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
+    lower, upper = ours[f"{word}_lower"].to_numpy(), ours[f"{word}_upper"].to_numpy()
+    return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
+
+
+def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Designs whose limits of mean and of deviation both overlap with those of the best."""
+    if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
+        return []
+    alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")
+    names = [str(name) for name in ours["design"].to_numpy()[alike]]
+    return [name for name in names if name != str(best["design"].item())]
+
+
+def _alike(ours: xr.Dataset, best: xr.Dataset) -> str:
+    twins = _twins(ours, best)
+    if not twins:
+        return "none: every other design differs by more than the limits"
+    shown = ", ".join(twins[:NAMED])
+    more = len(twins) - NAMED
+    shown += f" and {more} more" if more > 0 else ""
+    return f"{shown}: within the limits they cannot be told apart, choose by cost"
+
+
+def _bounds(best: xr.Dataset) -> str:
+    found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
+    return found or "none of its variables"
+
+
+def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
+    """Share of simulations that left the range of Hertz's theory, or failed."""
+    parts = []
+    if "beyond_hertz" in best:
+        share = int(best["beyond_hertz"]) / int(best["samples"])
+        parts.append(f"{share:.0%} of the simulations of this design")
+    samples = files.get("samples")
+    if samples is not None and "flags" in samples:
+        beyond = (samples["flags"].to_numpy() & int(Flag.BEYOND_HERTZ)) != 0
+        failed = int((samples["status"].to_numpy() != Status.OK).sum())
+        parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples, {failed} failed")
+    return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
+
+
+def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
+    count = int(best["samples"]) if "samples" in best else 0
+    level = float(verified.attrs.get("confidence", np.nan))
+    text = f"{count} direct simulations of each design"
+    text += f", limits of {level:.0%}" if np.isfinite(level) else ""
+    errors = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
+    if len(errors) == 2 and np.isfinite(errors).all():
+        text += f"; the surrogate was off by {errors[0]:+.1%} and {errors[1]:+.1%} there"
+    return text
+
+
+def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
+    """What to do, the most useful first; the report in the end."""
+    if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
+        yield "mind the contact: smaller clearances or stiffer bearings, or forces are only a guide"
+    if "on_bounds" in best and str(best["on_bounds"].item()):
+        yield "widen the ranges of the variables on a bound if the machine allows it"
+    if _twins(ours, best) and "samples" in best:
+        yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
+    yield f"hpcclear report {place}"
