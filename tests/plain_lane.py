@@ -45,7 +45,7 @@ def joints_of(mechanism):
 class Lane:
     """A generated motion as plain Python, with the rates where the layout has them."""
 
-    def __init__(self, mechanism, on=EVERYTHING, **options):
+    def __init__(self, mechanism, on=EVERYTHING, *, feedback=(ALPHA, BETA), **options):
         self.mechanism = mechanism
         rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, 401, 402, free=100)
         self.text = generate(mechanism, on, rows, **options)
@@ -59,7 +59,6 @@ class Lane:
         }
         exec(self.text.source, names)
         self.run = names["lane"]
-        feedback = (ALPHA, BETA)
         base = values(
             mechanism, options.get("cartesian", False), gravity=GRAVITY, feedback=feedback
         )
