@@ -1,21 +1,33 @@
 """Generated motions: against a dense model that shares no formula, and the slider-crank's against those written by hand."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from dense_linkage import Dense
-from linkages import LINKAGES, four_bar, slider_crank
+from linkages import LINKAGES, four_bar, six_bar, slider_crank
 from numba import njit
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
+from plain_lane import joints_of as joints_of_lane
+from scipy.integrate import solve_ivp
 
+from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import motion, rhs
+from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.elements import sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
+from hpcclear.dynamics.linkage.parts import ConstantSpeed
 from hpcclear.dynamics.linkage.slider_crank import joints_of, motion_of
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
+from assembly import executed_arithmetic
+
+FAST = ConstantSpeed("motor", "crank", 200.0)
 IN_PLACE = ("slider-crank, two", "v-twin, ideal, torque", "quick-return")
 
 
@@ -199,3 +211,80 @@ def test_the_slider_crank_has_the_bits_of_the_motions_by_hand(W, on):
         np.testing.assert_array_equal(work, other)  # zeros of either sign are equal
         moved += np.abs(work[at.ACC * W : (at.ACC + 2) * W]).sum()
     assert moved > 0
+
+
+# ---- whole motions, and the machine code -----------------------------------------------------------
+def energy(dense, q, v):
+    """Kinetic, potential and elastic energy of a state."""
+    total = 0.5 * dense.masses() @ v**2 + GRAVITY * dense.masses()[1::3] @ q[1::3]
+    for joint in dense.mechanism.clearances:
+        a, b = (np.array(dense.place(q, place), float) for place in joint.places)
+        depth = max(np.linalg.norm(a - b) - joint.clearance, 0.0)
+        total += 0.4 * joint.stiffness * depth**2.5
+    return total
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "end"),
+    [
+        (four_bar("o2", "o3", drive=FAST, off=0.003), 1e-3),
+        pytest.param(four_bar("o1", "o2", "o3", "o4", drive=FAST), 1e-3, marks=pytest.mark.full),
+    ],
+    ids=["two", "four"],
+)
+def test_whole_motions_are_the_dense_model_s_and_conserve_energy(mechanism, end):
+    """A four-bar from its assembly into contact, before motions of two tolerances part: to 1e-8 m, and 1e-8 of the energy."""
+    lane = Lane(mechanism)
+    dense = Dense(mechanism, [CONTACT] * len(mechanism.clearances), GRAVITY)
+    assembly = assemble(mechanism)
+    order = [
+        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
+        for one in assembly.loops.forest.coordinates
+    ]
+    q, v = np.zeros((2, dense.n))
+    q[order], v[order] = assembly.q, assembly.v
+    start = coordinates(lane, dense, q, v, 0.0 * v)
+    n = len(start[0])
+    seen = []
+
+    def of_lane(t, y):
+        a, work = lane(y[:n], y[n : 2 * n], t)
+        seen.append(max(work[FREE + 1 : FREE + 20 * len(mechanism.clearances) : 20]))
+        rates = work[at.RATE_NOW + 1000 :]
+        return [*y[n : 2 * n], *a, *rates[[at.DRIVE_POWER, at.LOAD_POWER, at.DISSIPATION]]]
+
+    def of_dense(t, y):
+        return [*y[dense.n :], *dense.accelerations(y[: dense.n], y[dense.n :], t)]
+
+    options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12, "max_step": 2e-5}
+    y = solve_ivp(of_lane, (0, end), [*start[0], *start[1], 0, 0, 0], **options).y[:, -1]
+    z = solve_ivp(of_dense, (0, end), [*q, *v], **options).y[:, -1]
+    expected = coordinates(lane, dense, z[: dense.n], z[dense.n :], 0.0 * v)
+    np.testing.assert_allclose(y[:n], expected[0], rtol=0, atol=1e-8)
+    assert max(seen) > 10.0  # N: there was contact
+    before, after = energy(dense, q, v), energy(dense, z[: dense.n], z[dense.n :])
+    drive, load, loss = y[2 * n :]
+    assert abs(after - before - drive - load + loss) < 1e-8 * (after + abs(drive))
+    assert loss > 1e-6 * after
+
+
+@pytest.mark.parametrize("mechanism", [four_bar("o2", "o3"), six_bar("o3", "o6")])
+def test_generated_motions_are_packed(mechanism):
+    lane = Lane(mechanism, On(friction=True))
+    joints, W = joints_of_lane(mechanism), 32
+    names = {"joint_force": motion.joint_force, "sincos": sincos}
+    exec(lane.text.source, names)
+    compiled_lane = lane_function(names["lane"])
+    effects = at.Effects(fixed=1, coulomb=1)
+
+    @njit(error_model="numpy")
+    def run(lanes):
+        par = beyond(lanes, 51200)
+        for i in range(W):
+            compiled_lane(effects, joints, lanes, par, i, W)
+
+    lanes = np.ones(51200 + 32000)
+    run(lanes)
+    found = executed_arithmetic(run.inspect_asm(run.signatures[0]))
+    assert found.packed.total() > 100
+    assert found.packed_share >= 0.9
