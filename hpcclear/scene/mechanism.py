@@ -109,6 +109,18 @@ class Material(Table):
     """Poisson's ratio."""
 
 
+def check_journal(clearance: float, bearing_radius: float) -> None:
+    """An error for validators unless a journal is left, m."""
+    if clearance >= bearing_radius:
+        raise invalid(
+            "the clearance must be smaller than the bearing radius "
+            f"({bearing_radius:g} m), or no journal is left",
+            "Write the radial clearance R_B - R_J",
+            key="clearance",
+            value=clearance,
+        )
+
+
 class ClearanceJoint(Table):
     """A journal that moves freely in a bearing larger than itself by the clearance."""
 
@@ -129,14 +141,7 @@ class ClearanceJoint(Table):
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
-        if self.clearance >= self.bearing_radius:
-            raise invalid(
-                "the clearance must be smaller than the bearing radius "
-                f"({self.bearing_radius:g} m), or no journal is left",
-                "Write the radial clearance R_B - R_J",
-                key="clearance",
-                value=self.clearance,
-            )
+        check_journal(self.clearance, self.bearing_radius)
         return self
 
 

@@ -15,7 +15,15 @@ Valid = TypeVar("Valid", bound=Table)
 
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
 _TAGGED = (("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
-_KINDS = {"drive": '"constant-speed" or "torque"', "joints": '"clearance" or "ideal"'}
+_TAGGED_ROWS = ("joints", "drives", "loads")  # of a planar linkage
+_KINDS = {
+    "drive": '"constant-speed" or "torque"',
+    "joints.crank_rod": '"clearance" or "ideal"',
+    "joints.rod_slider": '"clearance" or "ideal"',
+    "joints": '"revolute", "clearance", "slide" or "fixed"',
+    "drives": '"constant-speed", "harmonic" or "torque"',
+    "loads": '"force", "torque" or "spring"',
+}
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 
 
@@ -90,6 +98,9 @@ def _translated(error: ErrorDetails, content: Mapping[str, Any], more: int) -> I
 
 def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ...]:
     """A location without the tag that pydantic adds below a table whose kind decides its fields."""
+    in_rows = len(location) > 2 and location[0] in _TAGGED_ROWS and isinstance(location[1], int)
+    if in_rows and not kind.startswith("union_tag"):
+        return location[:2] + location[3:]
     for prefix in _TAGGED:
         if (
             location[: len(prefix)] == prefix
@@ -134,7 +145,9 @@ def _explained(error: ErrorDetails, found: Any, path: str) -> tuple[str, str]:
                 found, str
             ) else (f"Write {expected}")
         case "union_tag_not_found":
-            return "is missing", f"Add kind = {_KINDS[path.partition('.')[0]]}"
+            table = path.removesuffix(".kind")
+            kinds = _KINDS.get(table) or _KINDS[table.partition(".")[0]]
+            return "is missing", f"Add kind = {kinds}"
         case "bool_type":
             return "true or false is expected here", "Write true or false"
         case "string_type":

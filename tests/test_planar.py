@@ -1,0 +1,184 @@
+"""Planar linkages from tables: read into data, assembled, refused by name; the slider-crank's scene written out."""
+
+import copy
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from running import scene_with
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
+from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar import planar_mechanism, slider_crank_mechanism
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Parameters
+
+TEXT = """
+kind = "planar"
+
+[bodies.crank]
+mass = "200 g"
+inertia = 3e-5
+center = ["20 mm", 0.0]
+points = { a = [0.0, 0.0], b = ["40 mm", 0.0] }
+start_angle = "25 deg"
+
+[bodies.coupler]
+mass = 0.3
+inertia = 4e-4
+center = [0.06, 0.01]
+points = { a = [0.0, 0.0], b = [0.12, 0.0], tip = [0.06, 0.05] }
+start_angle = "40 deg"
+
+[bodies.rocker]
+like = "crank"
+points = { a = [0.0, 0.0], b = [0.08, 0.0] }
+start_angle = "90 deg"
+
+[ground]
+points = { o = [0.0, 0.0], p = [0.13, 0.01] }
+
+[joints.o1]
+kind = "revolute"
+journal = "crank.a"
+bearing = "ground.o"
+
+[joints.o2]
+kind = "clearance"
+journal = "crank.b"
+bearing = "coupler.a"
+clearance = "0.3 mm"
+bearing_radius = "20 mm"
+materials.bearing = { youngs_modulus = "0.5 GPa", poisson_ratio = 0.38 }
+materials.journal = { youngs_modulus = "206.8 GPa", poisson_ratio = 0.29 }
+
+[joints.o3]
+like = "o2"
+journal = "coupler.b"
+bearing = "rocker.b"
+clearance = "0.1 mm"
+
+[joints.o4]
+kind = "revolute"
+journal = "rocker.a"
+bearing = "ground.p"
+
+[drives.motor]
+kind = "constant-speed"
+body = "crank"
+speed = "3000 rpm"
+period = true
+
+[loads.weight]
+kind = "force"
+place = "coupler.tip"
+force = [0.0, "-10 N"]
+
+[loads.band]
+kind = "spring"
+first = "rocker.b"
+second = "ground.o"
+stiffness = 100.0
+"""
+TABLES = tomllib.loads(TEXT)
+
+
+def changed(path, value):
+    """The tables with another entry, or without it."""
+    tables = copy.deepcopy(TABLES)
+    *keys, last = path.split(".")
+    table = tables
+    for key in keys:
+        table = table.setdefault(key, {})
+    if value is None:
+        del table[last]
+    else:
+        table[last] = value
+    return tables
+
+
+def test_tables_are_read_into_data_and_assembled():
+    mechanism = planar_mechanism(TABLES)
+    assert [body.name for body in mechanism.bodies] == ["crank", "coupler", "rocker"]
+    crank, coupler, rocker = mechanism.bodies
+    assert (crank.mass, crank.center) == (0.2, (0.02, 0.0))
+    assert crank.start_angle == pytest.approx(math.radians(25))
+    assert (rocker.mass, rocker.points["b"]) == (0.2, (0.08, 0.0))  # like the crank
+    assert coupler.points["tip"] == (0.06, 0.05)
+    o2, o3 = mechanism.clearances
+    assert isinstance(o3, Clearance)
+    assert (o3.clearance, o3.bearing_radius, o3.journal) == (1e-4, 0.02, "coupler.b")
+    assert o3.stiffness > o2.stiffness > 1e8  # the tighter, the stiffer
+    assert mechanism.period.speed == pytest.approx(100 * math.pi)
+    assert [type(load) for load in mechanism.loads] == [Force, Spring]
+    names = [one.name for one in forest(mechanism).coordinates]
+    assert names == ["x_coupler", "y_coupler", "angle_coupler", "angle_rocker"]
+    assembly = assemble(mechanism)
+    assert assembly.angle("crank") == pytest.approx(math.radians(25))
+    assert 0 < assembly.angle("coupler") < assembly.angle("rocker") < math.pi
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "key", "said"),
+    [
+        ("bodies.coupler.mass", "3 m", "bodies.coupler.mass", "kg"),
+        ("bodies.coupler.mass", 0, "bodies.coupler.mass", "above 0"),
+        ("bodies.coupler.mass", None, "bodies.coupler.mass", "missing"),
+        ("bodies.coupler.weight", 1.0, "bodies.coupler.weight", "not a known key"),
+        ("bodies.coupler.points.b", [0.12], "bodies.coupler.points.b", "pair"),
+        ("bodies.coupler.points", "a, b", "bodies.coupler.points", "named points"),
+        ("bodies.rocker.like", "crnk", "bodies.rocker.like", "crank"),
+        ("joints.o1.kind", "revolut", "joints.o1.kind", "revolute"),
+        ("joints.o1.kind", None, "joints.o1.kind", '"slide"'),
+        ("joints.o2.clearance", None, "joints.o2.clearance", "missing"),
+        ("joints.o2.clearance", "30 mm", "joints.o2.clearance", "bearing radius"),
+        ("joints.o2.journal", "crank.c", "joints.o2.journal", "no point"),
+        ("drives", {}, "drives", "nothing drives"),
+        ("drives.motor.body", "piston", "drives.motor.body", "no such body"),
+        ("drives.motor.speed", 0, "drives.motor.speed", "nothing would turn"),
+        ("loads.weight.place", "coupler", "loads.weight.place", "no point"),
+        ("loads.band.kind", "rubber", "loads.band.kind", "spring"),
+        ("bodies.extra", {"mass": 1.0}, "bodies.extra.inertia", "inertia"),
+    ],
+)
+def test_wrong_tables_are_refused_by_name(path, value, key, said):
+    with pytest.raises(InputError) as caught:
+        planar_mechanism(changed(path, value))
+    assert caught.value.key == key
+    assert said in str(caught.value)
+
+
+TILTED = {"joints.crank_rod.start_eccentricity": [1e-4, -5e-5]}
+TORQUE = {"drive": {"kind": "torque", "torque": 5.0, "initial_speed": 300.0}}
+
+
+@pytest.mark.parametrize("changes", [{}, TILTED, TORQUE], ids=["paper", "eccentric", "torque"])
+def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
+    scene = scene_with(changes, 1)
+    mechanism = slider_crank_mechanism(scene)
+    par = parameters(scene)
+    assembly = assemble(mechanism)
+    start = start_states(scene, par)
+    names = [(one.kind, one.body) for one in assembly.loops.forest.coordinates]
+    order = [
+        names.index(p) for p in (("x", "rod"), ("y", "rod"), ("angle", "rod"), ("x", "slider"))
+    ]
+    np.testing.assert_allclose(assembly.q[order], start.coordinates(4)[0], atol=1e-14)
+    np.testing.assert_allclose(assembly.v[order], start.velocities(4)[0], rtol=1e-9, atol=1e-9)
+    stiffness = [joint.stiffness for joint in mechanism.clearances]
+    np.testing.assert_allclose(stiffness, Parameters(par).stiffness[0], rtol=1e-15)
+
+
+def test_guide_friction_and_load_are_written_out_too():
+    scene = scene_with(
+        {"effects.guide_friction": {"coefficient": 0.1}, "effects.slider_load": -50.0}, 1
+    )
+    mechanism = slider_crank_mechanism(scene)
+    guide = next(joint for joint in mechanism.joints if isinstance(joint, Slide))
+    assert guide.friction is not None
+    assert guide.friction.coefficient == 0.1
+    assert mechanism.loads == (Force("load", "slider.pin", (-50.0, 0.0)),)
