@@ -2,14 +2,15 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from numba import njit
 
 from hpcclear.base.jit import FASTMATH
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.base.one_text import one_text
+from hpcclear.dynamics.layout import Effects
+from hpcclear.dynamics.linkage.rhs import SIGNATURE, motion
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
 _X86 = re.compile(
@@ -100,14 +101,14 @@ def executed_arithmetic(assembly: str) -> Arithmetic:
 
 
 @cache
-def force_evaluation(width: int) -> Callable[..., Any]:
-    """The kernel's force evaluation for `width` lanes, compiled on its own.
-
-    Arguments: effects, work, parameters, torque table, load table.
-    """
-
-    @njit(error_model="numpy", fastmath=FASTMATH)
-    def evaluate(effects, work, par, torque_table, load_table):
-        accelerations(effects, work, par, torque_table, load_table, width)
-
-    return evaluate
+def force_evaluation(effects: Effects, width: int) -> str:
+    """Assembly of the kernel's force evaluation for `width` lanes, as steppers call it."""
+    text = one_text(motion, f"motion_{width}", effects=effects, W=width)
+    compiled = njit(
+        SIGNATURE,
+        error_model="numpy",
+        fastmath=FASTMATH,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+    )(text)
+    return str(compiled.inspect_asm(compiled.signatures[0]))

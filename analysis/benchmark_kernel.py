@@ -25,7 +25,7 @@ from scenes import Setup, ensemble, scene
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import motion_of, run_motion
 from hpcclear.dynamics.views import Outcome
 from hpcclear.results.dataset import provenance
 
@@ -71,9 +71,9 @@ def _force_loop(width: int) -> Callable[..., Any]:
     """Repeats the force evaluation of all lanes, each at a state that depends on the one before."""
 
     @njit(error_model="numpy", fastmath=FASTMATH)
-    def repeat(effects, work, par, table, count):
+    def repeat(motion, work, tables, count):
         for _ in range(count):
-            accelerations(effects, work, par, table, table, width)
+            run_motion(motion, work, tables)
             for i in range(width):
                 work[(at.QS + 3) * width + i] += 1e-14 * work[(at.ACC + 3) * width + i]
 
@@ -97,10 +97,12 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
     q[3] += 4e-4  # O23 well in contact
     for width in WIDTHS:
         repeat = _force_loop(width)
-        work, par = np.zeros((at.WORK, width)), np.repeat(setup.par[:1].T, width, 1).copy()
+        work = np.zeros((at.BANK, width))
+        work[at.WORK :] = np.repeat(setup.par[:1].T, width, 1)
         work[at.QS : at.QS + 4], work[at.VS : at.VS + 4] = q[:, None], v[:, None]
         work[[at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23]] = 1.0
-        arguments = (setup.problem.effects, work.ravel(), par.ravel(), np.zeros(4))
+        motion = motion_of(setup.problem.effects, width).address
+        arguments = (motion, work.ravel(), setup.problem.tables)
         repeat(*arguments, 1)
         tasks[f"W = {width}"] = lambda f=repeat, a=arguments: f(*a, count)
     y = np.concatenate([q, v, [0.0, 0.0]])
@@ -112,10 +114,7 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
 
 def assembly_of(setup: Setup, width: int) -> Arithmetic:
     """The force evaluation's arithmetic as emitted for this processor."""
-    evaluate = force_evaluation(width)
-    work, par = np.zeros(at.WORK * width), np.ones(at.PARAMETERS * width)
-    evaluate(setup.problem.effects, work, par, np.zeros(4), np.zeros(4))
-    return executed_arithmetic(evaluate.inspect_asm(evaluate.signatures[0]))
+    return executed_arithmetic(force_evaluation(setup.problem.effects, width))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH)

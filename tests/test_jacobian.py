@@ -10,8 +10,8 @@ from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
 from hpcclear.dynamics.implicit.radau import new_memory
 from hpcclear.dynamics.implicit.stiff import fit_to_ramp
-from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
@@ -53,9 +53,9 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     return problem, m
 
 
-def effects_and_tables(problem: Problem) -> tuple:
-    """As the stepper of lanes hands them on."""
-    return Lanes(problem, 1)._effects, problem.tables
+def motions_and_tables(problem: Problem) -> tuple:
+    """The motion of one lane, and of the bank's, as the stepper of lanes hands them on."""
+    return *(motion_of(problem.effects, width).address for width in (1, mem.LANES)), problem.tables
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)
@@ -63,7 +63,7 @@ def test_columns_are_the_derivatives(name: str):
     n, changes = TOPOLOGIES[name]
     problem, m = memory_of(changes)
     assert problem.coordinates == n
-    effects, tables = effects_and_tables(problem)
+    motion, bank, tables = motions_and_tables(problem)
     rows = m[: mem.JACOBIAN].reshape(-1, mem.LANES)
     state = np.r_[rows[at.QS : at.QS + n, mem.MIDDLE], rows[at.VS : at.VS + n, mem.MIDDLE]]
 
@@ -71,18 +71,18 @@ def test_columns_are_the_derivatives(name: str):
         out = np.zeros((len(states), n + at.RATES))
         contacts = rows[at.ACTIVE_12 : at.INVERSE_IMPACT_23 + 1, mem.MIDDLE]
         observe(
-            effects, rows[mem.PAR : mem.SECOND, 0].copy(), tables, states,
+            motion, rows[mem.PAR : mem.SECOND, 0].copy(), tables, states,
             np.tile(contacts, (len(states), 1)),
             np.full(len(states), rows[at.STAGE_TIME, mem.MIDDLE]), out,
         )  # fmt: skip
         return out[:, :n]
 
-    evaluate_bank(effects, m, tables)
+    evaluate_bank(bank, m, tables)
     found = rows[at.ACC : at.ACC + n, mem.MIDDLE]
     here = accelerations(state[None])[0]
     assert found == pytest.approx(here, rel=1e-13, abs=1e-12 * abs(here).max())
     m[mem.BASE : mem.BASE + n] = found
-    difference_jacobian(effects, (0,) * n, m, tables)
+    difference_jacobian(bank, n, m, tables)
     columns = m[mem.JACOBIAN : mem.JACOBIAN + n * mem.COLUMNS].reshape(n, mem.COLUMNS)[:, : 2 * n]
 
     least = m[mem.LEAST : mem.LEAST + 2 * n]
@@ -97,8 +97,8 @@ def test_columns_are_the_derivatives(name: str):
 def test_differences_stay_within_the_ramp():
     """A column's increment is a thousandth of the ramp at most: across its end the slope would be hidden."""
     problem, m = memory_of({"effects.friction.ramp_speed": 1e-6})
-    effects, tables = effects_and_tables(problem)
-    difference_jacobian(effects, (0,) * 4, m, tables)
+    _, bank, tables = motions_and_tables(problem)
+    difference_jacobian(bank, 4, m, tables)
     increments = m[mem.INCREMENT * mem.LANES :][: mem.LANES]
     assert (abs(increments[4:]) <= 1.0001e-9 * m[mem.LEAST + 4 : mem.LEAST + 8]).all()
     assert (increments != 0.0).all()

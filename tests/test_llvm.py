@@ -12,9 +12,10 @@ import struct
 
 import numpy as np
 import pytest
-from numba import njit, typeof, types
+from numba import njit, types
 
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import accelerations
 from hpcclear.dynamics.physics.angles import sincos
@@ -36,11 +37,9 @@ def compiled(function, *argument_types):
 def compiled_motion(effects, W=1):
     """The kernel's right-hand side with these effects on."""
 
-    def motion(effects, work, par, torque_table, load_table):
-        accelerations(effects, work, par, torque_table, load_table, W)
-
     flags = at.Effects(**dict.fromkeys(effects, 1))
-    return compiled(motion, typeof(flags), FLAT, FLAT, FLAT, FLAT)
+    text = one_text(accelerations, f"looked_at_{W}", effects=flags, W=W)
+    return compiled(text, FLAT, FLAT, FLAT)
 
 
 def par(row):
@@ -202,10 +201,9 @@ def test_the_kernel_by_hand_computes_the_same():
     mine, hers = np.zeros((2, at.WORK * W))
     values = np.abs(rng.normal(size=at.PARAMETERS * W)) + 0.1
     mine[:] = hers[:] = rng.normal(size=at.WORK * W)
-    table = np.zeros(4)
     njit(hertz_by_hand)(mine, values, W)
     run = njit(lambda *arguments: accelerations(*arguments, W))
-    run(at.Effects(crank_rod=1, rod_slider=1), hers, values, table, table)
+    run(at.Effects(crank_rod=1, rod_slider=1), hers, values, np.zeros(at.TABLES))
     written = slice(at.ACC * W, (at.RATE_NOW + at.RATE_23 + 1) * W)
     np.testing.assert_allclose(mine[written], hers[written], rtol=1e-11, atol=1e-11)
     np.testing.assert_array_equal(mine[: at.ACC * W], hers[: at.ACC * W])

@@ -9,6 +9,7 @@ from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, a
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import baumgarte as bg
 from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.linkage.rhs import motion_of
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}
@@ -160,10 +161,9 @@ def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations and rates of one state from the kernel."""
     flags = at.Effects(**dict.fromkeys(effects, 1))
     out = np.zeros((1, len(q) + at.RATES))
-    table = np.zeros(4)
     states = np.concatenate([q, v])[None]
-    tables = at.Tables(table, table)
-    observe(flags, par, tables, states, contacts[None], np.array([t]), out)
+    motion = motion_of(flags, 1).address
+    observe(motion, par, np.zeros(at.TABLES), states, contacts[None], np.array([t]), out)
     return out[0, : len(q)], out[0, len(q) :]
 
 

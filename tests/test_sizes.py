@@ -74,9 +74,9 @@ def test_groups_are_short():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="9 coordinates, not 10"):
-        make_stepper(4, 10)
+        make_stepper(4, 10, at.Effects())
     with pytest.raises(ValueError, match="5 coordinates, not 6"):
-        make_collocation_stepper(6)
+        make_collocation_stepper(6, at.Effects())
     problem = problem_of(scene_with())
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])

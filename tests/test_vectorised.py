@@ -7,7 +7,6 @@ import numba
 import numpy as np
 import pytest
 
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"
@@ -26,10 +25,7 @@ from scenes import LAWS, scene, single  # noqa: E402
 def arithmetic(law: str, width: int) -> Arithmetic:
     """Of the force evaluation, as the compiler emits it for this processor."""
     effects = single(scene(law, 1e-6, 1, 1)).problem.effects
-    work, par = np.zeros(at.WORK * width), np.ones(at.PARAMETERS * width)
-    evaluate = force_evaluation(width)
-    evaluate(effects, work, par, np.zeros(4), np.zeros(4))
-    return executed_arithmetic(evaluate.inspect_asm(evaluate.signatures[0]))
+    return executed_arithmetic(force_evaluation(effects, width))
 
 
 @pytest.mark.parametrize("law", LAWS)

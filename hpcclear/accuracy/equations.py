@@ -11,6 +11,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
+from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.views import Parameters, Start
 
@@ -31,7 +32,7 @@ def latch(contacts, seen, floor):
 
 
 @scalar_function
-def classical_turn(effects, par, tables, rule, steps, y, contacts, seen):
+def classical_turn(motion, tables, rule, steps, y, contacts, seen):
     """Integrate `y` over one revolution by the classical Runge-Kutta method of order 4, in equal steps.
 
     Contacts start and end between steps, as they come. `rule`: whether contacts latch, whether the last coordinate is the
@@ -46,10 +47,7 @@ def classical_turn(effects, par, tables, rule, steps, y, contacts, seen):
     time, peak, count, step, corrections, s, last = 0.0, 0.0, 0, 0, 0, 0, False
     while True:
         c = 0.0 if s == 0 else (1.0 if s == 3 else 0.5)
-        derivative(
-            effects, par, tables.torque, tables.load, contacts, time + c * h, stage,
-            out, joints, seen.work,
-        )  # fmt: skip
+        derivative(motion, tables, contacts, time + c * h, stage, out, joints, seen.lane)
         count += 1
         if s == 0:
             if latched and latch(contacts, joints, floor):
@@ -102,8 +100,8 @@ class Equations:
         self.contacts = start.contacts.copy()
         self._origin = start
         self.calls = 0
-        self._head: tuple[Any, ...] = (problem.effects, par, *problem.tables)
-        self._seen = new_seen(n)
+        self._head: tuple[Any, ...] = (motion_of(problem.effects, 1).address, problem.tables)
+        self._seen = new_seen(n, par)
 
     def anew(self) -> "Equations":
         """The same design at its start."""
@@ -125,9 +123,7 @@ class Equations:
         y, contacts = self.start.copy(), self.contacts.copy()
         rule = (self.latched, self.free, self.problem.impact_floor, float(self.named.period))
         time, peak, count = classical_turn(
-            self.problem.effects,
-            self.par,
-            self.problem.tables,
+            *self._head,
             rule,
             steps,
             y,

@@ -2,6 +2,7 @@
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.extending import intrinsic
 
 from hpcclear.base.jit import lane_function
@@ -81,3 +82,24 @@ def borrowed(typingctx, array):
         return _view(context, builder, signature.args[0], args[0], 0)
 
     return array(array), codegen
+
+
+@intrinsic
+def call_at(typingctx, address, arrays):
+    """Call the C function at an address with the places of a tuple's arrays; it returns nothing.
+
+    The compiler sees no more of it than that, so its caller is compiled without it, once for all.
+    """
+
+    def codegen(context, builder, signature, args):
+        parts = cgutils.unpack_tuple(builder, args[1])
+        kinds = signature.args[1].types
+        pointers = [
+            context.make_array(kind)(context, builder, part).data
+            for kind, part in zip(kinds, parts, strict=True)
+        ]
+        function = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in pointers])
+        builder.call(builder.inttoptr(args[0], function.as_pointer()), pointers)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, arrays), codegen

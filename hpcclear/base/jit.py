@@ -11,7 +11,10 @@ import os
 import platform
 import stat
 import tempfile
+from collections.abc import Callable, Hashable
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 import llvmlite.binding
@@ -27,9 +30,12 @@ def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
     parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
     parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
-    return sorted(parts | {root / "base" / name for name in ("outcome.py", "unrolled.py")})
+    return sorted(
+        parts | {root / "base" / name for name in ("one_text.py", "outcome.py", "unrolled.py")}
+    )
 
 
+@cache
 def source_key() -> str:
     """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits)."""
     root = Path(__file__).parent.parent
@@ -85,8 +91,40 @@ def doubles_in_a_vector() -> int:
 if not os.environ.get("NUMBA_CACHE_DIR"):
     config.CACHE_DIR = str(cache_folder())
 
-lane_function = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)
-"""Runs inside a loop over lanes: inlined, branch-free, vectorised there."""
+_written: dict[Any, str] = {}
+_apart: set[Any] = set()
 
-scalar_function = njit(error_model="numpy", cache=True)
-"""Runs for one lane or one point at a time."""
+
+def written_kind(function: Any) -> str | None:
+    """Whether `one_text` writes calls of a function out, and in which texts: "lane", "scalar" or None."""
+    return _written.get(function) if isinstance(function, Hashable) else None
+
+
+def lane_function(function: Callable[..., Any]) -> Any:
+    """Compile what runs inside a loop over lanes: inlined, branch-free, vectorised there."""
+    compiled = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)(function)
+    _written[compiled] = "lane"
+    return compiled
+
+
+def stands_apart(function: Any) -> bool:
+    """Whether it is marked by `apart`."""
+    return function in _apart
+
+
+def apart(compiled: Any) -> Any:
+    """Leave a function a function of its own beside the text; to stand above the decorator that compiles.
+
+    For sums of products: which of two products is fused with their sum goes by the order the compiler has put them in, and
+    a function of its own is looked at before it is inlined, whatever stands around it. Without this a sum may come out
+    another way in one scene than in the next, in the last bit.
+    """
+    _apart.add(compiled)
+    return compiled
+
+
+def scalar_function(function: Callable[..., Any]) -> Any:
+    """Compile what runs for one lane or one point at a time."""
+    compiled = njit(error_model="numpy", cache=True)(function)
+    _written[compiled] = "scalar"
+    return compiled

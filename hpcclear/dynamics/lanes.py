@@ -12,6 +12,8 @@ from hpcclear.dynamics.collocation.stepper import make_collocation_stepper
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import make_stepper
 from hpcclear.dynamics.implicit import radau
+from hpcclear.dynamics.implicit.memory import LANES
+from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.stepping.settings import COUNTERS, FINISHED, NEXT_SLOT, RECORDED, SLOTS
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -42,19 +44,29 @@ class Lanes:
         self.problem = problem
         self.width = width
         self.record = record
-        self._step = make_collocation_stepper(n) if problem.collocation else make_stepper(width, n)
         self._method = at.Method(problem.settings().rows, problem.tableau.packed(), problem.tables)
+        bank = np.zeros(at.BANK * width)
+        bank[at.WORK * width :] = 1.0  # parameters: a resting lane divides by them
         self._block = at.Block(
-            work=np.zeros(at.WORK * width),
+            work=bank[: at.WORK * width],
             stages=np.zeros(tab.STAGES * n * width),
-            par=np.ones(at.PARAMETERS * width),  # ones: a resting lane divides by them
+            par=bank[at.WORK * width :],
             book=np.zeros(at.BOOK * width),
         )
-        # absent, it keeps the implicit method from being compiled
-        self._memory = None if problem.implicit == "never" else radau.new_memory(width)
+        implicit = problem.implicit != "never"
+        self._memory = radau.new_memory(width) if implicit else None
         if problem.collocation:
             self._memory = lobatto.new_memory()
-        self._effects = problem.effects._replace(sliding=None if self._memory is None else 1)
+        at_once = self._memory is not None  # evaluations of one lane, eight side by side
+        effects = problem.effects._replace(sliding=1 if at_once else None)
+        self._motion = motion_of(effects, width).address
+        self._bank = motion_of(effects, LANES).address if at_once else 0
+        effects, recorded = effects.of_stepper(at_once), record is not None
+        self._step = (
+            make_collocation_stepper(n, effects, recorded=recorded)
+            if problem.collocation
+            else make_stepper(width, n, effects, recorded=recorded, implicit=implicit)
+        )
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
         self._accept_queue(
@@ -163,9 +175,9 @@ class Lanes:
 
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running."""
-        going = self._step(
-            self._effects, self._block, self._queue, self._method, self.record, self._memory, budget
-        )
+        arrays = (self._motion, self._bank, self._block, self._queue, self._method)
+        some = (one for one in (self.record, self._memory) if one is not None)
+        going = self._step(*arrays, *some, budget)
         return bool(going)
 
     def collect(self) -> tuple[Integers, Outcome, Array]:

@@ -36,6 +36,13 @@ class Effects(NamedTuple):
     responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
     sliding: Any = None  # sliding speeds, for the implicit method
 
+    def of_stepper(self, implicit: bool) -> "Effects":
+        """Those that a stepper asks for, all others off: what the motion alone reads must not have it compiled anew."""
+        alone = ["torque_table", "gravity", "load", "load_table", "guide", "series", "sliding"]
+        if not implicit:  # which looks for kinks of the forces
+            alone += ["fixed", "coulomb", "ambrosio"]
+        return self._replace(**dict.fromkeys(alone))
+
 
 # ---- parameters of one sample -------------------------------------------------------------------
 (
@@ -179,6 +186,14 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
 ) = range(INTEGRAL + RATES, INTEGRAL + RATES + 35)
 WORK = INTEGRAL + RATES + 35
 
+BANK = WORK + PARAMETERS
+"""Rows of what a motion reads and writes: those of `work`, then the parameters."""
+
+# ---- tabulated curves, one behind the other -----------------------------------------------------
+CELLS = 2048  # cubic cells over one turn, 4 coefficients each
+TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
+TABLES = 8 * CELLS
+
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (
     SAMPLE,  # slot of the sample in the queue
@@ -258,15 +273,10 @@ O23 = Joint(
 )  # fmt: skip
 
 
-class Tables(NamedTuple):
-    """Cubic cells of the tabulated drive torque and slider load, 4 coefficients each."""
-
-    torque: Any
-    load: Any
-
-
 class Block(NamedTuple):
-    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books."""
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books.
+
+    `work` and `par` are neighbours in memory, as a motion asks for."""
 
     work: Any
     stages: Any
@@ -285,8 +295,8 @@ class Queue(NamedTuple):
 
 
 class Method(NamedTuple):
-    """What a run is integrated with: its settings, the packed tableau, curves."""
+    """What a run is integrated with: its settings, the packed tableau, tabulated curves."""
 
     settings: Any
     weights: Any
-    tables: Tables
+    tables: Any  # (TABLES,)

@@ -31,11 +31,6 @@ STIFF_RAMP = STEEP
 STIFF_DAMPING = 10.0
 """Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""
 
-CELLS = 2048
-"""Cells of a tabulated torque or load over one turn."""
-
-_NO_TABLE = np.zeros(4)
-
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""
 
@@ -115,10 +110,16 @@ class Problem:
         return s
 
     @property
-    def tables(self) -> at.Tables:
-        """The tabulated curves as the kernel reads them; one that is absent is never looked up."""
-        torque, load = (_NO_TABLE if t is None else t for t in (self.torque_table, self.load_table))
-        return at.Tables(torque, load)
+    def tables(self) -> Array:
+        """The tabulated curves as the kernel reads them, (TABLES,); one that is absent is never looked up."""
+        tables = np.zeros(at.TABLES)
+        for first, table in (
+            (at.TORQUE_TABLE, self.torque_table),
+            (at.LOAD_TABLE, self.load_table),
+        ):
+            if table is not None:
+                tables[first : first + len(table)] = table
+        return tables
 
 
 def coordinate_count(scene: Scene) -> int:
@@ -191,7 +192,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     return (*coordinates, *velocities)
 
 
-def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = CELLS) -> Array:
+def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = at.CELLS) -> Array:
     """A tabulated curve over one turn as cubic cells on a uniform grid, 4 coefficients each (flat).
 
     Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
@@ -218,8 +219,8 @@ def curve_at(curve: Curve, angle: Array) -> Array:
     """A torque or load at crank angles (n,) in rad, as the kernel reads it."""
     if not isinstance(curve, tuple):
         return np.full(len(angle), curve)
-    place = np.mod(angle, at.TURN) * (CELLS / at.TURN)
-    cell = np.minimum(place.astype(int), CELLS - 1)
+    place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
+    cell = np.minimum(place.astype(int), at.CELLS - 1)
     s = place - cell
     c0, c1, c2, c3 = periodic_cells(curve).reshape(-1, 4)[cell].T
     return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))

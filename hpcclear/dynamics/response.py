@@ -15,6 +15,7 @@ from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.observe import observe
+from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.problem import (
     Problem,
@@ -95,8 +96,10 @@ def _observed(
     """Accelerations (n) and rates at each instant."""
     n = problem.coordinates
     out = np.zeros((len(times), n + Rates.size))
-    arrays = [np.ascontiguousarray(x) for x in (states, contacts, times)]
-    observe(problem.effects, par, problem.tables, *arrays, out)
+    states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
+    observe(
+        motion_of(problem.effects, 1).address, par, problem.tables, states, contacts, times, out
+    )
     return out[:, :n], Rates(out[:, n:])
 
 

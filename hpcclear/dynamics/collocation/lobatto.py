@@ -18,11 +18,10 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import run_motion
 
 STAGES = 8
 """Unknown stages of a step; the last stands at its end."""
@@ -32,7 +31,6 @@ MOST_COORDINATES = 5  # minimal ones of two open joints with a free crank
 COORDINATES = at.COORDINATES[:MOST_COORDINATES]
 
 PAR = at.WORK  # parameters, the same in every lane
-PARAMETER_OFFSET = PAR * STAGES
 NODE = PAR + at.PARAMETERS  # where the stages stand in the step, 0 to 1
 MATRIX = NODE + 1  # velocities by accelerations: row l holds the weights of node l
 SQUARE = MATRIX + _ROWS  # coordinates by accelerations, likewise
@@ -147,10 +145,9 @@ def set_stages(m, work, n, h):
 
 
 @lane_function
-def accelerations_of_stages(effects, m, tables):
-    """Accelerations and rates at all stages."""
-    par = beyond(m, PARAMETER_OFFSET)  # type: ignore[call-arg, var-annotated]
-    accelerations(effects, m, par, tables.torque, tables.load, STAGES)
+def accelerations_of_stages(motion, m, tables):
+    """Accelerations and rates at all stages, by the motion of eight lanes."""
+    run_motion(motion, m, tables)
 
 
 @lane_function

@@ -13,6 +13,7 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
@@ -58,14 +59,14 @@ def begin_contacts(work, m):
 
 
 @lane_function
-def evaluate_start(effects, work, stages, m, tables, n):
+def evaluate_start(motion, work, stages, m, tables, n):
     """Accelerations and rates at the start of the step, where they are not known."""
     for i in range(STAGES):
         m[at.STAGE_TIME * STAGES + i] = work[at.TIME]
         for k in range(n):
             m[(at.QS + k) * STAGES + i] = work[at.Q + k]
             m[(at.VS + k) * STAGES + i] = work[at.V + k]
-    lob.accelerations_of_stages(effects, m, tables)
+    lob.accelerations_of_stages(motion, m, tables)
     for k in range(n):
         stages[k] = m[(at.ACC + k) * STAGES]
     for r in range(at.RATES):
@@ -89,7 +90,7 @@ def weigh(work, stages, m, settings, strictness, n):
 
 
 @lane_function
-def sweep(effects, work, m, tables, n):
+def sweep(motion, work, m, tables, n):
     """Iterate the stages of the step until they have converged. Returns False when they will not in `MOST_SWEEPS`."""
     h = work[at.STEP]
     ratio = h / m[lob.CONTRACTION_STEP]
@@ -101,7 +102,7 @@ def sweep(effects, work, m, tables, n):
     while left > 0.0:
         left -= 1.0
         lob.set_stages(m, work, n, h)
-        lob.accelerations_of_stages(effects, m, tables)
+        lob.accelerations_of_stages(motion, m, tables)
         change = lob.take_accelerations(m, n)
         work[at.EVALUATIONS] += STAGES
         if before > 0.0:
@@ -235,17 +236,17 @@ def after_step(work, m):
 
 
 @lane_function
-def try_step(effects, block, m, tables, settings, n):
+def try_step(effects, motion, block, m, tables, settings, n):
     """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
     work, stages, par = block.work, block.stages, block.par
     choose_step(work, par, effects.torque, 1)
     begin_contacts(work, m)
     if work[at.FRESH] == 1.0:
-        evaluate_start(effects, work, stages, m, tables, n)
+        evaluate_start(motion, work, stages, m, tables, n)
     weigh(work, stages, m, settings, par[at.STRICTNESS], n)
     lob.guess(m, n, work[at.STEP])
     work[at.ATTEMPTS] += 1.0
-    if sweep(effects, work, m, tables, n):
+    if sweep(motion, work, m, tables, n):
         lob.keep_polynomial(m, n, work[at.STEP])
         error = error_of(effects, work, m, settings[RTOL], n)
         work[at.ERROR] = error
@@ -283,12 +284,43 @@ def next_sample(n, block, queue, settings, m):
     replicate(block.par, m)
 
 
+@lane_function
+def advance(effects, n, motion, bank, block, queue, method, record, m, budget):
+    """Take at most `budget` steps. Returns whether the lane holds a sample. The motion of one lane is not asked for."""
+    settings, tables, counters = method.settings, method.tables, queue.counters
+    work, stages, book = block.work, block.stages, block.book
+    if work[at.RUNNING] == 0.0:
+        next_sample(n, block, queue, settings, m)
+    full = False
+    while budget > 0 and work[at.RUNNING] > 0.0 and not full:
+        budget -= 1
+        try_step(effects, bank, block, m, tables, settings, n)
+        status = judge_end(effects, work, stages, m, settings, n)
+        goes_on = status == OK
+        if goes_on and work[at.ACCEPT] == 1.0:
+            record_nodes(record, counters, work, m, book, n)
+            ended = commit(effects, work, stages, n, 1)
+            record_step(record, counters, work, stages, book, n, 1)
+            full = no_room(record, counters)
+            after_step(work, m)
+            if ended > 0.0:
+                wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
+                status = end_revolution(0, 1, work, book, settings)
+                goes_on = status == UNFINISHED
+        if not goes_on:
+            finish(0, 1, n, status, block, queue)
+            next_sample(n, block, queue, settings, m)
+    return work[at.RUNNING] > 0.0
+
+
 @cache
-def make_collocation_stepper(n: int) -> Callable[..., Any]:
+def make_collocation_stepper(
+    n: int, effects: at.Effects, *, recorded: bool = False
+) -> Callable[..., Any]:
     """Return the compiled stepper of one response with n coordinates.
 
-    Its arguments are those of `stepper.make_stepper`, so that either serves `lanes.Lanes`; the tableau is not read, and
-    `memory` is what `lobatto.new_memory` makes.
+    Its arguments are those of `stepper.make_stepper` with an implicit method, so that either serves `lanes.Lanes`; the
+    tableau is not read, and `memory` is what `lobatto.new_memory` makes.
 
     Raises
     ------
@@ -297,32 +329,8 @@ def make_collocation_stepper(n: int) -> Callable[..., Any]:
     """
     if not 1 <= n <= lob.MOST_COORDINATES:
         raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
-
-    @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
-    def stepper(effects, block, queue, method, record, m, budget):
-        settings, tables, counters = method.settings, method.tables, queue.counters
-        work, stages, book = block.work, block.stages, block.book
-        if work[at.RUNNING] == 0.0:
-            next_sample(n, block, queue, settings, m)
-        full = False
-        while budget > 0 and work[at.RUNNING] > 0.0 and not full:
-            budget -= 1
-            try_step(effects, block, m, tables, settings, n)
-            status = judge_end(effects, work, stages, m, settings, n)
-            goes_on = status == OK
-            if goes_on and work[at.ACCEPT] == 1.0:
-                record_nodes(record, counters, work, m, book, n)
-                ended = commit(effects, work, stages, n, 1)
-                record_step(record, counters, work, stages, book, n, 1)
-                full = no_room(record, counters)
-                after_step(work, m)
-                if ended > 0.0:
-                    wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
-                    status = end_revolution(0, 1, work, book, settings)
-                    goes_on = status == UNFINISHED
-            if not goes_on:
-                finish(0, 1, n, status, block, queue)
-                next_sample(n, block, queue, settings, m)
-        return work[at.RUNNING] > 0.0
-
-    return stepper
+    known: dict[str, Any] = {"effects": effects, "n": n}
+    if not recorded:
+        known["record"] = None
+    text = one_text(advance, "collocation", **known)
+    return njit(error_model="numpy", fastmath=FASTMATH, cache=True)(text)  # type: ignore[no-any-return]

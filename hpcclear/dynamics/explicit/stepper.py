@@ -12,13 +12,15 @@ from numba import njit
 
 from hpcclear.base.bits import borrowed
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.jit import scalar_function as lane_event
+from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, any_stage_state, step_error
 from hpcclear.dynamics.explicit.switching import sense_stiffness, settle_methods
 from hpcclear.dynamics.implicit.stiff import take_implicit_steps
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.record import record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -114,7 +116,7 @@ def any_fresh(work, W):
 
 
 @lane_function
-def take_explicit_steps(effects, step, tables, memory, W):
+def take_explicit_steps(effects, motion, step, tables, memory, W):
     """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
     work, weights = step.work, step.weights
     for s in range(0 if any_fresh(work, W) else 1, tab.STAGES):
@@ -123,7 +125,7 @@ def take_explicit_steps(effects, step, tables, memory, W):
         else:
             any_stage_state(step, s, W)
         begin_stage(work, effects.torque, weights[tab.NODES + s], W)
-        accelerations(effects, work, step.par, tables.torque, tables.load, W)
+        run_motion(motion, work, tables)
         if s == 0:
             adopt_fresh(work, step.stages, step.n, W)
         else:
@@ -135,7 +137,7 @@ def take_explicit_steps(effects, step, tables, memory, W):
         work[at.EVALUATIONS * W + i] += evaluations
 
 
-@lane_function
+@lane_event
 def end_of_step(effects, i, W, n, block, settings):
     """What the end of a special lane's step shows: it may be cut. Returns OK or why the lane ends."""
     work = block.work
@@ -151,12 +153,20 @@ def end_of_step(effects, i, W, n, block, settings):
     return status
 
 
-@lane_function
+@lane_event
 def change_sample(i, W, n, status, block, queue, settings):
-    """Write down a lane's sample and give it the next. Returns the change of the number of running lanes."""
-    finish(i, W, n, status, block, queue)
+    """Write down a lane's sample, if its status is one, and give it the next. Returns whether there is one."""
+    if status != UNFINISHED:
+        finish(i, W, n, status, block, queue)
     load(i, W, n, block, queue, settings)
-    return block.work[at.RUNNING * W + i] - 1.0
+    return block.work[at.RUNNING * W + i]
+
+
+@lane_event
+def close_revolution(effects, i, W, n, block, settings):
+    """What the end of a lane's revolution brings. Returns UNFINISHED or why the lane ends."""
+    wrap_crank(effects.torque, effects.baumgarte, i, W, block.work, n - 1)
+    return end_revolution(i, W, block.work, block.book, settings)
 
 
 @lane_function
@@ -165,7 +175,7 @@ def load_lanes(W, n, block, queue, settings):
     running = 0.0
     for i in range(W):
         if block.work[at.RUNNING * W + i] == 0.0:
-            load(i, W, n, block, queue, settings)
+            change_sample(i, W, n, UNFINISHED, block, queue, settings)
         running += block.work[at.RUNNING * W + i]
     return running
 
@@ -185,7 +195,7 @@ def judge_steps(effects, n, block, queue, settings, W):
             if work[at.SPECIAL * W + i] == 1.0:
                 status = end_of_step(effects, i, W, n, block, settings)
                 if status != OK:
-                    change += change_sample(i, W, n, status, block, queue, settings)
+                    change += change_sample(i, W, n, status, block, queue, settings) - 1.0
     return change
 
 
@@ -197,10 +207,9 @@ def end_revolutions(effects, n, block, queue, settings, W):
     for i in range(W):
         ends = work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
         if ends == 1.0:
-            wrap_crank(effects.torque, effects.baumgarte, i, W, work, n - 1)
-            status = end_revolution(i, W, work, block.book, settings)
+            status = close_revolution(effects, i, W, n, block, settings)
             if status != UNFINISHED:
-                change += change_sample(i, W, n, status, block, queue, settings)
+                change += change_sample(i, W, n, status, block, queue, settings) - 1.0
     return change
 
 
@@ -208,25 +217,52 @@ def end_revolutions(effects, n, block, queue, settings, W):
 def borrowed_all(block, queue, method):
     """The same arrays without their counts of references, which functions that are not inlined would keep."""
     lent: Any = borrowed
-    tables = at.Tables(lent(method.tables.torque), lent(method.tables.load))
     return (
         at.Block(lent(block.work), lent(block.stages), lent(block.par), lent(block.book)),
         at.Queue(
             lent(queue.par), lent(queue.start), lent(queue.out),
             lent(queue.finished), lent(queue.counters),
         ),
-        at.Method(lent(method.settings), lent(method.weights), tables),
+        at.Method(lent(method.settings), lent(method.weights), lent(method.tables)),
     )  # fmt: skip
 
 
-@cache
-def make_stepper(W: int, n: int) -> Callable[..., Any]:
-    """Return the compiled stepper for W lanes of n coordinates.
+@lane_function
+def advance(effects, n, W, motion, bank, block, queue, method, record, memory, budget):
+    """Take at most `budget` block steps. Returns whether lanes are running."""
+    block, queue, method = borrowed_all(block, queue, method)
+    settings, tables, work = method.settings, method.tables, block.work
+    atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
+    step = Step(work, block.stages, block.par, method.weights, n, settings[RTOL], atol)
+    running = load_lanes(W, n, block, queue, settings)
+    while budget > 0 and running > 0.0:
+        budget -= 1
+        choose_step(work, block.par, effects.torque, W)
+        implicit = settle_methods(memory, settings, work, W)
+        if implicit < running:
+            take_explicit_steps(effects, motion, step, tables, memory, W)
+        if implicit > 0.0:
+            take_implicit_steps(effects, bank, n, block, tables, memory, settings, W)
+        running += judge_steps(effects, n, block, queue, settings, W)
+        ended = commit(effects, work, block.stages, n, W)
+        full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
+        if ended > 0.0:
+            running += end_revolutions(effects, n, block, queue, settings, W)
+        if full:
+            break
+    return running > 0.0
 
-    Its arguments: effects (`layout.Effects`), `layout.Block`, `layout.Queue`, `layout.Method`, record (array or None),
-    memory of the implicit method (see `radau.new_memory`; None switches it off) and budget: how many block steps to take
-    at most. It returns True while lanes are running. W = 1 is the single response; ensembles want at least twice the
-    vector length.
+
+@cache
+def make_stepper(
+    W: int, n: int, effects: at.Effects, *, recorded: bool = False, implicit: bool = False
+) -> Callable[..., Any]:
+    """Return the compiled stepper for W lanes of n coordinates, with effects as `layout.Effects.of_stepper` leaves them.
+
+    Its arguments: the addresses of the motion of W lanes and of eight (`rhs.motion_of`), `layout.Block`, `layout.Queue`,
+    `layout.Method`, if `recorded` an array for the steps of lane 0, if `implicit` the memory of the implicit method (see
+    `radau.new_memory`), and the budget: how many block steps to take at most. It returns True while lanes are running. W = 1
+    is the single response; ensembles want at least twice the vector length.
 
     Raises
     ------
@@ -235,31 +271,10 @@ def make_stepper(W: int, n: int) -> Callable[..., Any]:
     """
     if not 1 <= n <= at.MAX_COORDINATES:
         raise ValueError(f"the stepper holds 1 to {at.MAX_COORDINATES} coordinates, not {n}")
-    size = (0,) * n  # a length the compiler knows, for scalar code
-
-    @njit(error_model="numpy", fastmath=FASTMATH, cache=True)
-    def stepper(effects, block, queue, method, record, memory, budget):
-        block, queue, method = borrowed_all(block, queue, method)
-        memory = borrowed(memory)  # type: ignore[call-arg]
-        settings, tables, work = method.settings, method.tables, block.work
-        atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
-        step = Step(work, block.stages, block.par, method.weights, n, settings[RTOL], atol)
-        running = load_lanes(W, n, block, queue, settings)
-        while budget > 0 and running > 0.0:
-            budget -= 1
-            choose_step(work, block.par, effects.torque, W)
-            implicit = settle_methods(memory, settings, work, W)
-            if implicit < running:
-                take_explicit_steps(effects, step, tables, memory, W)
-            if implicit > 0.0:
-                take_implicit_steps(effects, size, block, tables, memory, settings, W)
-            running += judge_steps(effects, n, block, queue, settings, W)
-            ended = commit(effects, work, block.stages, n, W)
-            full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
-            if ended > 0.0:
-                running += end_revolutions(effects, n, block, queue, settings, W)
-            if full:
-                break
-        return running > 0.0
-
-    return stepper
+    known: dict[str, Any] = {"effects": effects, "n": n, "W": W}
+    if not recorded:
+        known["record"] = None
+    if not implicit:
+        known["memory"] = None
+    text = one_text(advance, f"stepper_{W}", **known)
+    return njit(error_model="numpy", fastmath=FASTMATH, cache=True)(text)  # type: ignore[no-any-return]

@@ -15,12 +15,11 @@ def exchange_rows(n, m, a, k, other):
 
 
 @scalar_function
-def factorise(size, m, a, pivot):
+def factorise(n, m, a, pivot):
     """LU factors of a real matrix in place, reciprocals of the pivots on the diagonal; row exchanges from `pivot` on.
 
-    The length of `size` is n, known to the compiler. Returns False where a pivot is zero or not a number.
+    Returns False where a pivot is zero or not a number.
     """
-    n = len(size)
     for k in range(n):
         best = k
         for r in range(k + 1, n):
@@ -42,9 +41,8 @@ def factorise(size, m, a, pivot):
 
 
 @scalar_function
-def solve(size, m, a, pivot, x):
+def solve(n, m, a, pivot, x):
     """Solve in place for n numbers from `x` on, with the factors of `factorise`."""
-    n = len(size)
     for k in range(n):
         other = int(m[pivot + k])
         m[x + k], m[x + other] = m[x + other], m[x + k]
@@ -62,9 +60,8 @@ def solve(size, m, a, pivot, x):
 
 
 @scalar_function
-def factorise_complex(size, m, a, b, pivot):
+def factorise_complex(n, m, a, b, pivot):
     """LU factors of the complex matrix with real parts from `a` on and imaginary parts from `b` on; as `factorise`."""
-    n = len(size)
     for k in range(n):
         best = k
         for r in range(k + 1, n):
@@ -97,9 +94,8 @@ def factorise_complex(size, m, a, b, pivot):
 
 
 @scalar_function
-def solve_complex(size, m, a, b, pivot, x, y):
+def solve_complex(n, m, a, b, pivot, x, y):
     """Solve in place for x + i y, with the factors of `factorise_complex`."""
-    n = len(size)
     for k in range(n):
         other = int(m[pivot + k])
         m[x + k], m[x + other] = m[x + other], m[x + k]

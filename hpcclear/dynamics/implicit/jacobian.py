@@ -10,18 +10,16 @@ from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.memory import LANES
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import run_motion
 
 _RELATIVE = 1.5e-8  # square root of the round-off
-PARAMETER_OFFSET = mem.PAR * LANES
 SECOND_OFFSET = mem.SECOND * LANES
 
 
 @scalar_function
-def evaluate_bank(effects, bank, tables):
-    """Accelerations and rates of the eight states held in a bank."""
-    par = beyond(bank, PARAMETER_OFFSET)  # type: ignore[call-arg, var-annotated]
-    accelerations(effects, bank, par, tables.torque, tables.load, LANES)
+def evaluate_bank(motion, bank, tables):
+    """Accelerations and rates of the eight states held in a bank, by the motion of eight lanes."""
+    run_motion(motion, bank, tables)
 
 
 @lane_function
@@ -101,22 +99,21 @@ def take_differences(n, m, first):
 
 
 @lane_function
-def columns(effects, n, m, tables, first):
+def columns(motion, n, m, tables, first):
     """As many columns of the Jacobian as there are lanes, from `first` on."""
     if first < 2 * n:
         displace_all(n, m, first)
         bank = beyond(m, SECOND_OFFSET)  # type: ignore[call-arg, var-annotated]
-        evaluate_bank(effects, bank, tables)
+        evaluate_bank(motion, bank, tables)
         take_differences(n, m, first)
 
 
 @scalar_function
-def difference_jacobian(effects, size, m, tables):
+def difference_jacobian(motion, n, m, tables):
     """Partial derivatives of the accelerations at the state of the middle stage, into mem.JACOBIAN.
 
-    The length of `size` is the number n of coordinates; mem.BASE holds the accelerations there.
+    mem.BASE holds the accelerations there.
     """
-    n = len(size)
-    columns(effects, n, m, tables, 0)
-    columns(effects, n, m, tables, LANES)
-    columns(effects, n, m, tables, 2 * LANES)
+    columns(motion, n, m, tables, 0)
+    columns(motion, n, m, tables, LANES)
+    columns(motion, n, m, tables, 2 * LANES)

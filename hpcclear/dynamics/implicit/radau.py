@@ -8,7 +8,7 @@ q' = v allows:
   ``mu/h - da/dv - (h/mu) da/dq``.
 
 The lane's numbers are in `m`, a row as laid out in `memory`: its three stages stand side by side in the first bank, and are
-evaluated together. `size` is a tuple whose length is the number n of coordinates, known to the compiler.
+evaluated together. n is the number of coordinates.
 """
 
 import math
@@ -93,9 +93,8 @@ def start_of_step(n, m):
 
 
 @scalar_function
-def factorise_both(size, m, h):
+def factorise_both(n, m, h):
     """Factors of the real and the complex system for step h. Returns False if one is singular."""
-    n = len(size)
     square = MU_RE * MU_RE + MU_IM * MU_IM
     for r in range(n):
         for c in range(n):
@@ -107,17 +106,16 @@ def factorise_both(size, m, h):
             m[mem.COMPLEX_RE + j] = MU_RE * unit - by_v - (h * MU_RE / square) * by_q
             m[mem.COMPLEX_IM + j] = MU_IM * unit + (h * MU_IM / square) * by_q
     m[mem.FACTORED_STEP] = h
-    real = factorise(size, m, mem.REAL, mem.PIVOT)
-    return factorise_complex(size, m, mem.COMPLEX_RE, mem.COMPLEX_IM, mem.COMPLEX_PIVOT) and real
+    real = factorise(n, m, mem.REAL, mem.PIVOT)
+    return factorise_complex(n, m, mem.COMPLEX_RE, mem.COMPLEX_IM, mem.COMPLEX_PIVOT) and real
 
 
 @scalar_function
-def guess_stages(size, m, h):
+def guess_stages(n, m, h):
     """First guess of the stages: the polynomial of the step before, or of the longer try from the same start.
 
     Without either, the velocities at the start.
     """
-    n = len(size)
     old = m[mem.POLYNOMIAL_STEP]
     continues = m[mem.CONTINUES] == 1.0
     for s in range(3):
@@ -143,21 +141,20 @@ def guess_stages(size, m, h):
 
 
 @scalar_function
-def guess_from_start(size, m, h):
+def guess_from_start(n, m, h):
     """First guess of the stages: the accelerations at the start."""
-    n = len(size)
     for s in range(3):
         for k in range(n):
             m[mem.Z + s * n + k] = NODES[s] * h * m[mem.START + k]
     m[mem.POLYNOMIAL_STEP] = h
     m[mem.CONTINUES] = 0.0
-    guess_stages(size, m, h)
+    guess_stages(n, m, h)
 
 
 @scalar_function
-def copy_polynomial(size, m, source, target):
+def copy_polynomial(n, m, source, target):
     """Copy the increments at the stages."""
-    for j in range(3 * len(size)):
+    for j in range(3 * n):
         m[target + j] = m[source + j]
 
 
@@ -191,12 +188,11 @@ def stage_of(k, n, m, c, h, i):
 
 @scalar_function
 @unrolled
-def evaluate_stages(effects, size, m, tables, h):
+def evaluate_stages(motion, n, m, tables, h):
     """Coordinates and velocities of the stages from the increments of the velocities; accelerations and rates there.
 
     All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
     """
-    n = len(size)
     t = m[mem.TIME]
     c: dict = {}
     for k in written_out(at.COORDINATES):
@@ -205,13 +201,12 @@ def evaluate_stages(effects, size, m, tables, h):
         m[at.STAGE_TIME * LANES + i] = t + m[mem.NODE * LANES + i] * h
         for k in written_out(at.COORDINATES):
             stage_of(k, n, m, c[k], h, i)
-    evaluate_bank(effects, m, tables)
+    evaluate_bank(motion, m, tables)
 
 
 @scalar_function
-def correct(size, m, h):
+def correct(n, m, h):
     """One correction of simplified Newton. Returns its size relative to the tolerance."""
-    n = len(size)
     lam, re, im = MU / h, MU_RE / h, MU_IM / h
     for k in range(n):
         row = (at.ACC + k) * LANES
@@ -227,9 +222,9 @@ def correct(size, m, h):
         m[mem.CHANGE + k] = r0 - lam * w0
         m[mem.CHANGE + n + k] = r1 - (re * w1 - im * w2)
         m[mem.CHANGE + 2 * n + k] = r2 - (re * w2 + im * w1)
-    solve(size, m, mem.REAL, mem.PIVOT, mem.CHANGE)
+    solve(n, m, mem.REAL, mem.PIVOT, mem.CHANGE)
     solve_complex(
-        size,
+        n,
         m,
         mem.COMPLEX_RE,
         mem.COMPLEX_IM,
@@ -257,7 +252,7 @@ def correct(size, m, h):
 
 
 @scalar_function
-def newton(effects, size, m, tables, h, known):
+def newton(motion, n, m, tables, h, known):
     """Solve for the stages. Returns how many iterations it took, negative if it did not converge.
 
     `known`: the stages of the first guess have been evaluated already.
@@ -267,8 +262,8 @@ def newton(effects, size, m, tables, h, known):
     m[mem.RATE] = 0.0
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0 or not known:
-            evaluate_stages(effects, size, m, tables, h)
-        change = correct(size, m, h)
+            evaluate_stages(motion, n, m, tables, h)
+        change = correct(n, m, h)
         if iteration > 0:
             rate = change / before
             m[mem.RATE] = max(m[mem.RATE], rate)
@@ -288,13 +283,12 @@ def newton(effects, size, m, tables, h, known):
 
 
 @scalar_function
-def filtered_error(size, m, h):
+def filtered_error(n, m, h):
     """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in mem.CHANGE (v, then q).
 
     Reads the accelerations at the start and shifts of the velocities there from mem.SHIFTED on. Returns the sum of the
     scaled squares.
     """
-    n = len(size)
     for k in range(n):
         sum_q = 0.0
         sum_v = 0.0
@@ -308,7 +302,7 @@ def filtered_error(size, m, h):
         for k in range(n):
             total += m[mem.JACOBIAN + r * mem.COLUMNS + k] * m[mem.CHANGE + n + k]
         m[mem.CHANGE + r] += h / MU * total
-    solve(size, m, mem.REAL, mem.PIVOT, mem.CHANGE)
+    solve(n, m, mem.REAL, mem.PIVOT, mem.CHANGE)
     total = 0.0
     for k in range(n):
         m[mem.CHANGE + n + k] = h / MU * (m[mem.CHANGE + k] + m[mem.CHANGE + n + k])
@@ -319,18 +313,17 @@ def filtered_error(size, m, h):
 
 
 @scalar_function
-def refilter_error(effects, size, m, tables, h):
+def refilter_error(motion, n, m, tables, h):
     """The estimate once more, from the start moved by the estimate: for a first try that looked too inaccurate."""
-    n = len(size)
     fill(m, at.STAGE_TIME, m[mem.TIME])
     for k in range(n):
         fill(m, at.VS + k, m[mem.V + k] + m[mem.CHANGE + k])
         fill(m, at.QS + k, m[mem.Q + k] + m[mem.CHANGE + n + k])
-    evaluate_bank(effects, m, tables)
+    evaluate_bank(motion, m, tables)
     for k in range(n):
         m[mem.SHIFTED + k] = m[(at.ACC + k) * LANES + END]
         m[mem.SHIFTED + n + k] = m[mem.CHANGE + k]
-    return filtered_error(size, m, h)
+    return filtered_error(n, m, h)
 
 
 @lane_function

@@ -103,9 +103,8 @@ def fit_to_ramp(m, settings):
 
 
 @scalar_function
-def take_over(size, lane, W, par, m, settings):
+def take_over(n, lane, W, par, m, settings):
     """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
-    n = len(size)
     for k in range(at.PARAMETERS):
         fill(m, mem.PAR + k, par[k * W + lane])
         fill(m, mem.SECOND + mem.PAR + k, par[k * W + lane])
@@ -128,9 +127,8 @@ def take_over(size, lane, W, par, m, settings):
 
 
 @scalar_function
-def fetch(effects, size, lane, W, block, m, tables):
+def fetch(effects, motion, n, lane, W, block, m, tables):
     """Bring the start of the step into the lane's memory."""
-    n = len(size)
     work, stages = block.work, block.stages
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
@@ -145,7 +143,7 @@ def fetch(effects, size, lane, W, block, m, tables):
     unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if unknown:
         start_of_step(n, m)
-        evaluate_bank(effects, m, tables)
+        evaluate_bank(motion, m, tables)
         work[at.EVALUATIONS * W + lane] += 1.0
     if fresh:
         m[mem.NEW_JACOBIAN] = 0.0
@@ -167,9 +165,8 @@ def fetch(effects, size, lane, W, block, m, tables):
 
 
 @scalar_function
-def norm_of_jacobian(size, m):
+def norm_of_jacobian(n, m):
     """Estimate of the largest eigenvalue in 1/s from row sums, in units that make angles and lengths comparable."""
-    n = len(size)
     by_q = 0.0
     by_v = 0.0
     for r in range(n):
@@ -185,10 +182,10 @@ def norm_of_jacobian(size, m):
 
 
 @scalar_function
-def cut_at_kink(effects, size, lane, W, work, m, tables):
+def cut_at_kink(effects, motion, n, lane, W, work, m, tables):
     """Evaluate the guessed stages, and cut the step if they show a kink."""
     h = m[mem.STEP]
-    evaluate_stages(effects, size, m, tables, h)
+    evaluate_stages(motion, n, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 3.0
     fraction = kink_fraction(effects, m, GUESSED_BEYOND)
     if fraction < 1.0:
@@ -198,72 +195,71 @@ def cut_at_kink(effects, size, lane, W, work, m, tables):
         work[at.STEP * W + lane] = h
         work[at.ENDING * W + lane] = 0.0
         m[mem.CONTINUES] = 0.0
-        guess_stages(size, m, h)
-        evaluate_stages(effects, size, m, tables, h)
+        guess_stages(n, m, h)
+        evaluate_stages(motion, n, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 3.0
 
 
 @scalar_function
-def new_jacobian(effects, size, m, tables, guessed):
+def new_jacobian(motion, n, m, tables, guessed):
     """Jacobian at the second guessed stage, or at the start where there is no guess."""
-    n = len(size)
     if not guessed:
         start_of_step(n, m)
     for k in range(n):
         m[mem.BASE + k] = m[(at.ACC + k) * LANES + mem.MIDDLE] if guessed else m[mem.START + k]
-    difference_jacobian(effects, size, m, tables)
-    m[mem.NORM] = norm_of_jacobian(size, m)
+    difference_jacobian(motion, n, m, tables)
+    m[mem.NORM] = norm_of_jacobian(n, m)
     m[mem.NEW_JACOBIAN] = 1.0
     m[mem.FACTORED_STEP] = 0.0
 
 
 @scalar_function
-def begin_step(effects, size, lane, W, block, m, tables, settings):
+def begin_step(effects, motion, n, lane, W, block, m, tables, settings):
     """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
     work = block.work
     first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if first:
-        take_over(size, lane, W, block.par, m, settings)
+        take_over(n, lane, W, block.par, m, settings)
     elif work[at.ACCEPT * W + lane] == 1.0:
         m[mem.ACCEPTED_STEP] = m[mem.STEP]
         m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
         m[mem.NEW_JACOBIAN] = 0.0
-        copy_polynomial(size, m, mem.Z, mem.KEPT)
+        copy_polynomial(n, m, mem.Z, mem.KEPT)
         m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
         m[mem.CONTINUES] = 1.0
-    fetch(effects, size, lane, W, block, m, tables)
+    fetch(effects, motion, n, lane, W, block, m, tables)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
     if first:
-        guess_from_start(size, m, m[mem.STEP])
+        guess_from_start(n, m, m[mem.STEP])
     else:
-        guess_stages(size, m, m[mem.STEP])
+        guess_stages(n, m, m[mem.STEP])
     return m[mem.POLYNOMIAL_STEP] > 0.0
 
 
 @scalar_function
-def solve_step(effects, size, lane, W, work, m, tables, guessed):
+def solve_step(effects, motion, n, lane, W, work, m, tables, guessed):
     """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
     if guessed:
-        cut_at_kink(effects, size, lane, W, work, m, tables)
+        cut_at_kink(effects, motion, n, lane, W, work, m, tables)
     h = m[mem.STEP]
     stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
     if stale and m[mem.NEW_JACOBIAN] == 0.0:
-        new_jacobian(effects, size, m, tables, guessed)
-        work[at.EVALUATIONS * W + lane] += 2.0 * len(size)
-    if m[mem.FACTORED_STEP] != h and not factorise_both(size, m, h):
+        new_jacobian(motion, n, m, tables, guessed)
+        work[at.EVALUATIONS * W + lane] += 2.0 * n
+    if m[mem.FACTORED_STEP] != h and not factorise_both(n, m, h):
         return -1
-    iterations = newton(effects, size, m, tables, h, guessed)
+    iterations = newton(motion, n, m, tables, h, guessed)
     evaluated = abs(iterations) - 1 if guessed else abs(iterations)
     work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
     return iterations
 
 
 @scalar_function
-def give_up(size, lane, W, work, m):
+def give_up(n, lane, W, work, m):
     """The iteration failed: a shorter step by the polynomial of the step before, with a Jacobian that is nearer."""
     h = m[mem.STEP]
-    copy_polynomial(size, m, mem.KEPT, mem.Z)
+    copy_polynomial(n, m, mem.KEPT, mem.Z)
     m[mem.POLYNOMIAL_STEP] = m[mem.KEPT_STEP]
     m[mem.CONTINUES] = 1.0
     m[mem.NEW_JACOBIAN] = 0.0
@@ -276,14 +272,14 @@ def give_up(size, lane, W, work, m):
 
 
 @scalar_function
-def implicit_step(effects, size, lane, W, block, tables, memory, settings):
+def implicit_step(effects, motion, n, lane, W, block, tables, memory, settings):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
     work = block.work
-    guessed = begin_step(effects, size, lane, W, block, m, tables, settings)
-    iterations = solve_step(effects, size, lane, W, work, m, tables, guessed)
+    guessed = begin_step(effects, motion, n, lane, W, block, m, tables, settings)
+    iterations = solve_step(effects, motion, n, lane, W, work, m, tables, guessed)
     if iterations < 0:
-        give_up(size, lane, W, work, m)
+        give_up(n, lane, W, work, m)
         return
     h = m[mem.STEP]
     m[mem.POLYNOMIAL_STEP] = h
@@ -297,28 +293,27 @@ def implicit_step(effects, size, lane, W, block, tables, memory, settings):
         work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
     else:
         m[mem.KINK_CUTS] = 0.0
-        judge(effects, size, lane, W, work, m, tables, iterations)
+        judge(effects, motion, n, lane, W, work, m, tables, iterations)
 
 
 @scalar_function
-def judge(effects, size, lane, W, work, m, tables, iterations):
+def judge(effects, motion, n, lane, W, work, m, tables, iterations):
     """Error of a converged step, its integrals, its end and the step to try next."""
-    n = len(size)
     h = m[mem.STEP]
     for k in range(n):
         m[mem.SHIFTED + k] = m[mem.START + k]
         m[mem.SHIFTED + n + k] = 0.0
-    total = filtered_error(size, m, h)
+    total = filtered_error(n, m, h)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
     if total > 2.0 * n and uneasy:
-        total = refilter_error(effects, size, m, tables, h)
+        total = refilter_error(motion, n, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 1.0
     # as the last correction left them: integrals fit the end of the step
-    evaluate_stages(effects, size, m, tables, h)
+    evaluate_stages(motion, n, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 1.0
     gaps = gap_errors(effects, m, work, lane, W)
     means_of_step(effects, m, work, lane, W)
-    leave(size, lane, W, work, m)
+    leave(n, lane, W, work, m)
     mean = (total + gaps) * (0.5 / n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
     work[at.ERROR * W + lane] = mean
@@ -351,9 +346,8 @@ def propose(lane, W, work, m, iterations):
 
 
 @scalar_function
-def leave(size, lane, W, work, m):
+def leave(n, lane, W, work, m):
     """Put the end of the step where an explicit step would leave it."""
-    n = len(size)
     for k in range(n):
         work[(at.QS + k) * W + lane] = m[(at.QS + k) * LANES + END]
         work[(at.VS + k) * W + lane] = m[(at.VS + k) * LANES + END]
@@ -363,10 +357,10 @@ def leave(size, lane, W, work, m):
 
 
 @lane_function
-def take_implicit_steps(effects, size, block, tables, memory, settings, W):
+def take_implicit_steps(effects, motion, n, block, tables, memory, settings, W):
     """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
     if memory is not None:
         work = block.work
         for i in range(W):
             if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
-                implicit_step(effects, size, i, W, block, tables, memory, settings)
+                implicit_step(effects, motion, n, i, W, block, tables, memory, settings)

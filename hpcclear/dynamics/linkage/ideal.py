@@ -78,7 +78,14 @@ def _instant(effects, par, load_table, angle, w, alpha, out, i):
     a3 = pin_ax + length * swing_x
     ax = pin_ax + near * swing_x
     ay = pin_ay + near * swing_y
-    load = load_of(effects.load, effects.load_table, par, table_value(load_table, angle), 0, 1)
+    load = load_of(
+        effects.load,
+        effects.load_table,
+        par,
+        table_value(load_table, 0, load_table.size // 4, angle),
+        0,
+        1,
+    )
     # guide reaction N = free - slope f with f = ratio |N|, one balance of rod and slider
     slope = length * st * inverse
     free = reaction_slope(par, (st, ct), (alpha2, ax, ay + g, a3), 0, 1) + load * slope + m3 * g

@@ -16,7 +16,7 @@ Coordinates (free crank angle last, only with a torque drive):
 
 import math
 
-from hpcclear.base.jit import lane_function
+from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.contact import elastic_force, normal_force
@@ -26,14 +26,13 @@ _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
 
 
 @lane_function
-def table_value(table, angle):
-    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell."""
-    cells = table.size // 4
+def table_value(table, first, cells, angle):
+    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell, from `first` on."""
     turns = angle * (0.5 / math.pi)
     x = (turns - math.floor(turns)) * cells
     cell = min(int(x), cells - 1)
     s = x - cell
-    k = 4 * cell
+    k = first + 4 * cell
     return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
 
 
@@ -103,6 +102,7 @@ def guide_friction(guide, par, speed, reaction, i, W):
         return 0.0
 
 
+@apart
 @lane_function
 def joint_force(effects, work, par, joint, relative, i, W):
     """Contact and friction in one open joint.
@@ -287,6 +287,7 @@ def two_open(effects, work, par, phi, omega, i, W):
     )
 
 
+@apart
 @lane_function
 def crank_rod_open(effects, work, par, phi, omega, i, W):
     """O12 open, O23 ideal: coordinates rod angle and slider x, coupled by the rod's mass."""
@@ -387,6 +388,7 @@ def sliding_pair(guide, par, matrix, right, rod, slider, i, W):
         return (b1 * a22 - a12 * b2) * inverse, (a11 * b2 - a12 * b1) * inverse, 0.0
 
 
+@apart
 @lane_function
 def rod_slider_open(effects, work, par, phi, omega, i, W):
     """O12 ideal, O23 open: coordinates rod angle, slider x (and the crank angle, coupled by the rod's mass)."""

@@ -7,33 +7,50 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import run_motion
+
+
+def observe(
+    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: Array, out: Array
+) -> None:
+    """Fill `out` (instants, n + RATES) with accelerations and rates.
+
+    `motion`: address of a motion of one lane (`rhs.motion_of`); `states` (instants, 2 n): coordinates, then velocities;
+    `contacts` (instants, 4): active flags and 1/d'_0 of both joints; `times` (instants,): since the start of the revolution;
+    `tables`: as `Problem.tables`.
+    """
+    _observe(motion, new_lane(par), tables, states, contacts, times, out)
+
+
+def new_lane(par: Array) -> Array:
+    """The rows of one lane with these parameters (PARAMETERS,)."""
+    return np.concatenate([np.zeros(at.WORK), par])
 
 
 @scalar_function
-def observe(effects, par, tables, states, contacts, times, out):
-    """Fill `out` (instants, n + RATES) with accelerations and rates.
-
-    `states` (instants, 2 n): coordinates, then velocities; `contacts` (instants, 4): active flags and 1/d'_0 of both
-    joints; `times` (instants,): since the start of the revolution; `tables`: `layout.Tables`.
-    """
+def _observe(motion, lane, tables, states, contacts, times, out):
+    """`observe` by a lane at hand."""
     n = states.shape[1] // 2
-    work = out[0, :1].repeat(at.WORK)
-    work[:] = 0.0
     for row in range(len(times)):
+        put_state(lane, contacts[row], times[row], states[row], n)
+        run_motion(motion, lane, tables)
         for k in range(n):
-            work[at.QS + k] = states[row, k]
-            work[at.VS + k] = states[row, n + k]
-        work[at.ACTIVE_12] = contacts[row, 0]
-        work[at.ACTIVE_23] = contacts[row, 1]
-        work[at.INVERSE_IMPACT_12] = contacts[row, 2]
-        work[at.INVERSE_IMPACT_23] = contacts[row, 3]
-        work[at.STAGE_TIME] = times[row]
-        accelerations(effects, work, par, tables.torque, tables.load, 1)
-        for k in range(n):
-            out[row, k] = work[at.ACC + k]
+            out[row, k] = lane[at.ACC + k]
         for r in range(at.RATES):
-            out[row, n + r] = work[at.RATE_NOW + r]
+            out[row, n + r] = lane[at.RATE_NOW + r]
+
+
+@scalar_function
+def put_state(work, contacts, time, state, n):
+    """What a motion of one lane reads besides parameters."""
+    for k in range(n):
+        work[at.QS + k] = state[k]
+        work[at.VS + k] = state[n + k]
+    work[at.ACTIVE_12] = contacts[0]
+    work[at.ACTIVE_23] = contacts[1]
+    work[at.INVERSE_IMPACT_12] = contacts[2]
+    work[at.INVERSE_IMPACT_23] = contacts[3]
+    work[at.STAGE_TIME] = time
 
 
 OPEN, FORCE, RATE = 0, 1, 2
@@ -41,39 +58,33 @@ OPEN, FORCE, RATE = 0, 1, 2
 
 
 class Seen(NamedTuple):
-    """What `derivative` writes: dy/dt, the joints (2, 3), and the kernel's rows of one lane."""
+    """What `derivative` writes: dy/dt, the joints (2, 3), and the kernel's rows of one lane, parameters included."""
 
     rates: Array
     joints: Array
-    work: Array
+    lane: Array
 
 
-def new_seen(n: int) -> Seen:
-    """Room for n coordinates."""
-    return Seen(np.empty(2 * n + 2), np.zeros((2, 3)), np.zeros(at.WORK))
+def new_seen(n: int, par: Array) -> Seen:
+    """Room for n coordinates of the lane with these parameters (PARAMETERS,)."""
+    return Seen(np.empty(2 * n + 2), np.zeros((2, 3)), new_lane(par))
 
 
-# ten arguments: packed into named tuples, a call from Python takes 32 us in place of 17
+# nine arguments: packed into named tuples, a call from Python takes 32 us in place of 17
 @scalar_function
-def derivative(effects, par, torque_table, load_table, contacts, time, y, out, joints, work):
+def derivative(motion, tables, contacts, time, y, out, joints, lane):
     """Rates of y = (coordinates, velocities, integrals of the absolute gaps) at `time` since the start of the revolution.
 
-    `contacts`: whether each joint is latched, then 1/d'_0 of each. `out`, `joints`, `work`: as in `Seen`.
+    `motion`: address of a motion of one lane; `contacts`: whether each joint is latched, then 1/d'_0 of each. `out`, `joints`,
+    `lane`: as in `Seen`.
     """
     n = len(y) // 2 - 1
-    for k in range(n):
-        work[at.QS + k] = y[k]
-        work[at.VS + k] = y[n + k]
-    work[at.ACTIVE_12] = contacts[0]
-    work[at.ACTIVE_23] = contacts[1]
-    work[at.INVERSE_IMPACT_12] = contacts[2]
-    work[at.INVERSE_IMPACT_23] = contacts[3]
-    work[at.STAGE_TIME] = time
-    accelerations(effects, work, par, torque_table, load_table, 1)
+    put_state(lane, contacts, time, y, n)
+    run_motion(motion, lane, tables)
     for k in range(n):
         out[k] = y[n + k]
-        out[n + k] = work[at.ACC + k]
+        out[n + k] = lane[at.ACC + k]
     for j, gap in ((0, at.GAP_12), (1, at.GAP_23)):
         for m in range(3):
-            joints[j, m] = work[at.RATE_NOW + gap + m]
+            joints[j, m] = lane[at.RATE_NOW + gap + m]
         out[2 * n + j] = abs(joints[j, OPEN])

@@ -1,6 +1,16 @@
-"""Accelerations of all lanes at one stage; only the effects that are on are compiled."""
+"""Accelerations of all lanes at one stage: one compiled function for each set of effects, which steppers call by its address.
 
-from hpcclear.base.jit import lane_function
+A stepper knows nothing of a motion but this address, so that one compiled stepper serves them all.
+"""
+
+from functools import cache
+from typing import Any
+
+from numba import carray, cfunc, types
+
+from hpcclear.base.bits import beyond, call_at
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.baumgarte import nine_coordinates
 from hpcclear.dynamics.linkage.motion import (
@@ -34,12 +44,12 @@ def crank_motion(torque, baumgarte, work, par, last, i, W):
 
 
 @lane_function
-def look_up(effects, flag, row, work, par, table, last, W):
+def look_up(effects, flag, row, work, par, tables, first, last, W):
     """Value of a tabulated curve for every lane: apart from the motion, which a look-up would keep from being vectorised."""
     if flag is not None:
         for i in range(W):
             phi, _ = crank_motion(effects.torque, effects.baumgarte, work, par, last, i, W)
-            work[row * W + i] = table_value(table, phi)
+            work[row * W + i] = table_value(tables, first, at.CELLS, phi)
 
 
 @lane_function
@@ -63,11 +73,53 @@ def lane_motion(effects, baumgarte, crank_rod, rod_slider, work, par, i, W):
 
 
 @lane_function
-def accelerations(effects, work, par, torque_table, load_table, W):
+def accelerations(effects, work, par, tables, W):
     """Accelerations and rates of W lanes at the stage held in `work`."""
     crank_rod, rod_slider, baumgarte = effects.crank_rod, effects.rod_slider, effects.baumgarte
     last = crank_coordinate(baumgarte, crank_rod, rod_slider)
-    look_up(effects, effects.torque_table, at.TORQUE_VALUE, work, par, torque_table, last, W)
-    look_up(effects, effects.load_table, at.LOAD_VALUE, work, par, load_table, last, W)
+    torque, load = effects.torque_table, effects.load_table
+    look_up(effects, torque, at.TORQUE_VALUE, work, par, tables, at.TORQUE_TABLE, last, W)
+    look_up(effects, load, at.LOAD_VALUE, work, par, tables, at.LOAD_TABLE, last, W)
     for i in range(W):
         lane_motion(effects, baumgarte, crank_rod, rod_slider, work, par, i, W)
+
+
+@lane_function
+def motion(effects, lanes, tables, W):
+    """`accelerations` of the lanes at an address."""
+    work = carray(lanes, at.BANK * W)
+    par = beyond(work, at.WORK * W)  # type: ignore[call-arg, var-annotated]
+    accelerations(effects, work, par, carray(tables, at.TABLES), W)
+
+
+_NUMBERS = types.CPointer(types.float64)
+SIGNATURE = types.void(_NUMBERS, _NUMBERS)
+
+
+@cache
+def motion_of(effects: at.Effects, W: int) -> Any:
+    """The compiled motion for W lanes; its ``address`` is what steppers take.
+
+    A motion is a C function ``void motion(double *lanes, double *tables)``, whatever mechanism it describes and wherever
+    its text comes from. Row k of lane i is ``lanes[k * W + i]``; the rows are those of `layout`, `work` first, parameters
+    behind it from row ``layout.WORK`` on.
+
+    - It reads coordinates and velocities of the stage (n rows each from QS and VS on), STAGE_TIME (s since the start of the
+      revolution), of each joint with clearance its contact state (ACTIVE, INVERSE_IMPACT), and parameters.
+    - It writes accelerations (n rows from ACC on) and, from RATE_NOW on, each joint's gap, normal force and rate of the gap,
+      and of the other rates those that are asked for.
+    - It may use TORQUE_VALUE and LOAD_VALUE. All other rows it leaves alone: no state of its own, nothing kept between calls.
+    - `tables` holds the tabulated curves, ``layout.TABLES`` numbers.
+
+    Every lane must get the same bits whatever W is and whatever the other lanes hold, lanes at rest among them, so it is
+    compiled with `FASTMATH` and without branches on a lane's numbers.
+    The object is kept for as long as the process lives: a stepper may hold its address.
+    """
+    text = one_text(motion, f"motion_{W}", effects=effects, W=W)
+    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+
+
+@lane_function
+def run_motion(address, work, tables):
+    """Accelerations and rates of all lanes at the stage held in `work`, by the motion at an address."""
+    call_at(address, (work, tables))  # type: ignore[call-arg]

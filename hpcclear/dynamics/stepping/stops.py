@@ -1,6 +1,5 @@
 """Where a step must end, in scalar code for few lanes: at impacts, at kinks of a force, with a free crank's turn."""
 
-from hpcclear.base.jit import lane_function
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
@@ -153,7 +152,7 @@ def stop_free_crank(lane, W, work, settings, last):
     return OK
 
 
-@lane_function
+@lane_event
 def turn_of_free_crank(torque, lane, W, work, settings, last):
     """End the step where a crank that is a coordinate ends its revolution; the status if it never will."""
     if torque is not None:
@@ -162,14 +161,14 @@ def turn_of_free_crank(torque, lane, W, work, settings, last):
         return OK
 
 
-@lane_function
+@lane_event
 def impacts(latched, lane, W, work, settings):
     """End the step at the first impact inside it, under laws that need the impact speed."""
     if latched is not None:
         stop_at_impacts(lane, W, work, settings)
 
 
-@lane_function
+@lane_event
 def wrap_crank(torque, baumgarte, lane, W, work, last):
     """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
     if torque is not None or baumgarte is not None:
