@@ -1,5 +1,6 @@
 """What results say of an engine of one's own: its own numbers, its own names, the objective that was asked for."""
 
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -11,11 +12,12 @@ from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OBJECTIVES
-from hpcclear.cli.printing import describe_samples, describe_statistics
+from hpcclear.cli.printing import describe_samples, describe_statistics, quantity
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks.boundary import alone
+from hpcclear.ranks.progress import grouped
 from hpcclear.report.html import sections
 from hpcclear.report.html.content import read
 from hpcclear.results import dataset
@@ -188,3 +190,32 @@ def test_a_response_holds_the_load_that_was_applied(more):
 
 def test_no_load_no_column():
     assert "slider_load" not in hpcclear.simulate(engine("effects.slider_load=none", study=False))
+
+
+def test_a_run_says_which_stage_of_how_many_it_is_at(tmp_path, monkeypatch, capsys):
+    formula.replace_dynamics(monkeypatch.setattr)
+    run_study(engine(), tmp_path / "out", alone(), progress_style="log")
+    told = re.findall(r"(?m)^stage (\d) of (\d): .+ \(\d+ s so far\)$", capsys.readouterr().err)
+    numbers = [int(number) for number, _ in told]
+    assert {of for _, of in told} == {"4"}  # no sensitivities asked for, nothing of the paper's
+    assert numbers == sorted(numbers)
+    assert set(numbers) == {1, 2, 3, 4}
+    run_study(engine(), tmp_path / "quiet", alone(), progress_style="quiet")
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (29916.0, "N", "29.92 kN"),
+        (6.78e-6, "m", "6.78 µm"),
+        (3e-4, "m", "0.3 mm"),
+        (1.06e11, "Pa", "106 GPa"),
+        (0.0, "m", "0 m"),
+        (np.nan, "m", "nan"),
+    ],
+)
+def test_numbers_in_the_terminal_have_prefixes(value, unit, shown):
+    assert quantity(value, unit) == shown
+    assert grouped(1249.6) == "1 250"
+    assert grouped(3.217) == "3.22"

@@ -116,6 +116,12 @@ def _place(output: Path) -> Path:
     return output
 
 
+def _check_free(path: Path) -> None:
+    """Raise InputError if something is there: what a user wrote is not written over."""
+    if path.exists():
+        raise InputError("file", str(path), "is there already", "Choose another name")
+
+
 def _is_root() -> bool:
     return launched_rank() in (0, None)
 
@@ -130,20 +136,54 @@ def _on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None
     return run_on_ranks(program, stop)
 
 
+@cli.command(short_help="Write a starter scene.")
+@click.argument("file", type=click.Path(path_type=Path))
+def init(file: Path) -> int:
+    """Write an engine to start from: every table, each number with its unit, and a small study.
+
+    An existing file is never overwritten.
+
+    Example: hpcclear init engine.toml
+    """
+    if not _is_root():
+        return Exit.DONE
+    from importlib import resources
+
+    from hpcclear.results import files
+
+    _check_free(file)
+    files.probe(_place(file))
+    text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
+    files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
+    click.echo(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
+    return Exit.DONE
+
+
 @cli.command(short_help="Say what a file would simulate, at what cost.")
 @_FILE
 @_SET
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
-def check(file: Path, overrides: tuple[str, ...], cost: bool) -> int:
+@click.option(
+    "--sketch",
+    type=click.Path(path_type=Path),
+    metavar="FIGURE",
+    help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
+)
+def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
-    Example: hpcclear check jobs/slider_crank.toml --set effects.gravity=9.81
+    Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
     if not _is_root():
         return Exit.DONE
     from hpcclear.cli.printing import describe_scene
 
-    describe_scene(_scene(file, overrides), cost)
+    scene = _scene(file, overrides)
+    describe_scene(scene, cost)
+    if sketch is not None:
+        from hpcclear.report import save, sketch_figure
+
+        click.echo(f"sketch   {save(sketch_figure(scene), _place(sketch))}")
     return Exit.DONE
 
 

@@ -120,14 +120,20 @@ def _cores() -> int:
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     study = scene.study
     assert study is not None
-    rows = [("samples", f"{study.samples} ({study.method}), seed {study.seed}")]
+    rows = [
+        ("samples", f"{study.samples} ({study.method}), seed {study.seed}"),
+        ("objective", f"{study.objective}: {scene.objective.words}"),
+    ]
     for variable in study.variables:
         if variable.range is not None:
-            unit = scene.unit(variable.paths[0])
-            rows.append((variable.name, f"{variable.range[0]:g} to {variable.range[1]:g} {unit}"))
+            lower, upper = (quantity(end, variable.unit) for end in variable.range)
+            rows.append((variable.name, f"{lower} to {upper}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(
-                (variable.name, f"{variable.ratio[0]:g} to {variable.ratio[1]:g} times m L^2/12")
+                (
+                    variable.name,
+                    f"{variable.ratio[0]:g} to {variable.ratio[1]:g}: {variable.ratio_words}",
+                )
             )
     return rows
 
@@ -148,7 +154,7 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     evaluations = int(record["rhs_evaluations"])
     rows = [
         ("force evaluations", f"{evaluations}"),
-        ("time a sample", f"{each * 1e3:.3g} ms on one core, {DEFAULT_LANES} in lockstep"),
+        ("time a sample", f"{each * 1e3:.3g} ms on one core, {DEFAULT_LANES} side by side"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (kept for the next run)"),
     ]
     if scene.study is not None:

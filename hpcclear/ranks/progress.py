@@ -100,7 +100,9 @@ class Progress:
         """Done, total, percentage, failures and rate."""
         share = 100.0 * self._done / self._total if self._total else 100.0
         failed = f", {self._failed} failed" if self._failed else ""
-        return f"{self._done}/{self._total} ({share:.0f} %){failed}, {self._rate():.3g} samples/s"
+        return (
+            f"{self._done}/{self._total} ({share:.0f} %){failed}, {grouped(self._rate())} samples/s"
+        )
 
     def _rate(self) -> float:
         """Samples a second over the last `_WINDOW` seconds."""
@@ -133,6 +135,11 @@ def duration(seconds: float) -> str:
     if hours:
         return f"{hours}:{minutes:02d}:{rest:02d} h"
     return f"{minutes}:{rest:02d} min" if minutes else f"{rest} s"
+
+
+def grouped(number: float) -> str:
+    """A positive number as people read it: ``1 250``, ``3.2``."""
+    return f"{number:,.0f}".replace(",", " ") if number >= 100.0 else f"{number:.3g}"
 
 
 def launching_terminal() -> TextIO | None:

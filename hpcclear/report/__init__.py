@@ -18,6 +18,7 @@ from hpcclear.report.figures.response import (
     spectrum_figure,
 )
 from hpcclear.report.figures.samples import samples_figure
+from hpcclear.report.figures.sketch import sketch_figure
 from hpcclear.report.figures.style import save
 from hpcclear.report.figures.surrogates import (
     fit_figure,
@@ -44,6 +45,7 @@ __all__ = [
     "samples_figure",
     "save",
     "sensitivity_figure",
+    "sketch_figure",
     "sobol_figure",
     "spectrum_figure",
     "surfaces_figure",

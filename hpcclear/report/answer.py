@@ -18,6 +18,9 @@ SPAN = 2.0
 MANY = 0.05
 """Share of samples beyond the range of the theory from which it is said first."""
 
+FAR = 0.2
+"""Relative error of the surrogate from which it is said to be off."""
+
 NAMED = 3
 """Designs named before the rest is counted."""
 
@@ -37,7 +40,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     files : mapping of str to xarray.Dataset
         Result files by their kind.
     place : str
-        Directory they are in, as the reader knows it.
+        Directory they are in, as the reader knows it; "" on the page itself.
     """
     verified = files.get("verification")
     if verified is None or not np.isfinite(verified["mean_true"]).any():
@@ -173,10 +176,16 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     level = float(verified.attrs.get("confidence", np.nan))
     text = f"{count} direct simulations of each design"
     text += f", limits of {level:.0%}" if np.isfinite(level) else ""
-    errors = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
-    if len(errors) == 2 and np.isfinite(errors).all():
+    errors = _surrogate_errors(best)
+    if len(errors) == 2:
         text += f"; the surrogate was off by {errors[0]:+.1%} and {errors[1]:+.1%} there"
     return text
+
+
+def _surrogate_errors(best: xr.Dataset) -> list[float]:
+    """Relative errors of the surrogate's mean and deviation, as far as they are known."""
+    found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
+    return [error for error in found if np.isfinite(error)]
 
 
 def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
@@ -185,6 +194,12 @@ def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
         yield "mind the contact: smaller clearances or stiffer bearings, or forces are only a guide"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "widen the ranges of the variables on a bound if the machine allows it"
+    if any(abs(error) > FAR for error in _surrogate_errors(best)):
+        yield "raise study.samples: the surrogate is off there, and a better design may hide"
     if _twins(ours, best) and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
-    yield f"hpcclear report {place}"
+    yield (
+        f"hpcclear report {place}"
+        if place
+        else "click its mark on the front below for its response"
+    )

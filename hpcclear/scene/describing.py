@@ -21,7 +21,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name, label in NAMES.items():
         joint = getattr(scene.joints, name)
         if isinstance(joint, ClearanceJoint):
-            yield f"clearance {joint.clearance * 1e3:g} mm in joint {name} ({label})"
+            small = joint.clearance < 1e-4
+            size = f"{joint.clearance * 1e6:g} um" if small else f"{joint.clearance * 1e3:g} mm"
+            yield f"clearance {size} in joint {name} ({label})"
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"

@@ -36,6 +36,7 @@ from hpcclear.study import optimisation, paper, responses, sensitivities, surrog
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.simulations import Simulations
+from hpcclear.study.stages import Stages
 
 __all__ = ["run_study"]
 
@@ -105,8 +106,9 @@ def _carry_out(scene: Scene, session: Session) -> None:
     compile_ahead(scene, session.ranks, points, style)
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
+    announce = Stages(scene).announced if style != "quiet" else Stages.silent
     _tell_the_story(
-        StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell)
+        StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
     )
 
 

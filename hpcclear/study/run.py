@@ -34,6 +34,8 @@ class StudyRun:
     simulations : Simulations
     tell : callable
         Gets what the user should know, a sentence at a time.
+    announce : callable
+        Gets the name of each stage when it begins.
     """
 
     scene: Scene
@@ -42,6 +44,7 @@ class StudyRun:
     checkpoint: Checkpoint
     simulations: Simulations
     tell: Callable[[str], object]
+    announce: Callable[[str], object] = lambda name: None
 
     @property
     def study(self) -> Study:
@@ -68,6 +71,7 @@ class StudyRun:
         Either way the samples that follow are numbered alike, so that a run that was interrupted
         ends like one that was not.
         """
+        self.announce(name)
         return self._kept(name, self.ranks.stage(name), work, arguments)
 
     def part(

@@ -86,7 +86,7 @@ def _policy() -> str:
 def _sections(content: Content) -> Iterator[Section]:
     """All sections in the page's order, those with nothing to show among them."""
     beside = " beside the paper's" if content.is_compared else ""
-    lines = answer(content.files, str(content.directory))
+    lines = answer(content.files, "")
     yield Section("answer", "The answer", "answer.html", lines or None)
     yield Section("summary", "Summary", "summary.html", sections.summary(content))
     yield Section(

@@ -1,0 +1,49 @@
+"""Which stage of how many a study is at, for those who wait."""
+
+import sys
+import time
+
+from hpcclear.ranks.progress import duration
+from hpcclear.scene import Scene
+from hpcclear.study import paper
+
+_WORDS = {
+    "sensitivity": "which variables matter",
+    "kriging": "models of the objective",
+    "optimisation": "the swarm on the model",
+    "check": "its best designs by direct simulation",
+    "infill": "more points where the model is off",
+    "verification": "designs along the fronts by direct simulation",
+    "responses": "responses of the original and the best designs",
+    "readings": "the printed designs under readings of the text",
+}
+"""What each stage does, by its name without the number of a round."""
+
+_SEARCH = ("optimisation", "check", "infill")
+"""Stages that are repeated until the model holds: one of those that are counted."""
+
+
+class Stages:
+    """Tells each stage of a study of this scene as it begins, on standard error."""
+
+    def __init__(self, scene: Scene) -> None:
+        steps = ["kriging", "optimisation", "verification", "responses"]
+        steps = (["sensitivity"] if scene.required_study.groups else []) + steps
+        self._steps = steps + (["readings"] if "readings.nc" in paper.files(scene) else [])
+        self._began = time.monotonic()
+
+    def announced(self, name: str) -> None:
+        """Write which stage begins, and how long the study has taken so far."""
+        kind, _, round_ = name.partition("-")
+        step = "optimisation" if kind in _SEARCH else kind
+        if step not in self._steps:
+            return
+        number = self._steps.index(step) + 1
+        again = f", round {int(round_) + 1}" if round_ else ""
+        spent = duration(time.monotonic() - self._began)
+        text = f"stage {number} of {len(self._steps)}: {_WORDS[kind]}{again} ({spent} so far)"
+        print(text, file=sys.stderr, flush=True)
+
+    @staticmethod
+    def silent(name: str) -> None:
+        """Say nothing."""

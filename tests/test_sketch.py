@@ -1,0 +1,93 @@
+"""The drawing of a mechanism, and the scene to start from."""
+
+import itertools
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from own_engine import engine
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.report import sketch_figure
+from hpcclear.report.figures.sketch import ANGLE
+from hpcclear.scene import load_scene
+
+SCENES = {
+    "engine": (),
+    "short crank": ("mechanism.crank.length=8 mm",),
+    "long crank": ("mechanism.crank.length=130 mm",),
+    "counterweight": ("mechanism.crank.mass_center=-30 mm", "effects.gravity=9.81"),
+    "ideal": ("joints.crank_rod.kind=ideal", "effects.slider_load=none"),
+    "torque": (
+        'drive={ kind = "torque", torque = 4.0, flywheel_inertia = 0.05, initial_speed = "3000 rpm" }',
+    ),
+}
+
+
+def drawn(scene):
+    """Figure, its axes and its texts, laid out."""
+    figure = sketch_figure(scene)
+    figure.canvas.draw()
+    return (
+        figure,
+        figure.axes[0],
+        [t for t in [*figure.texts, *figure.axes[0].texts] if t.get_text()],
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_word_of_the_drawing_covers_another_or_leaves_the_page(name):
+    figure, _, texts = drawn(engine(*SCENES[name], study=False))
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts]
+    page = figure.bbox
+    for word, box in boxes:
+        assert page.containsx(box.x0), word
+        assert page.containsx(box.x1), word
+        assert page.containsy(box.y0), word
+        assert page.containsy(box.y1), word
+    for (word, one), (other, two) in itertools.combinations(boxes, 2):
+        assert not one.overlaps(two), (word, other)
+
+
+def test_lengths_and_mass_centres_are_to_scale():
+    _, axes, _ = drawn(engine(study=False))
+    lines = [np.column_stack(line.get_data()) for line in axes.lines]
+    pin = 0.04 * np.array([np.cos(ANGLE), np.sin(ANGLE)])
+    bars = [line for line in lines if line.shape == (2, 2)]
+    crank = next(line for line in bars if np.allclose(line[0], 0.0))
+    assert np.allclose(crank[1], pin)
+    rod = next(line for line in bars if np.allclose(line[0], pin))
+    assert np.hypot(*(rod[1] - rod[0])) == pytest.approx(0.14)
+    assert rod[1, 1] == pytest.approx(0.0)
+    points = [line[0] for line in lines if line.shape == (1, 2)]
+    for centre in (pin * 10 / 40, pin + (rod[1] - pin) * 45 / 140):
+        assert any(np.allclose(point, centre) for point in points)
+
+
+def test_the_key_has_the_scenes_own_numbers():
+    text = " ".join(t.get_text() for t in drawn(engine(study=False))[2])
+    for words in ("40 mm", "1.1 kg", "30 µm", "15 µm", "3000 rpm", "-9 kN to -200 N", "O12", "O23"):
+        assert words in text, words
+    rigid = " ".join(t.get_text() for t in drawn(engine(*SCENES["ideal"], study=False))[2])
+    assert "ideal, no play" in rigid
+    assert "F on the slider" not in rigid
+
+
+def test_check_draws_and_init_writes_what_check_accepts(tmp_path):
+    file, figure = tmp_path / "my engine.toml", tmp_path / "sketch.svg"
+    made = CliRunner().invoke(cli, ["init", str(file)])
+    assert made.exit_code == 0
+    assert f"hpcclear check {file}" in made.output
+    assert f"hpcclear run {file} -o results" in file.read_text()
+    scene = load_scene(file)
+    assert scene.warnings == ()
+    assert scene.study.objective in file.read_text()
+    words = ["check", str(file), "--no-cost", "--sketch", str(figure)]
+    checked = CliRunner().invoke(cli, words)
+    assert checked.exit_code == 0
+    assert figure.read_text().startswith("<?xml")
+    before = file.read_bytes()
+    again = CliRunner().invoke(cli, ["init", str(file)])
+    assert isinstance(again.exception, InputError)
+    assert file.read_bytes() == before
