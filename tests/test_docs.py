@@ -103,7 +103,10 @@ def test_commands_and_options_that_are_named_exist(page):
     for text in inline(page):
         if found := re.match(r"(?:mpiexec -n \S+ )?hpcclear ([a-z]+)", text):
             command = cli.commands[found[1]]
-            known = {word for p in command.params for word in p.opts} | {"--help", "-h"}
+            known = {word for p in command.params for word in (*p.opts, *p.secondary_opts)} | {
+                "--help",
+                "-h",
+            }
             used = {word for word in text.split() if word.startswith("-") and word != "-n"}
             assert used <= known, f"{page}: {text}"
         elif re.fullmatch(r"--[a-z-]+( \S+)?", text) and "sbatch" not in text:
@@ -204,3 +207,14 @@ def test_no_code_of_ours_is_left_in_the_pages(site):
         assert "no-run:" not in text, path
         assert " slow:" not in text, path
         assert "<!--" not in text, path
+
+
+def test_a_newcomers_questions_are_answered_in_a_command_or_a_click():
+    """docs/questions.md, a click from the start: twenty rows, each with a command, an entry or a link."""
+    page = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
+    rows = re.findall(r"(?m)^\| ([^|]+\?) \| (.+) \|$", page)
+    assert len(rows) == 20
+    assert all("`" in answer or "](" in answer for _, answer in rows)
+    for word in ("lubrication", "four-stroke", "LuGre", "latched", "restart", "Hertz"):
+        assert word in page
+    assert "(questions.md)" in (ROOT / "docs" / "index.md").read_text(encoding="utf-8")

@@ -8,17 +8,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OBJECTIVES
-from hpcclear.cli.printing import describe_samples, describe_statistics, quantity
+from hpcclear.cli import cli
+from hpcclear.cli.printing import describe_response, describe_samples, describe_statistics, quantity
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import grouped
-from hpcclear.report.html import sections
+from hpcclear.report import samples_figure
+from hpcclear.report.html import gallery, sections
 from hpcclear.report.html.content import read
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
@@ -219,3 +222,40 @@ def test_numbers_in_the_terminal_have_prefixes(value, unit, shown):
     assert quantity(value, unit) == shown
     assert grouped(1249.6) == "1 250"
     assert grouped(3.217) == "3.22"
+
+
+def test_a_peak_between_the_instants_of_the_series_is_said_to_be_one(tmp_path, capsys):
+    response = hpcclear.simulate(engine("output.instants_per_revolution=36", study=False))
+    describe_response(response, tmp_path / "response.nc")
+    told = " ".join(capsys.readouterr().out.split())
+    for joint in range(2):
+        peak = float(response.peak_contact_force[joint])
+        shown = float(response.contact_force[:, joint].max())
+        assert quantity(peak, "N") in told
+        if peak > shown * 1.001:
+            assert f"the series, which shows {quantity(shown, 'N')}" in told
+    assert "which shows" in told  # 36 instants miss one of them at least
+
+
+def test_every_command_that_simulates_warns_of_a_slip(tmp_path):
+    path = tmp_path / "slip.toml"
+    path.write_text(engine("drive.speed=5000", study=False).to_toml())
+    where = str(tmp_path / "out.nc")
+    words = ["--set", "numerics.max_steps=50"]
+    done = CliRunner().invoke(cli, ["simulate", str(path), "-o", where, *words])
+    assert done.stderr.count("47746 rpm") == 1
+
+
+def test_figures_say_at_which_plays_responses_were_simulated():
+    response = hpcclear.simulate(engine(study=False))
+    assert gallery._plays(response) == ", at radial clearances of 30 µm in O12 and 15 µm in O23"
+
+
+def test_the_figure_of_samples_marks_none_as_failed_where_the_scatter_is_not_known(tmp_path):
+    scene = engine(*QUICK, "study.objective=peak-contact-force")
+    found = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")).content
+    figure = samples_figure(found)
+    crosses = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "x"]
+    assert sum(len(line.get_xdata()) for line in crosses) == 0
+    words = " ".join(text.get_text() for axes in figure.axes for text in axes.texts)
+    assert "not known of this objective" in words

@@ -101,10 +101,15 @@ def cli() -> None:
     """
 
 
-def _scene(file: Path, overrides: tuple[str, ...]) -> "Scene":
+def _scene(file: Path, overrides: tuple[str, ...], warn: bool = True) -> "Scene":
+    """The scene; what looks like a slip of units is said, unless the caller says it."""
     from hpcclear.scene import load_scene
+    from hpcclear.scene.plausibility import implausible
 
-    return load_scene(file, overrides)
+    scene = load_scene(file, overrides)
+    for text in implausible(scene) if warn else ():
+        _say(f"Warning: {text}")
+    return scene
 
 
 def _place(output: Path) -> Path:
@@ -178,7 +183,7 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
         return Exit.DONE
     from hpcclear.cli.printing import describe_scene
 
-    scene = _scene(file, overrides)
+    scene = _scene(file, overrides, warn=False)
     describe_scene(scene, cost)
     if sketch is not None:
         from hpcclear.report import save, sketch_figure

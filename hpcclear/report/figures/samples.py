@@ -103,18 +103,30 @@ def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.Data
     side.set_xlabel("samples (–)")
     side.tick_params(labelleft=False)
     below = figure.add_subplot(cells[1, 0], sharex=first)
-    _cloud(below, main, samples["objective_spread"], _values(main))
-    below.set_xlabel(labels.of(main).label(symbol(main)))
-    below.set_ylabel(labels.of(samples["objective_spread"]).label("spread of $f$"))
-    spread = samples["objective_spread"].where(samples["objective_spread"] > 0)
-    if float(spread.max()) > 30.0 * float(spread.min()):
-        below.set_yscale("log")
+    _spread(below, samples, main)
     style.settle([first, below])
     style.settle([side], 3)
     corner = figure.add_subplot(cells[1, 1])
     corner.set_axis_off()
     corner.legend(handles=_marks(samples), loc="lower center", handletextpad=0.4, borderpad=0.0)
     return first
+
+
+def _spread(below: "Axes", samples: xr.Dataset, main: xr.DataArray) -> None:
+    """How f scatters between revolutions, where that is known."""
+    spread = samples["objective_spread"]
+    below.set_xlabel(labels.of(main).label(symbol(main)))
+    if not bool(spread.notnull().any()) and bool(samples["objective"].notnull().any()):
+        below.set_yticks([])
+        words = "its scatter between revolutions\nis not known of this objective"
+        place: dict[str, Any] = {"ha": "center", "va": "center", "transform": below.transAxes}
+        below.text(0.5, 0.5, words, fontsize=style.SMALL, **place)
+        return
+    _cloud(below, main, spread, _values(main))
+    below.set_ylabel(labels.of(spread).label("spread of $f$"))
+    positive = spread.where(spread > 0)
+    if float(positive.max()) > 30.0 * float(positive.min()):
+        below.set_yscale("log")
 
 
 def _values(variable: xr.DataArray) -> Array:

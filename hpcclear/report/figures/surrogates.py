@@ -1,5 +1,6 @@
 """Figures of sensitivities and surrogates (kinds ``sensitivity`` and ``kriging``)."""
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -255,7 +256,9 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
 def _held(sensitivity: xr.Dataset) -> str:
     """What is held fixed for each surface: the clearance, unless a study says otherwise."""
     words = labels.words(sensitivity["clearance"])
-    return "clearance $C$" if words == "radial clearance" else labels.literal(words)
+    if words == "radial clearance":
+        return "clearance $C$"
+    return "\n".join(textwrap.wrap(labels.literal(words), 20))  # half a column holds no more
 
 
 def _surface(name: str) -> str:

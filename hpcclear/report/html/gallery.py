@@ -4,12 +4,15 @@ import base64
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
     accuracy,
     designs,
+    labels,
+    motion,
     portraits,
     response,
     samples,
@@ -93,14 +96,28 @@ def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
             yield from _tried(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
     found = content.responses
     if len(found) > 1:
-        caption = "Responses of the designs, two revolutions."
+        caption = f"Responses of the designs, two revolutions{_plays(*found.values())}."
         yield designs.comparison_figure(found), caption
     if found:
         name = "original" if "original" in found else next(iter(found))
         if len(found) == 1:
-            yield response.response_figure(found[name]), f"{name}: response, two revolutions."
+            yield (
+                response.response_figure(found[name]),
+                f"{name}: response, two revolutions{_plays(found[name])}.",
+            )
         for draw, what in _RESPONSE:
             yield from _tried(draw, found[name], f"{name}: {what}.")
+
+
+def _plays(*responses: xr.Dataset) -> str:
+    """At which clearances these were simulated, where that is the same for all."""
+    told = []
+    for joint, name in enumerate(style.JOINT_NAMES.values()):
+        known = [motion.clearances(one)[joint] for one in responses]
+        shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}
+        if len(shown) == 1:
+            told.append(f"{shown.pop()} in {name}")
+    return f", at radial clearances of {' and '.join(told)}" if told else ""
 
 
 def _tried(
