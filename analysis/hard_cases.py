@@ -25,7 +25,8 @@ from hpcclear import __version__
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.dynamics.energy import energies
-from hpcclear.dynamics.evaluator import evaluate_records, outcome_records
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of

@@ -9,7 +9,8 @@ from running import kept_steps
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import evaluator
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, evaluate_records
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from patience import crowded
 
-from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates

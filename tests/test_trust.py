@@ -5,7 +5,7 @@ import pytest
 from margins import at_least, at_most, bootstrap, fewest, ratio_of_medians
 
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics.evaluator import evaluate_records
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.api import as_points
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube

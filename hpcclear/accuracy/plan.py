@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
+from hpcclear.base.arrays import Records
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
-from hpcclear.dynamics.target import resolve
+from hpcclear.dynamics.steady import telling
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import COLUMNS, Ranks
@@ -26,6 +27,9 @@ TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 
 PROBE = 2 * DEFAULT_LANES
 """Samples of the first look at what one costs."""
+
+STEADY_PROBE = 8
+"""Likewise where each is a steady mean: its copies fill the lanes."""
 
 FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
 """How long the settings of the file, and each rung of the ladder, are measured on every rank."""
@@ -49,18 +53,20 @@ class Row:
         With the settings.
     seconds : float
         Core-seconds of one sample.
-    reason : str
-        What the settings were chosen for; empty for those of the file.
+    reached : str
+        Limits that the samples tried came to; empty where the file names no target error.
     """
 
     error: float | None
     scene: Scene
     seconds: float
-    reason: str
+    reached: str
 
     def settings(self) -> str:
-        """Tolerance and revolutions in words."""
+        """Tolerance and revolutions in words; of a steady mean what was reached."""
         n = self.scene.numerics
+        if self.reached:
+            return self.reached
         return f"rtol {n.rtol:.1e}, {n.transient_revolutions}+{n.averaged_revolutions} rev"
 
 
@@ -137,14 +143,12 @@ def measure(
     points = design(few, None)
     assert study is not None  # refused by `design`
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
-    chosen = [(error, *resolve(one, points)) for error, one in wanted]
     rows = []
     with _company(scene, points, workers if ranks.size == 1 else 1):
-        for k, (error, one, reason) in enumerate(chosen):
-            seconds = cost(
-                one, points, ranks, FILE_SECONDS if error is None else RUNG_SECONDS, str(k)
-            )
-            rows.append(Row(error, one, seconds, reason))
+        for k, (error, one) in enumerate(wanted):
+            limit = FILE_SECONDS if error is None else RUNG_SECONDS
+            seconds, records = cost(one, points, ranks, limit, str(k))
+            rows.append(Row(error, one, seconds, telling.in_short(one, records)))
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     startup = process_age_at_start()
     whole = sum(extent.samples_of(scene).values()) if study.cases else None
@@ -152,15 +156,23 @@ def measure(
     return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
 
 
-def cost(scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str) -> float:
-    """Core-seconds of one sample in a long batch, measured for about `seconds` on every rank."""
+def cost(
+    scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str
+) -> tuple[float, Records]:
+    """Core-seconds of one sample in a long batch, measured for about `seconds` on every rank; and the samples."""
 
-    def busy(count: int, stage: str) -> float:
-        sample_points(scene, points.take(np.arange(count) % len(points)), ranks, stage=stage)
-        return float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum()) / count
+    def busy(count: int, stage: str) -> tuple[float, Records]:
+        spread = np.linspace(0, len(points), count, endpoint=False).astype(int)
+        rows = spread if count <= len(points) else np.arange(count) % len(points)
+        records = sample_points(scene, points.take(rows), ranks, stage=stage)
+        spent = float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum())
+        return spent / count, records
 
-    once = busy(PROBE * ranks.size, f"plan {label}: probe")
-    block = DEFAULT_LANES * ranks.size
+    steady = scene.numerics.target_error is not None
+    block = (STEADY_PROBE if steady else DEFAULT_LANES) * ranks.size
+    once, found = busy((STEADY_PROBE if steady else PROBE) * ranks.size, f"plan {label}: probe")
+    if steady and once * block > seconds * ranks.size:
+        return once, found
     count = block * int(np.clip(seconds * ranks.size / (once * block), 2, 2000))
     return busy(count, f"plan {label}")
 

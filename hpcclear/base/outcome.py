@@ -68,13 +68,46 @@ class Flag(IntEnum):
     LATCHED = 1  # a joint stayed in contact for whole revolutions with a frozen impact speed
     BEYOND_HERTZ = 2  # penetration beyond the range of Hertz theory
     STIFF = 4  # the implicit method was used for part of the run
+    TARGET_MISSED = 8  # the steady mean is not known to the target error, or there is none
+
+
+class Regime(IntEnum):
+    """What kind of motion a steady mean was looked for in."""
+
+    UNJUDGED = 0
+    REGULAR = 1
+    SETTLING = 2
+    UNSTEADY = 3
+    CHAOTIC = 4
+    SEVERAL = 5
+
+    @property
+    def meaning(self) -> str:
+        """What it says about the motion, in a few words."""
+        return _REGIMES[self]
+
+
+_REGIMES = {
+    Regime.UNJUDGED: "not judged",
+    Regime.REGULAR: "regular: it repeats itself",
+    Regime.SETTLING: "still settling: the average moves on",
+    Regime.UNSTEADY: "unsteady: it drifts, there is no steady mean",
+    Regime.CHAOTIC: "chaotic: the smallest kick becomes as large as the motion",
+    Regime.SEVERAL: "several orbits: which one it settles on depends on the smallest kick",
+}
 
 
 RESPONSES = ("mean_contact_force", "peak_crank_moment", "slider_acceleration_deviation")
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
-ON_REQUEST = (*RESPONSES, "energy_error")
-"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
+STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
+"""Fields of `OUTCOME` that a target error fills in; `regime` goes with them."""
+
+MAPPED = ("kick_growth_limit", "attractors")
+"""Fields that a map fills in besides."""
+
+ON_REQUEST = (*RESPONSES, "energy_error", *STEADY, *MAPPED, "regime")
+"""Fields of `OUTCOME` that are NaN (a regime: 0), and left out of datasets, unless a scene asks for them."""
 
 OUTCOME = np.dtype(
     [
@@ -91,6 +124,14 @@ OUTCOME = np.dtype(
         ("peak_crank_moment", np.float64),  # N m, likewise
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
+        ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
+        ("kick_growth", np.float64),  # mean logarithm of the growth of a kick per revolution
+        ("kick_growth_limit", np.float64),  # of its limits; NaN outside maps
+        ("attractors", np.float64),  # kinds of motion found from several starts; NaN outside maps
+        ("period", np.float64),  # revolutions; NaN where none was found
+        ("steady_rtol", np.float64),  # the tightest tolerance used
+        ("steady_revolutions", np.float64),  # of all copies, spin-up included
+        ("regime", np.int8),
         ("latched", np.int8, 2),
         ("rhs_evaluations", np.int64),
         ("status", np.int8),

@@ -1,11 +1,13 @@
 """The commands. Each parses its words, calls one function of the package, and prints what a person wants to know.
 
-Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goes on from there).
+Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goes on from there), 4 done, but f is not
+known to the target error.
 """
 
 import contextlib
 import functools
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -199,23 +201,29 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
 def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
-    Exit code 1 if the simulation did not reach its end; what there is of it is written.
+    Exit code 1 if the simulation did not reach its end, 4 if f is not known to numerics.target_error; what there is
+    of it is written.
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
     if not _is_root():
         return Exit.DONE
-    from hpcclear.base.outcome import Status
+    from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
+    from hpcclear.dynamics.steady.telling import why_missed
     from hpcclear.results import dataset, files
 
     scene = _scene(file, overrides)
     files.probe(_place(output))
+    began = time.perf_counter()
     response = simulate_scene(scene)
     dataset.write(response, output)
-    describe_response(response, output)
+    describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))
+    if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
+        click.echo(f"Target missed: {why_missed(response, scene.numerics.target_error)}", err=True)
+        return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
     click.echo(f"Error: {status.name.lower()}: {status.message}. {status.remedy}", err=True)
@@ -281,6 +289,36 @@ def sample(
             describe_samples(run_sample(scene, place, ranks, table=points, options=options))
 
     _check_kind(points, statistics, raw)
+    return _on_ranks(program, how.time_limit)
+
+
+@cli.command("map", short_help="Show where the motion does what.")
+@_FILE
+@_SET
+@_output("NetCDF file to write.")
+@click.option(
+    "--x", "x", required=True, metavar="PATH=LO:HI:N", help="First entry, its limits, its cells."
+)
+@click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second entry.")
+@_with_how
+def map_command(
+    file: Path, overrides: tuple[str, ...], output: Path, x: str, y: str | None, how: _How
+) -> int:
+    """Judge the motion over a line or a grid of one or two entries of the scene: growth of a kick (largest Lyapunov
+    exponent, per revolution), period, kinds of motion from several starts, f and its limit.
+
+    Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --x C=0.1mm:1mm:40 -o results/map.nc
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_map
+        from hpcclear.ensemble.maps import run_map
+        from hpcclear.ensemble.session import Options
+
+        axes = (x,) if y is None else (x, y)
+        options = Options(how.fresh, how.interval, how.progress)
+        describe_map(run_map(_scene(file, overrides), axes, _place(output), ranks, options))
+
     return _on_ranks(program, how.time_limit)
 
 

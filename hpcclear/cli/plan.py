@@ -57,8 +57,8 @@ def _needs(
         ),
         ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
     ]
-    if row.reason:
-        rows.append(("settings", row.reason))
+    if row.reached:
+        rows.append(("reached", row.reached))
     if command == "run":
         text = (
             f"and {plan.responses} single responses; refused surrogates and misses take more; "

@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.report.answer import answer
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
@@ -140,7 +141,8 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
 
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES, evaluate_records
+    from hpcclear.dynamics.evaluation import evaluate_records
+    from hpcclear.dynamics.evaluator import DEFAULT_LANES
     from hpcclear.scene.points import Points
 
     path = "mechanism.slider.mass"
@@ -152,7 +154,8 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     evaluate_records(scene, columns)
     each = (time.perf_counter() - start) / DEFAULT_LANES
     evaluations = int(record["rhs_evaluations"])
-    rows = [
+    rows = [("f, steady mean", in_a_line(record))] if record["regime"] else []
+    rows += [
         ("force evaluations", f"{evaluations}"),
         ("time a sample", f"{each * 1e3:.3g} ms on one core, {DEFAULT_LANES} side by side"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (kept for the next run)"),
@@ -162,14 +165,16 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
-def describe_response(response: xr.Dataset, output: Path) -> None:
-    """Print the outcome of one response and where it went."""
+def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
+    """Print the outcome of one response, what it took and where it went."""
     out = console()
     status = Status(int(response["status"]))
     rows = [("status", f"{status.name.lower()}: {status.message}")]
     if status is not Status.OK:
         rows.append(("remedy", status.remedy))
     f, spread = float(response["objective"]), float(response["objective_spread"])
+    if "regime" in response and status.valid:
+        rows.append(("f, steady mean", in_a_line(response, seconds)))
     words, unit = objective_of(response)
     rows.append(("objective f", f"{quantity(f, unit, 6)}: {words}"))
     if np.isfinite(spread):
@@ -198,6 +203,7 @@ REMARKS = {
     Flag.LATCHED: "a joint never left contact: its damping kept an old impact speed, f may depend on the tolerance",
     Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
     Flag.STIFF: "the implicit method was used for part of the run",
+    Flag.TARGET_MISSED: "f is not known to numerics.target_error",
 }
 
 
@@ -264,6 +270,8 @@ def describe_samples(found: "Finished") -> None:
                 f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f",
             )
         )
+    if "target_error_reached" in samples.attrs:
+        rows.append(("target error", str(samples.attrs["target_error_reached"])))
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
     rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
     busy = found.spent[:, 0]
@@ -279,3 +287,23 @@ def describe_samples(found: "Finished") -> None:
     out.print(table("Samples", rows + _load(found)))
     for what, path in (("samples", found.output), ("timing", found.timing)):
         out.print(f"{what:8} {path}")
+
+
+def describe_map(found: "Finished") -> None:
+    """Print how many cells are of which kind, and the load."""
+    out, content = console(), found.content
+    good = (content["status"] == Status.OK).to_numpy()
+    rows = [("cells", f"{int(good.sum())} of {len(good)} without failure")]
+    for regime in Regime:
+        count = int(((content["regime"] == regime).to_numpy() & good).sum())
+        if count and regime is not Regime.UNJUDGED:
+            rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
+    periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
+    told = [f"{n} of {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    rows.append(("periods", ", ".join(told) or "none found"))
+    growth = content["kick_growth"].to_numpy()[good]
+    if len(growth):
+        text = f"{growth.min():.3g} to {growth.max():.3g} a revolution"
+        rows.append(("largest Lyapunov exponent", text))
+    out.print(table("Map", rows + _load(found)))
+    out.print(f"map      {found.output}")

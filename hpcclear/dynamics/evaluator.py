@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.outcome import OUTCOME, RESPONSES, Flag, Status
+from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
@@ -191,6 +191,8 @@ def outcome_records(
     records["energy_error"] = np.nan
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][~valid] = np.nan
+    for name in (*STEADY, *MAPPED):
+        records[name] = np.nan
     for name in RESPONSES:
         records[name][~(valid & responses)] = np.nan
     latched = outcome.latched == 1.0
@@ -208,14 +210,3 @@ def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
     ratio = p.journal_radius / p.bearing_radius
     beyond: Booleans = outcome.deepest > HERTZ_RANGE * ratio * p.clearance
     return beyond[:, 0] | beyond[:, 1]
-
-
-def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> Records:
-    """Simulate all points here and now; records in the points' order (n,)."""
-    evaluator = Evaluator(scene, points, lanes)
-    evaluator.submit(np.arange(len(points)), points.values)
-    done = []
-    while evaluator.pending:
-        done.append(evaluator.advance(0.2))
-    records = np.concatenate(done) if done else np.zeros(0, OUTCOME)
-    return records[np.argsort(records["sample"], kind="stable")]

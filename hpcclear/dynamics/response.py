@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.objectives import Objective, asked
+from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.layout import TURN
@@ -25,11 +27,12 @@ from hpcclear.dynamics.problem import (
     problem_of,
 )
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.dynamics.stepping import record as rec
-from hpcclear.dynamics.target import recorded, resolve
 from hpcclear.dynamics.views import Parameters, Rates, Start
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
 
 _CHUNK = 8192  # accepted steps kept before they are handed over
 
@@ -172,32 +175,63 @@ def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
     InputError
         If the scene asks for what the kernel cannot do.
     """
-    named = scene
-    scene, reason = resolve(scene)
+    steady = _steady(scene)
+    if steady is not None:
+        named, scene = scene, _shown(scene, steady)
+    else:
+        named = scene
     simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
     objective = named.objective if objective is None else objective
     times, data, record = simulated(scene)
-    record = asked(record, objective)
+    record = asked(record if steady is None else steady, objective)
+    names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(scene.effects.slider_load, data["crank_angle"])
-    names = (
-        "objective",
-        "objective_spread",
-        "objective_uncertainty",
-        "mean_gap",
-        "peak_contact_force",
-    )
-    outcome = {
-        name: record[name][0] for name in (*names, "latched", "rhs_evaluations", "status", "flags")
-    }
     return dataset.response_dataset(
         times,
-        {**data, **outcome},
+        {**data, **{name: record[name][0] for name in names}},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
-        | recorded(reason)
+        | recorded(named, record)
         | {"integrator": integrator_of(scene, single=True)},
         objective,
     )
+
+
+_TOLD = (
+    "objective",
+    "objective_spread",
+    "objective_uncertainty",
+    "mean_gap",
+    "peak_contact_force",
+    "latched",
+    "rhs_evaluations",
+    "status",
+    "flags",
+)
+"""What a response says about itself as a sample does."""
+
+SPUN_UP, SHOWN = 20, 10
+"""Revolutions before those that a response with a target error is averaged over, and of these, at most."""
+
+
+def _steady(scene: Scene) -> Records | None:
+    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
+    if scene.numerics.target_error is None or not scene.clearance_joints():
+        return None
+    return evaluate_records(scene, Points((), np.empty((1, 0)), ()))
+
+
+def _shown(scene: Scene, steady: Records) -> Scene:
+    """The scene of the one response that is written beside a steady mean: at its tolerance, spun up."""
+    rtol = float(steady["steady_rtol"][0])
+    changes = {
+        "numerics.target_error": None,
+        "numerics.rtol": rtol if np.isfinite(rtol) else scene.numerics.rtol,
+        "numerics.atol": None,
+        "numerics.transient_revolutions": SPUN_UP,
+        "numerics.averaged_revolutions": SHOWN,
+    }
+    return scene.with_(changes)
 
 
 def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:

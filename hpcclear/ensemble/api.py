@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
-from hpcclear.dynamics.evaluator import evaluate_records
-from hpcclear.dynamics.target import recorded, resolve
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
@@ -35,14 +35,20 @@ def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
         str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
     }
     values = np.column_stack(np.broadcast_arrays(*columns.values()))
-    paths = tuple(_paths(scene, name) for name in columns)
+    paths = tuple(paths_of(scene, name) for name in columns)
     made = Points(tuple(columns), values, paths)
     check_points(scene, made)
     return made
 
 
-def _paths(scene: Scene, name: str) -> tuple[str, ...]:
-    """Scene entries that a name drives: the study's, a short name's, or a path itself."""
+def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
+    """Scene entries that a name drives: the study's, a short name's, or a path itself.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
     if scene.study is not None and name in scene.study.names:
         return scene.study.variable(name).paths
     if name in SHORT_NAMES:
@@ -73,15 +79,14 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
         If a name is unknown, a design makes no mechanism, or the scene asks for what the kernel cannot do.
     """
     designs = as_points(scene, points)
-    chosen, reason = resolve(scene, designs)
-    records = asked(evaluate_records(chosen, designs), scene.objective)
+    records = asked(evaluate_records(scene, designs), scene.objective)
     return dataset.samples_dataset(
         designs.names,
         designs.values,
         dict(zip(designs.names, designs.units, strict=True)),
         records,
         dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
-        | recorded(reason),
+        | recorded(scene, records),
         scene.objective,
         designs.words,
     )

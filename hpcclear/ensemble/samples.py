@@ -6,6 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points
@@ -80,17 +81,18 @@ def run_sample(
 def _simulate(scene: Scene, points: Points, session: Session) -> xr.Dataset:
     """Simulate what is not finished yet, and write the dataset."""
     units = dict(zip(points.names, points.units, strict=True))
-    chosen = session.described(scene, points)
+    session.describe(scene)
     checkpoint = session.opened(points.names, units)
     progress = Progress("samples", session.options.style)
-    records = sample_points(chosen, points, session.ranks, checkpoint, progress)
+    records = sample_points(scene, points, session.ranks, checkpoint, progress)
+    attributes = session.attributes | recorded(scene, records)
     return session.write(
         dataset.samples_dataset(
             points.names,
             points.values,
             units,
             records,
-            session.attributes,
+            attributes,
             scene.objective,
             points.words,
         )

@@ -17,7 +17,6 @@ from typing import Self
 import numpy as np
 import xarray as xr
 
-from hpcclear.dynamics.target import recorded, resolve
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.results import dataset, files
@@ -25,7 +24,6 @@ from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,7 @@ class Session:
     Attributes
     ----------
     attributes : dict of str to str
-        Of every file of results: what made them, and the key; empty before `described`.
+        Of every file of results: what made them, and the key; empty before `describe`.
     """
 
     def __init__(
@@ -202,18 +200,12 @@ class Session:
             check_key(dataset.read(path), self.key, path)
         return len(there) == len(names)
 
-    def described(self, scene: Scene, points: Points | None = None) -> Scene:
-        """The scene with the settings that its target error asks for at `points`; sets `attributes`."""
-        chosen, reason = scene, ""
-        if points is not None and scene.numerics.target_error is not None:
-            with self.ranks.stage("settings"):
-                chosen, reason = resolve(scene, points)
+    def describe(self, scene: Scene) -> None:
+        """Set `attributes`: what made the files of this run."""
         self.attributes = {
             **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
-            **recorded(reason),
             **key_attribute(self.key),
         }
-        return chosen
 
     def opened(
         self, names: Sequence[str] = (), units: Mapping[str, str] | None = None

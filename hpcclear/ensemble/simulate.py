@@ -6,7 +6,7 @@ that fails on one rank ends them all.
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -17,9 +17,14 @@ from hpcclear.ranks.team import Ranks, Task
 
 if TYPE_CHECKING:
     from hpcclear.dynamics.evaluator import Evaluator
+    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+    from hpcclear.ranks.schedule import Worker
     from hpcclear.results.checkpoint import Checkpoint
     from hpcclear.scene import Scene
     from hpcclear.scene.points import Points
+
+
+Compiled = TypeVar("Compiled", bound="Worker")
 
 
 def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
@@ -44,7 +49,7 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
 class Judge:
     """A rank's worker: an evaluator whose records hold the objective that was asked for; see `ranks.schedule.Worker`."""
 
-    def __init__(self, evaluator: "Evaluator", objective: Objective) -> None:
+    def __init__(self, evaluator: "Evaluator | SteadyEvaluator", objective: Objective) -> None:
         self._evaluator, self._objective = evaluator, objective
         self.lanes = evaluator.lanes
         self.submit = evaluator.submit
@@ -60,16 +65,21 @@ class Judge:
 
 
 def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
-    """A rank's worker; the kernel is compiled by one rank of each node and loaded by the others."""
-    from hpcclear.dynamics.evaluator import Evaluator
+    """A rank's worker."""
+    from hpcclear.dynamics.evaluation import evaluator_of
     from hpcclear.scene import load_scene
     from hpcclear.scene.points import Points
 
     nothing = np.empty((0, len(payload["names"])))
     columns = Points(payload["names"], nothing, payload["paths"])
-    evaluator = Evaluator(load_scene(payload["scene"]), columns, payload["lanes"])
-    ranks.first_on_node(lambda: evaluator.advance(0.0))  # without samples it only compiles
-    return Judge(evaluator, OBJECTIVES[payload["objective"]])
+    evaluator = evaluator_of(load_scene(payload["scene"]), columns, payload["lanes"])
+    return Judge(first_compiled(evaluator, ranks), OBJECTIVES[payload["objective"]])
+
+
+def first_compiled(worker: Compiled, ranks: Ranks) -> Compiled:
+    """The worker, compiled by one rank of each node and loaded by the others."""
+    ranks.first_on_node(lambda: worker.advance(0.0))  # without samples it only compiles
+    return worker
 
 
 @contextmanager
@@ -100,6 +110,7 @@ def sample_points(
     *,
     stage: str = "samples",
     first: int = 0,
+    maker: "Callable[[Mapping[str, Any], Ranks], Worker]" = make_evaluator,
 ) -> np.ndarray:
     """Simulate a design on all ranks; call it on root.
 
@@ -117,6 +128,8 @@ def sample_points(
         Name for reports and timing.
     first : int
         Number of the first point in the checkpoint, for designs that come one after the other.
+    maker : function of a payload and the ranks, optional
+        Makes a rank's worker.
 
     Returns
     -------
@@ -130,7 +143,7 @@ def sample_points(
     StorageError
         The disk refuses.
     """
-    task = Task(stage, make_evaluator, payload_of(scene, points))
+    task = Task(stage, maker, payload_of(scene, points))
     if checkpoint is None:
         return ranks.run_points(task, points.values, progress=progress)
     completed = checkpoint.completed()

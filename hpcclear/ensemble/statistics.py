@@ -116,9 +116,9 @@ class _Streaming:
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
     ) -> None:
         few = points.page(0)
-        chosen = session.described(scene, few)
-        self._payload = payload_of(chosen, few)
-        self._design = chosen.resolved()
+        session.describe(scene)
+        self._payload = payload_of(scene, few)
+        self._design = scene.resolved()
         self._objective = scene.objective
         self._points = points
         self._session = session

@@ -24,6 +24,7 @@ class Exit(IntEnum):
     FAILED = 1
     BAD_INPUT = 2
     STOPPED = 3
+    TARGET_MISSED = 4
 
 
 class Stopped(Exception):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.outcome import ON_REQUEST, Flag, Status
+from hpcclear.base.outcome import ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
 from hpcclear.results.columns import Column, Columns
 
@@ -48,6 +48,10 @@ FURTHER: dict[str, dict[str, object]] = {
     "flags": {
         "flag_masks": np.array([int(flag) for flag in Flag], np.int8),
         "flag_meanings": " ".join(flag.name.lower() for flag in Flag),
+    },
+    "regime": {
+        "flag_values": np.array([int(regime) for regime in Regime], np.int8),
+        "flag_meanings": " ".join(regime.name.lower() for regime in Regime),
     },
     "latched": {"flag_values": _NO_YES, "flag_meanings": "free latched"},
     "converged": {"flag_values": _NO_YES, "flag_meanings": "not_determined determined"},

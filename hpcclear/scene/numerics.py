@@ -28,6 +28,9 @@ class Numerics(Table):
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
     """Relative error of the objective to aim at; chooses tolerance and revolutions in place of the
     entries here."""
+    target_revolutions: Annotated[int, Count(100, 10**12)] = 20_000
+    """With target_error: most revolutions of a design, those of all its copies together; beyond it the target counts
+    as missed."""
     transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
     """Revolutions before the average starts."""
     averaged_revolutions: Annotated[int | Literal["auto"], Count(1, 10**9, word="auto")] = 5

@@ -98,7 +98,7 @@ def run_study(
 def _carry_out(scene: Scene, session: Session) -> None:
     """Go on from what is there, to the end."""
     study, style = scene.required_study, session.options.style
-    session.described(scene)
+    session.describe(scene)
     units = {variable.name: variable.unit for variable in study.variables}
     checkpoint = session.opened(study.names, units)
     columns = tuple(variable.paths for variable in study.variables)

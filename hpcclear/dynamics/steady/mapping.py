@@ -1,0 +1,147 @@
+"""One cell of a map: what the motion does there, how fast a kick grows, how many kinds of motion several starts end in."""
+
+from collections.abc import Generator
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Regime
+from hpcclear.dynamics.revolutions import objective
+from hpcclear.dynamics.steady import judging
+from hpcclear.dynamics.steady.copies import kicked
+from hpcclear.dynamics.steady.procedure import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.views import Outcome, Start
+
+RTOL = 1e-8
+"""Tolerance of a map. The exponent of the paper's scene is -0.32 at 1e-11; this finds -0.31."""
+
+DISTANCE = 1e-4
+"""Of a shadow from its copy, over scale. Less, and the steps of the two, which are not the same, part them by more than the
+motion does (at 1e-6 it finds 2.2 where -0.32 is right); more, and it is not small beside a penetration."""
+
+OWN, OTHER = 4, 4
+"""Copies of the scene's own start, each with a shadow; and other starts."""
+
+FAR = 0.05
+"""Kicks of the other starts over scale: a twentieth of a millimetre, of a metre a second."""
+
+SPIN_UP = 20
+LOOKS = (20, 40, 80)
+"""Revolutions after the spin-up at which the exponent is judged; the last one ends it."""
+
+SURE = 0.05
+"""Limit of an exponent that is narrow enough, over the exponent or a revolution, whichever is more."""
+
+SAME = 1e-4
+"""Relative difference of f between two starts that end in the same motion."""
+
+REPEATS = 1e-5
+"""Relative difference of f between two revolutions of a periodic motion that are a period apart."""
+
+
+def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
+    """Judge the motion of one cell.
+
+    Largest Lyapunov exponent per revolution: the mean logarithm by which the distance of a shadow grows over a revolution,
+    after which it is set back along the same direction (Benettin et al. 1980, doi:10.1007/BF02128236).
+
+    Parameters
+    ----------
+    sample : Sample
+
+    Returns
+    -------
+    Mean
+        Its growth is the exponent.
+    """
+    effort = Effort(sample, budget=0)
+    start = _starts(sample)
+    shadow: Start | None = None
+    logs: list[Array] = []
+    outcomes: list[Outcome] = []
+    for revolution in range(1, SPIN_UP + LOOKS[-1] + 1):
+        copies = OWN + OTHER
+        rows = start.rows if shadow is None else np.concatenate([start.rows, shadow.rows])
+        outcome = yield from effort.run(RTOL, 1, Start(rows), np.ones(len(rows)))
+        if effort.failed is not None:
+            return effort.failure(outcome, RTOL)
+        end = outcome.end()
+        start = end[:copies]
+        if shadow is not None:
+            outcomes.append(outcome[:copies])
+            grown, shadow = _set_back(start[:OWN], end[copies:], sample.scale)
+            logs.append(grown)
+        elif revolution == SPIN_UP:
+            shadow = _shadows(start[:OWN], sample.scale)
+        if len(logs) in LOOKS:
+            growth, limit = _exponent(np.array(logs))
+            if limit <= SURE * max(abs(growth), 1.0) or len(logs) == LOOKS[-1]:
+                break
+    return _judged(effort, outcomes, growth, limit)
+
+
+def _starts(sample: Sample) -> Start:
+    own = kicked(sample.start, sample.scale, range(OWN))
+    other = kicked(sample.start, sample.scale, range(OWN, OWN + OTHER), FAR)
+    return Start(np.concatenate([own.rows, other.rows]))
+
+
+def _shadows(start: Start, scale: Array) -> Start:
+    """A copy beside each start, `DISTANCE` away."""
+    beside = [
+        kicked(start[k : k + 1], scale, range(k + 1, k + 2), DISTANCE) for k in range(len(start))
+    ]
+    return Start(np.concatenate([one.rows for one in beside]))
+
+
+def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
+    """Logarithms of the growth of the distances (copies,), and shadows set back to where distances are as at first.
+
+    A contact that only one of the two is in has no distance: the shadow takes the other's.
+    """
+    n = len(scale) // 2
+    apart = (shadow.state(n) - start.state(n)) / scale
+    distance = np.sqrt(np.mean(apart**2, axis=1))
+    factor = DISTANCE / np.maximum(distance, 1e-300)
+    back = Start(start.rows.copy())
+    moved = apart * factor[:, None] * scale
+    back.coordinates(n)[:] += moved[:, :n]
+    back.velocities(n)[:] += moved[:, n:]
+    alike = (shadow.active == start.active).all(axis=1)
+    inverse = (shadow.inverse_impact - start.inverse_impact) * (factor * alike)[:, None]
+    back.inverse_impact = start.inverse_impact + inverse
+    return np.log(np.maximum(distance, 1e-300) / DISTANCE), back
+
+
+def _exponent(logs: Array) -> tuple[float, float]:
+    """Mean and half-width of its limits, of logarithms (revolutions, copies): copies times four stretches of revolutions."""
+    pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
+    mean, _, limit = judging.student(pieces)
+    return mean, limit
+
+
+def _judged(effort: Effort, outcomes: list[Outcome], growth: float, growth_limit: float) -> Mean:
+    gaps = np.stack([outcome.mean_gap for outcome in outcomes])  # (revolutions, copies, 2)
+    f = objective(gaps)
+    own = gaps[:, :OWN]
+    mean = float(objective(own.mean(axis=(0, 1))))
+    period = judging.period_of(f[:, :OWN], REPEATS * mean)
+    means = objective(gaps.mean(axis=0))
+    scatter = f.std(axis=0, ddof=1) / np.sqrt(len(f))
+    limit = judging.student(means[:OWN])[2]
+    several = bool(np.ptp(means[:OWN]) > 2.0 * SAME * mean + 6.0 * scatter[:OWN].max())
+    chaotic = growth > growth_limit and period is None
+    regime = Regime.CHAOTIC if chaotic else Regime.SEVERAL if several else Regime.REGULAR
+    kept = Outcome(np.stack([outcome.rows[:OWN] for outcome in outcomes]))
+    return effort.mean(
+        regime=regime, limit=limit, outcomes=kept, stretch=1, rtol=RTOL, met=True, period=period, growth=growth,
+        growth_limit=growth_limit, attractors=_kinds(means, scatter, mean),
+    )  # fmt: skip
+
+
+def _kinds(means: Array, scatter: Array, f: float) -> int:
+    """How many kinds of motion the starts ended in: those whose averages differ by more than they scatter."""
+    order = np.argsort(means)
+    steps = np.diff(means[order])
+    doubt = 4.0 * (scatter[order][1:] + scatter[order][:-1]) + SAME * f
+    return 1 + int(np.count_nonzero(steps > doubt))

@@ -1,0 +1,181 @@
+"""The `map` command: one or two entries of a scene over a grid, and at each point what the motion does."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.ensemble.api import paths_of
+from hpcclear.ensemble.identity import sample_key
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.simulate import first_compiled, sample_points
+from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.paths import quantities
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.units import UnitError, to_si
+
+if TYPE_CHECKING:
+    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+
+SHAPE = "map_shape"
+"""Attribute of a map: cells along its entries, in the order of the design variables."""
+
+
+def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
+    """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; limits in SI or with a unit.
+
+    Raises
+    ------
+    InputError
+        If the words do not say that.
+    """
+    name, _, rest = words.partition("=")
+    parts = rest.split(":")
+    wrong = InputError(
+        "map", words, "is not PATH=LO:HI:N", 'For example C=0.1mm:1mm:40, or drive.speed="500 rpm:6000 rpm:60"'
+    )  # fmt: skip
+    if len(parts) != 3 or not name:
+        raise wrong
+    paths = paths_of(scene, name)
+    unit = quantities()[paths[0]].unit
+    try:
+        low, high = (_number(part, unit) for part in parts[:2])
+        count = int(parts[2])
+    except ValueError:
+        raise wrong from None
+    except UnitError as error:
+        raise InputError("map", words, str(error), f"Give limits in {unit or '1'}") from None
+    if count < 1 or not np.isfinite([low, high]).all():
+        raise wrong
+    return name, paths, np.linspace(low, high, count)
+
+
+def _number(words: str, unit: str) -> float:
+    """A limit: a plain number in SI, or one with a unit."""
+    try:
+        return float(words)
+    except ValueError:
+        return to_si(words.strip().strip('"'), unit)
+
+
+def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]:
+    """All cells of a grid, the first entry's values changing slowest, and how many there are along each.
+
+    Raises
+    ------
+    InputError
+        If an axis is not one, two are the same, or a cell makes no mechanism.
+    """
+    parsed = [axis(scene, words) for words in axes]
+    names = tuple(name for name, _, _ in parsed)
+    if len({entry for _, paths, _ in parsed for entry in paths}) < sum(
+        len(p) for _, p, _ in parsed
+    ):
+        raise InputError("map", " ".join(axes), "two axes drive the same entry", "Drop one")
+    grid = np.meshgrid(*(values for _, _, values in parsed), indexing="ij")
+    points = Points(
+        names, np.column_stack([g.ravel() for g in grid]), tuple(p for _, p, _ in parsed)
+    )
+    check_points(scene, points)
+    if not scene.clearance_joints():
+        raise InputError(
+            "joints",
+            None,
+            "without clearance there is nothing to map",
+            'Set a joint\'s kind = "clearance"',
+        )
+    return points, grid[0].shape
+
+
+def make_mapper(payload: Mapping[str, Any], ranks: Ranks) -> "SteadyEvaluator":
+    """A rank's worker."""
+    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+    from hpcclear.dynamics.steady.mapping import mapped
+
+    nothing = np.empty((0, len(payload["names"])))
+    columns = Points(payload["names"], nothing, payload["paths"])
+    worker = SteadyEvaluator(load_scene(payload["scene"]), columns, payload["lanes"], mapped)
+    return first_compiled(worker, ranks)
+
+
+def run_map(
+    scene: Scene,
+    axes: tuple[str, ...],
+    output: Path,
+    ranks: Ranks,
+    options: Options = DEFAULT_OPTIONS,
+) -> Finished:
+    """Judge every cell of a grid on all ranks and write it; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+    axes : tuple of str
+        ``PATH=LO:HI:N``, one or two.
+    output : Path
+        NetCDF file of kind ``samples``, a sample a cell; `grid` gives it back as a grid.
+    ranks : Ranks
+    options : Options
+
+    Raises
+    ------
+    InputError, StorageError, Stopped, RankFailed
+    """
+    began = time.perf_counter()
+    place = Place.of_file(output, options.fresh)
+    points, shape = cells(scene, axes)
+    key = {**sample_key(scene, points), "command": "map"}
+    with Session(place, key, ranks, options) as session:
+        content = session.found("samples")
+        if content is None:
+            session.describe(scene)
+            units = dict(zip(points.names, points.units, strict=True))
+            checkpoint = session.opened(points.names, units)
+            progress = Progress("cells", options.style)
+            records = sample_points(
+                scene, points, ranks, checkpoint, progress, stage="map", maker=make_mapper
+            )
+            attributes = {**session.attributes, SHAPE: " ".join(str(n) for n in shape)}
+            content = session.write(
+                dataset.samples_dataset(
+                    points.names, points.values, units, records, attributes, words=points.words
+                )
+            )
+        session.close()
+    return session.finished(content, began)
+
+
+def grid(content: xr.Dataset) -> xr.Dataset:
+    """A map's cells with its entries as coordinates, in place of sample numbers.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no map.
+    """
+    if SHAPE not in content.attrs:
+        raise InputError(
+            "map", content.attrs.get("hpcclear_kind"), "is no map", "Make one with hpcclear map"
+        )
+    shape = tuple(int(n) for n in str(content.attrs[SHAPE]).split())
+    names = [
+        str(v.name) for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"
+    ]
+    coords: dict[str, Any] = {}
+    for k, name in enumerate(names):
+        values = np.moveaxis(content[name].to_numpy().reshape(shape), k, 0).reshape(shape[k], -1)
+        coords[name] = (name, values[:, 0], content[name].attrs)
+    coords["joint"] = content["joint"]
+    data = {}
+    for key, variable in content.drop_vars(names).data_vars.items():
+        rest = variable.dims[1:]
+        folded = variable.to_numpy().reshape(*shape, *variable.shape[1:])
+        data[key] = ((*names, *rest), folded, variable.attrs)
+    return xr.Dataset(data, coords, content.attrs)

@@ -1,0 +1,86 @@
+"""What revolutions of copies say: periods, limits, spin-up, drift. On series that are known."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from hpcclear.dynamics.steady import judging
+
+RNG_SEEDS = range(400)
+
+
+def two_joints(f: np.ndarray) -> np.ndarray:
+    """Mean gaps (..., 2) whose objective is f."""
+    return np.stack([0.6 * f, 0.8 * f], axis=-1)
+
+
+@pytest.mark.parametrize("period", [1, 2, 4, 8])
+def test_a_period_is_the_least_one(period: int):
+    k = np.arange(40)
+    f = 1.0 + 0.1 * np.cos(2 * np.pi * k / period)[:, None] + 0.5 * np.exp(-2.0 * k)[:, None]
+    assert judging.period_of(f, 1e-6) == period
+
+
+def test_what_does_not_repeat_has_no_period():
+    f = 1.0 + 0.1 * np.random.default_rng(0).standard_normal((40, 2))
+    assert judging.period_of(f, 1e-3) is None
+    k = np.arange(40)[:, None]
+    assert judging.period_of(1.0 + 0.1 * np.cos(k), 1e-3) is None
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.6, 0.8])
+@pytest.mark.parametrize("revolutions", [8, 16, 32])
+def test_an_approach_is_foreseen(ratio: float, revolutions: int):
+    f = 1.0 + 0.3 * ratio ** np.arange(revolutions)[:, None]
+    seen = judging.windows(two_joints(f), 1.0)
+    off = np.hypot(*seen.gaps[0]) - 1.0
+    assert 0.0 < off <= 1.01 * seen.settling
+    assert seen.settling <= 10.0 * off  # and is not told far too large
+
+
+def test_copies_that_come_together_are_told_from_those_that_stay_apart():
+    k = np.arange(16)[:, None]
+    joining = 1.0 + np.array([0.0, 0.5]) * 0.5**k
+    apart = 1.0 + np.array([0.0, 0.1]) + 0.0 * k
+    assert judging.windows(two_joints(joining), 1e-3).joining
+    assert not judging.windows(two_joints(apart), 1e-3).joining
+    assert judging.windows(two_joints(apart), 1e-3).apart == pytest.approx(0.1)
+
+
+def test_limits_hold_the_mean_as_often_as_they_say():
+    holds = 0
+    for seed in RNG_SEEDS:
+        mean, _, limit = judging.student(np.random.default_rng(seed).standard_normal(8))
+        holds += abs(mean) <= limit
+    least = stats.binom.ppf(0.001, len(RNG_SEEDS), judging.LEVEL)
+    assert holds >= least
+    assert holds < len(RNG_SEEDS)  # limits that always hold are none
+
+
+def test_a_transient_is_left_out_and_a_steady_series_is_kept():
+    noise = np.random.default_rng(1).standard_normal(40)
+    assert judging.spin_up(noise + 20.0 * np.exp(-np.arange(40) / 3.0)) >= 8
+    assert judging.spin_up(np.concatenate([np.full(10, 5.0), np.zeros(30)])) == 10
+
+
+def test_copies_count_from_where_they_have_parted():
+    between = np.array([1e-12, 1e-6, 0.1, 0.9, 1.1, 1.0, 0.8, 1.0])
+    assert judging.parted(between) == 3
+
+
+def test_a_common_drift_shows_though_copies_differ_for_good():
+    rng = np.random.default_rng(2)
+    places = rng.standard_normal(32)
+    k = np.arange(16)[:, None]
+    moved, settling = judging.approach(
+        10.0 + places - 0.01 * k + 1e-3 * rng.standard_normal((16, 32))
+    )
+    assert moved == pytest.approx(0.04, rel=0.1)
+    assert settling > moved
+    assert judging.approach(10.0 + places + 1e-3 * rng.standard_normal((16, 32))) == (0.0, 0.0)
+
+
+def test_the_projection_has_the_objective_for_its_mean():
+    gaps = np.random.default_rng(3).uniform(0.5, 1.5, (5, 8, 2))
+    mean = gaps.reshape(-1, 2).mean(axis=0)
+    assert judging.projected(gaps).mean() == pytest.approx(np.hypot(*mean), rel=1e-14)
