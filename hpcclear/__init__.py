@@ -5,6 +5,7 @@ Public names are loaded when they are first used, so that importing the package 
 - `load_scene`, `Scene`: a scene file, validated
 - `simulate`: one response as an xarray Dataset
 - `evaluate`: many designs as an xarray Dataset, in this process
+- `grid`: a map, its entries as coordinates
 - `run_study`: the whole study
 """
 
@@ -14,18 +15,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
+    from hpcclear.ensemble.maps import grid
     from hpcclear.scene import Scene, load_scene
     from hpcclear.study import run_study
 
 __version__ = "0.1.0"
 
-__all__ = ["Scene", "evaluate", "load_scene", "run_study", "simulate"]
+__all__ = ["Scene", "evaluate", "grid", "load_scene", "run_study", "simulate"]
 
 _HOME = {
     "Scene": "scene",
     "load_scene": "scene",
     "simulate": "dynamics.response",
     "evaluate": "ensemble.api",
+    "grid": "ensemble.maps",
     "run_study": "study",
 }
 
