@@ -4,6 +4,7 @@ python analysis/plot_map.py results/map.nc -o results/map.png
 """
 
 import argparse
+import json
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -68,10 +69,16 @@ def line(cells: xr.Dataset, name: str) -> plt.Figure:
 
 
 def load_scene_of(cells: xr.Dataset) -> Scene:
-    """The scene that a map was made of."""
-    import tomllib
-
-    return load_scene(tomllib.loads(str(cells.attrs["scene"])))
+    """The scene that a map was made of, with what was set on the command line."""
+    content: dict[str, dict] = {}
+    for path, value in json.loads(cells.attrs["run_key"]).items():
+        *tables, name = path.split(".")
+        if tables and tables[0] != "study":
+            table = content
+            for key in tables:
+                table = table.setdefault(key, {})
+            table[name] = json.loads(value)
+    return load_scene({"format_version": 1, **content})
 
 
 def revolutions(scene: Scene, name: str, values: np.ndarray) -> np.ndarray:

@@ -29,16 +29,16 @@ def test_runs_at_two_tolerances_overlap_within_their_stated_uncertainties(box):
 
 
 def test_the_stated_uncertainty_is_no_excuse(box):
-    """Its median is at most three times the median difference: 2.7 and 2.0 times over 6000 scenes.
+    """Its median is at most five times the median difference: 4.2 and 3.1 times over 6000 scenes.
 
-    The ratio scatters by an eighth over 600 chaotic scenes, so it is its lower limit that must not pass 3. Twice the
-    stated uncertainty does pass: 3.2 to 5.2.
+    Errors of chaotic scenes have long tails: what holds 93 % of them is four of their medians wide. The ratio scatters by an
+    eighth over 600 scenes, so it is its lower limit that must not pass 5. Twice the stated uncertainty does pass.
     """
     one, other = box
     apart = np.abs(one["objective"] - other["objective"])
     for records in box:
         stated = records["objective_uncertainty"]
-        at_most(bootstrap(ratio_of_medians, stated, apart, side="lower"), 3.0)
+        at_most(bootstrap(ratio_of_medians, stated, apart, side="lower"), 5.0)
 
 
 def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box, shift):
@@ -114,3 +114,21 @@ def test_an_impact_just_before_the_end_of_a_revolution_is_met():
             scene.with_({"numerics.method": method}), as_points(scene, {"m1": 0.3}), 1
         )
         assert record["status"] == Status.OK
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize(
+    "contact",
+    [{"law": "lankarani-nikravesh", "restitution": 0.9}, {"law": "hunt-crossley", "damping": 0.5}],
+    ids=lambda contact: contact["law"],
+)
+def test_the_stated_uncertainty_holds_the_true_objective(contact, rtol, shift):
+    """In 93 % or more of 300 designs; 92 % are asked for."""
+    scene = load_scene(SCENE, [f"study.seed={3 + shift}"]).with_({"effects.contact": contact})
+    points = latin_hypercube(scene, 300)
+    truth = evaluate_records(scene.with_({"numerics.rtol": 1e-11}), points)["objective"]
+    asked = scene.with_({"numerics.rtol": rtol, "numerics.uncertainty": True})
+    records = evaluate_records(asked, points)
+    held = np.abs(records["objective"] - truth) <= records["objective_uncertainty"]
+    at_least(np.count_nonzero(held), fewest(len(truth), 0.92))

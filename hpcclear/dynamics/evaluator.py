@@ -56,8 +56,9 @@ KICK = 1e-10
 COPIES = ((1.0, 1), (1.0, -1), (10.0, 0), (100.0, 0))
 """Copies run beside a sample when its uncertainty is asked for: (tolerance divided by, sign of the kick)."""
 
-COVERAGE = 2.1
-"""Stated uncertainty over the scatter of sample and copies; chosen so that two runs overlap, see the manual."""
+COVERAGE = 3.3
+"""Stated uncertainty over the scatter of sample and copies. On 300 designs of the paper's box at rtol 1e-5 to 1e-9 it holds the
+f of rtol 1e-11 in at least 93 %, under Lankarani and Nikravesh's law and under Hunt and Crossley's; 2.1 does in 76 % at worst."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
