@@ -58,7 +58,7 @@ COPIES = ((1.0, 1), (1.0, -1), (10.0, 0), (100.0, 0))
 
 COVERAGE = 3.3
 """Stated uncertainty over the scatter of sample and copies. On 300 designs of the paper's box at rtol 1e-5 to 1e-9 it holds the
-f of rtol 1e-11 in at least 93 %, under Lankarani and Nikravesh's law and under Hunt and Crossley's; 2.1 does in 76 % at worst."""
+f of rtol 1e-11 in at least 93 %, under both its laws; 2.1 holds 76 % at worst."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged.

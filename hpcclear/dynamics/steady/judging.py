@@ -90,7 +90,7 @@ def student(values: Array) -> tuple[float, float, float]:
 
 
 def projected(gaps: Array) -> Array:
-    """Mean gaps (..., 2) as numbers (...) whose mean is the objective of the mean gaps, to first order."""
+    """Mean gaps, shape (..., 2), as numbers, shape (...), whose mean is the objective of the mean gaps, to first order."""
     mean = gaps.reshape(-1, 2).mean(axis=0)
     return gaps @ (mean / np.hypot(*mean))
 

@@ -157,7 +157,7 @@ class Effort:
     def run(
         self, rtol: float, revolutions: int, start: Start, strictness: Array
     ) -> Generator[Stretch, Outcome, Outcome]:
-        """A stretch of each of these copies."""
+        """A stretch of each of these copies; how many times stricter each one's tolerance is, shape (copies,)."""
         par = np.repeat(self.sample.par, len(start), axis=0)
         Parameters(par).strictness = strictness**2  # squared, as the kernel keeps it
         outcome = yield Stretch(rtol, revolutions, par, start)
