@@ -1,4 +1,4 @@
-"""Random scenes, three target errors each: what is called met is met, and stated limits hold a mean bought at a hundred times the cost.
+"""Random scenes, three target errors each: is what is called met met, do limits hold a mean bought at a hundred times the cost?
 
 python analysis/target_error.py --scenes 200      (hours on one core: most of it for the means to compare with)
 python analysis/target_error.py --first 40 --scenes 10
@@ -34,7 +34,9 @@ def random_scene(number: int) -> tuple[str, Scene]:
     kind = KINDS[number % len(KINDS)]
     crank = rng.uniform(0.02, 0.12)
     rod = crank * rng.uniform(2.2, 4.5)
-    crank_mass, rod_mass, slider_mass = (10.0 ** rng.uniform(-1.0, 0.8) * w for w in (1.0, 0.6, 0.6))
+    crank_mass, rod_mass, slider_mass = (
+        10.0 ** rng.uniform(-1.0, 0.8) * w for w in (1.0, 0.6, 0.6)
+    )
     speed = 10.0 ** rng.uniform(np.log10(500.0), np.log10(6000.0)) * np.pi / 30.0
     changes: dict[str, object] = {
         "mechanism.crank.length": crank,
@@ -67,7 +69,10 @@ def random_scene(number: int) -> tuple[str, Scene]:
         law = str(rng.choice(["lankarani-nikravesh", "flores"]))
         changes["effects.contact"] = {"law": law, "restitution": rng.uniform(0.3, 0.9)}
     if kind == "guide friction":
-        changes["effects.guide_friction"] = {"coefficient": rng.uniform(0.02, 0.15), "ramp_speed": 0.01}
+        changes["effects.guide_friction"] = {
+            "coefficient": rng.uniform(0.02, 0.15),
+            "ramp_speed": 0.01,
+        }
     if kind == "torque drive":
         torque = slider_mass * (crank * speed) ** 2 * rng.uniform(-0.002, 0.01)
         changes["drive"] = {"kind": "torque", "torque": torque, "initial_speed": speed}
@@ -79,7 +84,12 @@ def truth(scene: Scene, rtol: float) -> tuple[float, float, int]:
     """Mean of f over 64 copies of 300 revolutions after 100, its relative standard error, and copies that ended."""
     par = parameters(scene)
     start = kicked(start_states(scene, par), scales(scene), range(1000, 1064))
-    numerics = {"rtol": rtol, "atol": None, "transient_revolutions": 100, "averaged_revolutions": 300}
+    numerics = {
+        "rtol": rtol,
+        "atol": None,
+        "transient_revolutions": 100,
+        "averaged_revolutions": 300,
+    }
     problem = problem_of(scene.with_({f"numerics.{k}": v for k, v in numerics.items()}))
     outcome = Lanes(problem, 16).run(np.repeat(par, 64, axis=0), start)
     gaps = outcome.mean_gap[outcome.status == Status.OK]
@@ -93,7 +103,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--rtol", type=float, default=1e-7, help="tolerance of the means to compare with")
+    parser.add_argument(
+        "--rtol", type=float, default=1e-7, help="tolerance of the means to compare with"
+    )
     options = parser.parse_args()
     counts: Counter[str] = Counter()
     for number in range(options.first, options.first + options.scenes):
@@ -118,7 +130,12 @@ def main() -> None:
                 f"truth +- {error:.0e} ({ended}) {spent:6} revolutions {seconds:7.2f} s",
                 flush=True,
             )
-    stated = counts["met, held"] + counts["met, not held"] + counts["missed, held"] + counts["missed, not held"]
+    stated = (
+        counts["met, held"]
+        + counts["met, not held"]
+        + counts["missed, held"]
+        + counts["missed, not held"]
+    )
     held = counts["met, held"] + counts["missed, held"]
     print(dict(counts))
     print(f"limits hold the truth in {held} of {stated}: {held / max(stated, 1):.3f}")

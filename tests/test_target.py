@@ -148,6 +148,16 @@ def test_a_response_carries_the_steady_mean():
     assert made.sizes["time"] > 1000
 
 
+def test_a_stretch_says_on_request_how_far_copies_of_it_differ():
+    """The stretch itself stays what it is."""
+    plain, asked = (
+        simulate(BASE.with_(CHAOTIC | {"numerics.uncertainty": on})) for on in (False, True)
+    )
+    assert float(plain["objective"]) == float(asked["objective"])
+    assert np.isnan(float(plain["objective_uncertainty"]))
+    assert float(asked["objective_uncertainty"]) > 1e-3 * float(asked["objective"])
+
+
 def run_simulate(tmp_path: Path, scene: Scene) -> tuple[int, str, str]:
     file = tmp_path / "scene.toml"
     file.write_text(scene.to_toml())

@@ -179,6 +179,10 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     rows.append(("objective f", f"{quantity(f, unit, 6)}: {words}"))
     if np.isfinite(spread):
         rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
+    if np.isfinite(uncertainty := float(response["objective_uncertainty"])):
+        rows.append(
+            ("its uncertainty", f"{quantity(uncertainty, unit, 2)}: so far kicked copies differ")
+        )
     rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
     for k, joint in enumerate(response["joint"].to_numpy()):
         peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]

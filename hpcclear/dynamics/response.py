@@ -183,7 +183,12 @@ def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
     simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
     objective = named.objective if objective is None else objective
     times, data, record = simulated(scene)
-    record = asked(record if steady is None else steady, objective)
+    if steady is not None:
+        steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
+        record = steady
+    elif named.numerics.uncertainty and coordinate_count(scene):
+        record["objective_uncertainty"] = evaluate_records(scene, _ITSELF)["objective_uncertainty"]
+    record = asked(record, objective)
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(scene.effects.slider_load, data["crank_angle"])
@@ -218,7 +223,11 @@ def _steady(scene: Scene) -> Records | None:
     """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
-    return evaluate_records(scene, Points((), np.empty((1, 0)), ()))
+    return evaluate_records(scene, _ITSELF)
+
+
+_ITSELF = Points((), np.empty((1, 0)), ())
+"""The scene as the only design."""
 
 
 def _shown(scene: Scene, steady: Records) -> Scene:
