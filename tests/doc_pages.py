@@ -65,7 +65,15 @@ class Reader:
     """Somebody with a fresh checkout who does what a page says."""
 
     def __init__(self, place: Path) -> None:
-        ignored = shutil.ignore_patterns(".*", "results", "site", "__pycache__", "*.egg-info")
+        made = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info")
+        made_here = shutil.ignore_patterns(
+            "results", "site"
+        )  # a room of the package is called so too
+
+        def ignored(folder: str, names: list[str]) -> set[str]:
+            here = made_here(folder, names) if Path(folder) == ROOT else set()
+            return {*made(folder, names), *here}
+
         shutil.copytree(ROOT, place, ignore=ignored)
         self.place = place
         self.names: dict[str, Any] = {"__name__": "__main__"}
