@@ -20,7 +20,7 @@ from hpcclear.dynamics.explicit.stepper import make_stepper, weigh_rates
 from hpcclear.dynamics.implicit.radau import means_of_step
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.stepping.control import commit_rates
+from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
 W = 4
@@ -74,9 +74,9 @@ def test_groups_are_short():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="9 coordinates, not 10"):
-        make_stepper(4, 10, at.Effects())
+        make_stepper(4, 10, (1, 1))
     with pytest.raises(ValueError, match="5 coordinates, not 6"):
-        make_collocation_stepper(6, at.Effects())
+        make_collocation_stepper(6, (1, 1))
     problem = problem_of(scene_with())
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])
@@ -106,14 +106,43 @@ def test_an_end_is_a_start():
 # ---- what is integrated ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_rates])
+@pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_measures])
 def test_every_stepper_integrates_all_of_the_list(traversal):
-    """Each rate and its effect stand in the code that was written out, the gaps of `commit` in their joints."""
+    """Each gap and its joint stand in the code that was written out (`commit` has its own); the rest is measured."""
     seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
-    rates = at.MEASURES if traversal is commit_rates else at.INTEGRATED
-    for one in rates:
-        assert one.rate in seen
-        assert one.asked_by in seen
+    assert "measures" in seen
+    for gap in at.GAPS if traversal is not commit_measures else ():
+        assert gap.rate in seen
+        assert gap.asked_by in seen
+
+
+def test_what_is_measured_goes_by_the_effects():
+    everything = at.Effects(*[1] * len(at.Effects._fields))
+    assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
+    assert list(at.measures_of(at.Effects(responses=1))) == [
+        at.FORCE_12, at.FORCE_23, at.SLIDER_ACCELERATION, at.SLIDER_SQUARE
+    ]  # fmt: skip
+    assert len(at.measures_of(at.Effects(crank_rod=1, latched=1))) == 0
+
+
+def test_rules_are_numbers_of_one_kind():
+    """So that one compiled stepper serves all effects."""
+    for effects, on in (
+        (at.Effects(), set()),
+        (at.Effects(latched=1, torque=1), {"latched", "free", "turning"}),
+        (at.Effects(baumgarte=1, coulomb=1, gravity=1), {"turning", "coulomb"}),
+    ):
+        rules = at.rules_of(effects)
+        assert {name for name in rules._fields if getattr(rules, name)} == on
+        assert {type(value) for value in rules} == {int}
+
+
+def test_scenes_of_the_same_joints_share_a_stepper():
+    one, other = (
+        Lanes(problem_of(scene_with(changes)), 4)._step
+        for changes in ({}, {"effects.gravity": 9.81, "numerics.energy": True})
+    )
+    assert one is other
 
 
 def test_no_stepper_names_a_rate_of_its_own():

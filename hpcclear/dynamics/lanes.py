@@ -44,7 +44,12 @@ class Lanes:
         self.problem = problem
         self.width = width
         self.record = record
-        self._method = at.Method(problem.settings().rows, problem.tableau.packed(), problem.tables)
+        self._method = at.Method(
+            problem.settings().rows,
+            problem.tableau.packed(),
+            problem.tables,
+            at.measures_of(problem.effects),
+        )
         bank = np.zeros(at.BANK * width)
         bank[at.WORK * width :] = 1.0  # parameters: a resting lane divides by them
         self._block = at.Block(
@@ -61,11 +66,12 @@ class Lanes:
         effects = problem.effects._replace(sliding=1 if at_once else None)
         self._motion = motion_of(effects, width).address
         self._bank = motion_of(effects, LANES).address if at_once else 0
-        effects, recorded = effects.of_stepper(at_once), record is not None
+        self._rules = at.rules_of(effects)
+        joints, recorded = (effects.crank_rod, effects.rod_slider), record is not None
         self._step = (
-            make_collocation_stepper(n, effects, recorded=recorded)
+            make_collocation_stepper(n, joints, recorded=recorded)
             if problem.collocation
-            else make_stepper(width, n, effects, recorded=recorded, implicit=implicit)
+            else make_stepper(width, n, joints, recorded=recorded, implicit=implicit)
         )
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
@@ -175,7 +181,7 @@ class Lanes:
 
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running."""
-        arrays = (self._motion, self._bank, self._block, self._queue, self._method)
+        arrays = (self._motion, self._bank, self._rules, self._block, self._queue, self._method)
         some = (one for one in (self.record, self._memory) if one is not None)
         going = self._step(*arrays, *some, budget)
         return bool(going)

@@ -36,13 +36,6 @@ class Effects(NamedTuple):
     responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
     sliding: Any = None  # sliding speeds, for the implicit method
 
-    def of_stepper(self, implicit: bool) -> "Effects":
-        """Those that a stepper asks for, all others off: what the motion alone reads must not have it compiled anew."""
-        alone = ["torque_table", "gravity", "load", "load_table", "guide", "series", "sliding"]
-        if not implicit:  # which looks for kinks of the forces
-            alone += ["fixed", "coulomb", "ambrosio"]
-        return self._replace(**dict.fromkeys(alone))
-
 
 # ---- parameters of one sample -------------------------------------------------------------------
 (
@@ -127,6 +120,12 @@ INTEGRATED = (
 GAPS = tuple(one for one in INTEGRATED if one.clearance is not None)
 MEASURES = tuple(one for one in INTEGRATED if one.clearance is None)
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
+
+
+def measures_of(effects: Effects) -> np.ndarray:
+    """Rates besides the gaps that are integrated with these effects."""
+    asked = (one.rate for one in MEASURES if getattr(effects, one.asked_by) is not None)
+    return np.array(list(asked), np.int64)
 
 
 def place(rate: int) -> int:
@@ -295,8 +294,37 @@ class Queue(NamedTuple):
 
 
 class Method(NamedTuple):
-    """What a run is integrated with: its settings, the packed tableau, tabulated curves."""
+    """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured."""
 
     settings: Any
     weights: Any
     tables: Any  # (TABLES,)
+    measures: Any  # as `measures_of`
+
+
+class Rules(NamedTuple):
+    """What a stepper has to know of the effects, as numbers 0 and 1: none of them has it compiled anew."""
+
+    latched: Any  # impacts are located, and their speed is kept
+    fixed: Any  # the three: where the forces have kinks
+    coulomb: Any
+    ambrosio: Any
+    free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
+    turning: Any  # its angle is a coordinate, whoever drives it
+    responses: Any
+
+
+def rules_of(effects: Effects) -> Rules:
+    """Those of a set of effects."""
+    e = effects
+    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, e.torque or e.baumgarte)
+    return Rules(*(int(flag is not None) for flag in (*flags, e.responses)))
+
+
+class Stepped(NamedTuple):
+    """What the functions of a stepper read: which joints are open (None or 1, known when it is compiled), rules, measures."""
+
+    crank_rod: Any
+    rod_slider: Any
+    rules: Rules
+    measures: Any

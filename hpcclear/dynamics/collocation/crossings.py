@@ -58,7 +58,7 @@ def kink_in(work, m, joint, tolerance):
 def contact_change(flag, latched, work, m, joint, settings):
     """Fraction of the step at which a joint's contact begins or ends; 2 if it does not, 1 if an impact ends the step."""
     if flag is not None:
-        if latched is not None and work[joint.active] == 0.0:
+        if latched and work[joint.active] == 0.0:
             return impact_in(work, m, joint, settings)
         return kink_in(work, m, joint, settings[GAP_TOLERANCE])
     else:
@@ -68,7 +68,7 @@ def contact_change(flag, latched, work, m, joint, settings):
 @lane_function
 def stop_at_contacts(effects, work, m, settings):
     """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
-    first = contact_change(effects.crank_rod, effects.latched, work, m, at.O12, settings)
-    second = contact_change(effects.rod_slider, effects.latched, work, m, at.O23, settings)
+    first = contact_change(effects.crank_rod, effects.rules.latched, work, m, at.O12, settings)
+    second = contact_change(effects.rod_slider, effects.rules.latched, work, m, at.O23, settings)
     if cut_or_latch(0, 1, work, settings, first, second):
         m[lob.KINK] = lob.KINK_AT_END

@@ -19,6 +19,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
+from hpcclear.dynamics.explicit.stepper import Joints
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -171,8 +172,10 @@ def quadrature(flag, work, m, rate):
 @unrolled
 def quadratures(effects, work, m):
     """Integrals of all that is integrated over the step, over h."""
-    for one in written_out(at.INTEGRATED):
-        quadrature(getattr(effects, one.asked_by), work, m, one.rate)
+    for gap in written_out(at.GAPS):
+        quadrature(getattr(effects, gap.asked_by), work, m, gap.rate)
+    for r in range(len(effects.measures)):
+        quadrature(1, work, m, effects.measures[r])
 
 
 @lane_function
@@ -239,7 +242,7 @@ def after_step(work, m):
 def try_step(effects, motion, block, m, tables, settings, n):
     """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
     work, stages, par = block.work, block.stages, block.par
-    choose_step(work, par, effects.torque, 1)
+    choose_step(work, par, effects.rules.free, 1)
     begin_contacts(work, m)
     if work[at.FRESH] == 1.0:
         evaluate_start(motion, work, stages, m, tables, n)
@@ -268,7 +271,7 @@ def judge_end(effects, work, stages, m, settings, n):
         quadratures(effects, work, m)
         stop_at_contacts(effects, work, m, settings)
         if work[at.ACCEPT] == 1.0:
-            status = turn_of_free_crank(effects.torque, 0, 1, work, settings, n - 1)
+            status = turn_of_free_crank(effects.rules.free, 0, 1, work, settings, n - 1)
         if work[at.ACCEPT] == 1.0:
             integrate_gap(0, 1, work, at.O12)
             integrate_gap(0, 1, work, at.O23)
@@ -285,8 +288,9 @@ def next_sample(n, block, queue, settings, m):
 
 
 @lane_function
-def advance(effects, n, motion, bank, block, queue, method, record, m, budget):
+def advance(crank_rod, rod_slider, n, motion, bank, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample. The motion of one lane is not asked for."""
+    effects = at.Stepped(crank_rod, rod_slider, rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book
     if work[at.RUNNING] == 0.0:
@@ -304,7 +308,7 @@ def advance(effects, n, motion, bank, block, queue, method, record, m, budget):
             full = no_room(record, counters)
             after_step(work, m)
             if ended > 0.0:
-                wrap_crank(effects.torque, effects.baumgarte, 0, 1, work, n - 1)
+                wrap_crank(effects.rules.turning, 0, 1, work, n - 1)
                 status = end_revolution(0, 1, work, book, settings)
                 goes_on = status == UNFINISHED
         if not goes_on:
@@ -315,7 +319,7 @@ def advance(effects, n, motion, bank, block, queue, method, record, m, budget):
 
 @cache
 def make_collocation_stepper(
-    n: int, effects: at.Effects, *, recorded: bool = False
+    n: int, joints: Joints, *, recorded: bool = False
 ) -> Callable[..., Any]:
     """Return the compiled stepper of one response with n coordinates.
 
@@ -329,7 +333,7 @@ def make_collocation_stepper(
     """
     if not 1 <= n <= lob.MOST_COORDINATES:
         raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"effects": effects, "n": n}
+    known: dict[str, Any] = {"crank_rod": joints[0], "rod_slider": joints[1], "n": n}
     if not recorded:
         known["record"] = None
     text = one_text(advance, "collocation", **known)

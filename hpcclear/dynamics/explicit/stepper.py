@@ -21,7 +21,13 @@ from hpcclear.dynamics.explicit.combine import Step, any_stage_state, step_error
 from hpcclear.dynamics.explicit.switching import sense_stiffness, settle_methods
 from hpcclear.dynamics.implicit.stiff import take_implicit_steps
 from hpcclear.dynamics.linkage.rhs import run_motion
-from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
+from hpcclear.dynamics.stepping.control import (
+    choose_step,
+    commit,
+    flag_gaps,
+    judge_step,
+    measure,
+)
 from hpcclear.dynamics.stepping.record import record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 from hpcclear.dynamics.stepping.settings import ATOL, GAP_TOLERANCE, RTOL
@@ -33,11 +39,13 @@ from hpcclear.dynamics.stepping.stops import (
     wrap_crank,
 )
 
+Joints = tuple[int | None, int | None]
+
 
 @lane_function
-def begin_stage(work, torque, c, W):
+def begin_stage(work, free, c, W):
     """Time of this stage within the revolution."""
-    if torque is None:
+    if not free:
         for i in range(W):
             work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
 
@@ -65,18 +73,18 @@ def adopt_fresh(work, stages, n, W):
 
 
 @lane_function
-def weigh_rate(flag, work, rate, first, row, b, i, W):
+def weigh_rate(work, rate, first, row, b, i, W):
     """Add a stage's rate to the sum that becomes its integral over the step."""
-    if flag is not None:
-        before = work[(at.RATE_SUM + rate) * W + i]
-        before = 0.0 if first else before
-        work[(at.RATE_SUM + rate) * W + i] = before + b * work[(row + rate) * W + i]
+    before = work[(at.RATE_SUM + rate) * W + i]
+    before = 0.0 if first else before
+    work[(at.RATE_SUM + rate) * W + i] = before + b * work[(row + rate) * W + i]
 
 
 @lane_function
-def weigh_error(flag, work, gap, first, row, e, i, W):
-    """Add a stage's gap to the sum that becomes the error of its integral."""
+def weigh_gap(flag, work, gap, first, row, b, e, i, W):
+    """Add a stage's gap to the sums that become its integral and the error of that."""
     if flag is not None:
+        weigh_rate(work, gap, first, row, b, i, W)
         before = work[(at.RATE_ERROR + gap) * W + i]
         before = 0.0 if first else before
         work[(at.RATE_ERROR + gap) * W + i] = before + e * work[(row + gap) * W + i]
@@ -87,14 +95,16 @@ def weigh_error(flag, work, gap, first, row, e, i, W):
 def weigh_rates(effects, work, first, row, b, e, W):
     """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
 
-    One loop for all: shorter ones the compiler unrolls instead of vectorising. One product a sum: of two it might
+    One loop for all gaps: shorter ones the compiler unrolls instead of vectorising. One product a sum: of two it might
     fuse either, and lanes would differ from a single response in the last bit.
     """
     for i in range(W):
-        for one in written_out(at.INTEGRATED):
-            weigh_rate(getattr(effects, one.asked_by), work, one.rate, first, row, b, i, W)
         for gap in written_out(at.GAPS):
-            weigh_error(getattr(effects, gap.asked_by), work, gap.rate, first, row, e, i, W)
+            weigh_gap(getattr(effects, gap.asked_by), work, gap.rate, first, row, b, e, i, W)
+    for r in range(len(effects.measures)):
+        rate = measure(effects, r)
+        for i in range(W):
+            weigh_rate(work, rate, first, row, b, i, W)
 
 
 @lane_function
@@ -124,7 +134,7 @@ def take_explicit_steps(effects, motion, step, tables, memory, W):
             start_state(work, step.n, W)
         else:
             any_stage_state(step, s, W)
-        begin_stage(work, effects.torque, weights[tab.NODES + s], W)
+        begin_stage(work, effects.rules.free, weights[tab.NODES + s], W)
         run_motion(motion, work, tables)
         if s == 0:
             adopt_fresh(work, step.stages, step.n, W)
@@ -143,11 +153,11 @@ def end_of_step(effects, i, W, n, block, settings):
     work = block.work
     status = failure(i, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + i] == 1.0:
-        impacts(effects.latched, i, W, work, settings)
+        impacts(effects.rules.latched, i, W, work, settings)
         if work[at.ACCEPT * W + i] == 1.0:
             stop_at_kinks(i, W, work, settings)
         if work[at.ACCEPT * W + i] == 1.0:
-            status = turn_of_free_crank(effects.torque, i, W, work, settings, n - 1)
+            status = turn_of_free_crank(effects.rules.free, i, W, work, settings, n - 1)
         integrate_gap(i, W, work, at.O12)
         integrate_gap(i, W, work, at.O23)
     return status
@@ -165,7 +175,7 @@ def change_sample(i, W, n, status, block, queue, settings):
 @lane_event
 def close_revolution(effects, i, W, n, block, settings):
     """What the end of a lane's revolution brings. Returns UNFINISHED or why the lane ends."""
-    wrap_crank(effects.torque, effects.baumgarte, i, W, block.work, n - 1)
+    wrap_crank(effects.rules.turning, i, W, block.work, n - 1)
     return end_revolution(i, W, block.work, block.book, settings)
 
 
@@ -187,8 +197,7 @@ def judge_steps(effects, n, block, queue, settings, W):
     change = 0.0
     special = judge_step(work, settings, W)
     special += flag_gaps(
-        effects.crank_rod, effects.rod_slider, effects.torque, effects.latched,
-        work, n - 1, settings[GAP_TOLERANCE], W,
+        effects, work, n - 1, settings[GAP_TOLERANCE], W,
     )  # fmt: skip
     if special > 0.0:
         for i in range(W):
@@ -223,21 +232,26 @@ def borrowed_all(block, queue, method):
             lent(queue.par), lent(queue.start), lent(queue.out),
             lent(queue.finished), lent(queue.counters),
         ),
-        at.Method(lent(method.settings), lent(method.weights), lent(method.tables)),
+        at.Method(
+            lent(method.settings), lent(method.weights), lent(method.tables), lent(method.measures)
+        ),
     )  # fmt: skip
 
 
 @lane_function
-def advance(effects, n, W, motion, bank, block, queue, method, record, memory, budget):
+def advance(
+    crank_rod, rod_slider, n, W, motion, bank, rules, block, queue, method, record, memory, budget
+):
     """Take at most `budget` block steps. Returns whether lanes are running."""
     block, queue, method = borrowed_all(block, queue, method)
+    effects = at.Stepped(crank_rod, rod_slider, rules, method.measures)
     settings, tables, work = method.settings, method.tables, block.work
     atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
     step = Step(work, block.stages, block.par, method.weights, n, settings[RTOL], atol)
     running = load_lanes(W, n, block, queue, settings)
     while budget > 0 and running > 0.0:
         budget -= 1
-        choose_step(work, block.par, effects.torque, W)
+        choose_step(work, block.par, effects.rules.free, W)
         implicit = settle_methods(memory, settings, work, W)
         if implicit < running:
             take_explicit_steps(effects, motion, step, tables, memory, W)
@@ -255,14 +269,14 @@ def advance(effects, n, W, motion, bank, block, queue, method, record, memory, b
 
 @cache
 def make_stepper(
-    W: int, n: int, effects: at.Effects, *, recorded: bool = False, implicit: bool = False
+    W: int, n: int, joints: Joints, *, recorded: bool = False, implicit: bool = False
 ) -> Callable[..., Any]:
-    """Return the compiled stepper for W lanes of n coordinates, with effects as `layout.Effects.of_stepper` leaves them.
+    """Return the compiled stepper for W lanes of n coordinates, with the joints O12 and O23 open (1) or not (None).
 
-    Its arguments: the addresses of the motion of W lanes and of eight (`rhs.motion_of`), `layout.Block`, `layout.Queue`,
-    `layout.Method`, if `recorded` an array for the steps of lane 0, if `implicit` the memory of the implicit method (see
-    `radau.new_memory`), and the budget: how many block steps to take at most. It returns True while lanes are running. W = 1
-    is the single response; ensembles want at least twice the vector length.
+    Its arguments: the addresses of the motion of W lanes and of eight (`rhs.motion_of`), `layout.Rules`, `layout.Block`,
+    `layout.Queue`, `layout.Method`, if `recorded` an array for the steps of lane 0, if `implicit` the memory of the implicit
+    method (see `radau.new_memory`), and the budget: how many block steps to take at most. It returns True while lanes are
+    running. W = 1 is the single response; ensembles want at least twice the vector length.
 
     Raises
     ------
@@ -271,7 +285,7 @@ def make_stepper(
     """
     if not 1 <= n <= at.MAX_COORDINATES:
         raise ValueError(f"the stepper holds 1 to {at.MAX_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"effects": effects, "n": n, "W": W}
+    known: dict[str, Any] = {"crank_rod": joints[0], "rod_slider": joints[1], "n": n, "W": W}
     if not recorded:
         known["record"] = None
     if not implicit:

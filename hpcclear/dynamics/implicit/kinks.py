@@ -33,9 +33,9 @@ _BOTH = 2 * mem.KINKS_A_JOINT
 def damping_part(fixed, latched, m, joint, rate, i):
     """Damping factor of the normal force; 1 without damping or contact."""
     damping = m[(mem.PAR + joint.block + at.DAMPING) * LANES + i]
-    if latched is not None:
+    if latched:
         return 1.0 + damping * rate * m[joint.inverse_impact * LANES + i]
-    elif fixed is not None:
+    elif fixed:
         return 1.0 + damping * rate
     else:
         return 1.0
@@ -44,7 +44,7 @@ def damping_part(fixed, latched, m, joint, rate, i):
 @lane_function
 def in_contact(latched, m, gap, active, i):
     """Whether the joint transmits a force but for its damping."""
-    if latched is not None:
+    if latched:
         return gap > 0.0 and m[active * LANES + i] == 1.0
     else:
         return gap > 0.0
@@ -53,7 +53,7 @@ def in_contact(latched, m, gap, active, i):
 @lane_function
 def impact_ahead(latched, m, active, i):
     """Whether a change of the gap's sign is the stepper's to find: an impact to be located."""
-    if latched is not None:
+    if latched:
         return m[active * LANES + i] == 0.0
     else:
         return False
@@ -63,9 +63,9 @@ def impact_ahead(latched, m, active, i):
 def ramp_sides(coulomb, ambrosio, m, joint, sliding, i):
     """Functions that vanish where friction's ramp begins and ends."""
     inverse_ramp = m[(mem.PAR + joint.block + at.INVERSE_RAMP) * LANES + i]
-    if coulomb is not None:
+    if coulomb:
         return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
-    elif ambrosio is not None:
+    elif ambrosio:
         ramp = (
             abs(sliding) - m[(mem.PAR + joint.block + at.DEAD_SPEED) * LANES + i]
         ) * inverse_ramp
@@ -81,10 +81,10 @@ def kinks_of_joint(flag, effects, latched, m, joint, row, i):
         gap = m[(at.RATE_NOW + joint.gap) * LANES + i]
         rate = m[(at.RATE_NOW + joint.rate) * LANES + i]
         sliding = m[(at.RATE_NOW + joint.sliding) * LANES + i]
-        factor = damping_part(effects.fixed, latched, m, joint, rate, i)
+        factor = damping_part(effects.rules.fixed, latched, m, joint, rate, i)
         touches = in_contact(latched, m, gap, joint.active, i)
         pushes = touches and factor > 0.0
-        low, high = ramp_sides(effects.coulomb, effects.ambrosio, m, joint, sliding, i)
+        low, high = ramp_sides(effects.rules.coulomb, effects.rules.ambrosio, m, joint, sliding, i)
         free = impact_ahead(latched, m, joint.active, i)
         unit = GAP_UNIT * m[(mem.PAR + joint.block + at.CLEARANCE) * LANES + i]
         m[row * LANES + i] = factor if touches else 0.0
@@ -98,8 +98,8 @@ def kink_functions(effects, m):
     """Kink functions of both joints at the states of the first bank, as evaluated."""
     second = mem.KINKS + mem.KINKS_A_JOINT
     for i in range(LANES):
-        kinks_of_joint(effects.crank_rod, effects, effects.latched, m, at.O12, mem.KINKS, i)
-        kinks_of_joint(effects.rod_slider, effects, effects.latched, m, at.O23, second, i)
+        kinks_of_joint(effects.crank_rod, effects, effects.rules.latched, m, at.O12, mem.KINKS, i)
+        kinks_of_joint(effects.rod_slider, effects, effects.rules.latched, m, at.O23, second, i)
 
 
 @scalar_function

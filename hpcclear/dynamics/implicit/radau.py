@@ -366,8 +366,10 @@ def mean_of_step(flag, m, work, rate, lane, W):
 @unrolled
 def means_of_step(effects, m, work, lane, W):
     """Means of all that is integrated over the step."""
-    for one in written_out(at.INTEGRATED):
-        mean_of_step(getattr(effects, one.asked_by), m, work, one.rate, lane, W)
+    for gap in written_out(at.GAPS):
+        mean_of_step(getattr(effects, gap.asked_by), m, work, gap.rate, lane, W)
+    for r in range(len(effects.measures)):
+        mean_of_step(1, m, work, effects.measures[r], lane, W)
 
 
 @scalar_function

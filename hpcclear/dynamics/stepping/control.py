@@ -8,7 +8,6 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
@@ -24,17 +23,20 @@ def count_up(count, flag):
 
 
 @lane_function
-def choose_step(work, par, torque, W):
+def choose_step(work, par, free, W):
     """Take the step asked for, or what is left of the revolution (prescribed speed)."""
-    for i in range(W):
-        h = work[at.NEXT_STEP * W + i]
-        if torque is None:
+    if free:
+        for i in range(W):
+            work[at.STEP * W + i] = work[at.NEXT_STEP * W + i]
+    else:
+        for i in range(W):
+            h = work[at.NEXT_STEP * W + i]
             left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
             # Stretched by round-off at most: a step cut to end at an impact must stay cut, or is tried for ever.
             ending = 1.0 if h * (1.0 + 1e-8) >= left else 0.0
             h = left if h * (1.0 + 1e-8) >= left else h
             work[at.ENDING * W + i] = ending
-        work[at.STEP * W + i] = h
+            work[at.STEP * W + i] = h
 
 
 @lane_function
@@ -81,31 +83,29 @@ def gap_flag(latched, work, joint, i, W, tolerance):
     d0 = work[(at.RATE_OLD + joint.gap) * W + i]
     d1 = work[(at.RATE_NOW + joint.gap) * W + i]
     flag = 1.0 if d0 * d1 < 0.0 else 0.0
-    if latched is not None:
-        h = work[at.STEP * W + i]
-        m0 = h * work[(at.RATE_OLD + joint.rate) * W + i]
-        m1 = h * work[(at.RATE_NOW + joint.rate) * W + i]
-        flight = 1.0 - work[joint.active * W + i]
-        hit = 1.0 if d1 > -tolerance else 0.0
-        bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
-        flag = max(flag, flight * max(hit, bump))
-    return flag
+    h = work[at.STEP * W + i]
+    m0 = h * work[(at.RATE_OLD + joint.rate) * W + i]
+    m1 = h * work[(at.RATE_NOW + joint.rate) * W + i]
+    flight = latched * (1.0 - work[joint.active * W + i])
+    hit = 1.0 if d1 > -tolerance else 0.0
+    bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
+    return max(flag, flight * max(hit, bump))
 
 
 @lane_function
-def flag_gaps(crank_rod, rod_slider, torque, latched, work, last, tolerance, W):
+def flag_gaps(effects, work, last, tolerance, W):
     """Mark accepted lanes that need the scalar code before the step is committed."""
     special = 0.0
+    latched, free = 1.0 * effects.rules.latched, 1.0 * effects.rules.free
     for i in range(W):
         flag = 0.0
-        if crank_rod is not None:
+        if effects.crank_rod is not None:
             flag = max(flag, gap_flag(latched, work, at.O12, i, W, tolerance))
-        if rod_slider is not None:
+        if effects.rod_slider is not None:
             flag = max(flag, gap_flag(latched, work, at.O23, i, W, tolerance))
-        if torque is not None:
-            turned = 1.0 if work[(at.QS + last) * W + i] > at.TURN - 1e-6 else 0.0
-            stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
-            flag = max(flag, max(turned, stalled))
+        turned = 1.0 if work[(at.QS + last) * W + i] > at.TURN - 1e-6 else 0.0
+        stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
+        flag = max(flag, free * max(turned, stalled))
         flag = flag * work[at.ACCEPT * W + i] * work[at.RUNNING * W + i]
         work[at.SPECIAL * W + i] = max(work[at.SPECIAL * W + i], flag)
         special = count_up(special, flag)
@@ -146,49 +146,50 @@ def commit_joint(flag, latched, work, joint, i, W):
         add_integral(work, joint.gap, abs(work[(at.RATE_SUM + joint.gap) * W + i]), yes, i, W)
         keep(work, at.RATE_OLD + joint.gap, d, yes, i, W)
         keep(work, at.RATE_OLD + joint.rate, work[(at.RATE_NOW + joint.rate) * W + i], yes, i, W)
-        if latched is not None:
-            on = work[joint.active * W + i]
-            off = 1.0 if (accept * on == 1.0) & (d < 0.0) else 0.0
-            work[joint.active * W + i] = on - off
-            work[joint.ended * W + i] += off
+        on = work[joint.active * W + i]
+        off = 1.0 if (latched * accept * on == 1.0) & (d < 0.0) else 0.0
+        work[joint.active * W + i] = on - off
+        work[joint.ended * W + i] += off
 
 
 @lane_function
-def commit_measure(flag, work, rate, i, W):
-    """Integral of a rate after a step."""
-    if flag is not None:
-        yes = work[at.ACCEPT * W + i] == 1.0
-        add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
-        keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+def measure(effects, r):
+    """Rate r of those that are measured: not below 0, which spares the compiler a question for every lane."""
+    return effects.measures[r] & 31
 
 
 @lane_function
-def commit_peak(responses, work, i, W):
+def commit_measures(effects, work, W):
+    """Integrals of what is measured besides the gaps, and the peak of the crank moment, after a step."""
+    for r in range(len(effects.measures)):
+        rate = measure(effects, r)
+        for i in range(W):
+            yes = work[at.ACCEPT * W + i] == 1.0
+            add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
+            keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+    if effects.rules.responses:
+        for i in range(W):
+            commit_peak(work, i, W)
+
+
+@lane_function
+def commit_peak(work, i, W):
     """Peak of the crank moment after a step."""
-    if responses is not None:
-        counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
-        moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
-        peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
-        work[at.PEAK_MOMENT * W + i] = peak
-
-
-@lane_function
-@unrolled
-def commit_rates(effects, work, i, W):
-    """Integrals over a step, and what else is kept of the rates at its end."""
-    commit_joint(effects.crank_rod, effects.latched, work, at.O12, i, W)
-    commit_joint(effects.rod_slider, effects.latched, work, at.O23, i, W)
-    for one in written_out(at.MEASURES):
-        commit_measure(getattr(effects, one.asked_by), work, one.rate, i, W)
-    commit_peak(effects.responses, work, i, W)
+    counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
+    moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
+    peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
+    work[at.PEAK_MOMENT * W + i] = peak
 
 
 @lane_function
 def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
+    commit_measures(effects, work, W)
     ended = 0.0
+    latched = 1.0 * effects.rules.latched
     for i in range(W):
-        commit_rates(effects, work, i, W)
+        commit_joint(effects.crank_rod, latched, work, at.O12, i, W)
+        commit_joint(effects.rod_slider, latched, work, at.O23, i, W)
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
         for k in range(n):

@@ -153,9 +153,9 @@ def stop_free_crank(lane, W, work, settings, last):
 
 
 @lane_event
-def turn_of_free_crank(torque, lane, W, work, settings, last):
+def turn_of_free_crank(free, lane, W, work, settings, last):
     """End the step where a crank that is a coordinate ends its revolution; the status if it never will."""
-    if torque is not None:
+    if free:
         return stop_free_crank(lane, W, work, settings, last)
     else:
         return OK
@@ -164,12 +164,12 @@ def turn_of_free_crank(torque, lane, W, work, settings, last):
 @lane_event
 def impacts(latched, lane, W, work, settings):
     """End the step at the first impact inside it, under laws that need the impact speed."""
-    if latched is not None:
+    if latched:
         stop_at_impacts(lane, W, work, settings)
 
 
 @lane_event
-def wrap_crank(torque, baumgarte, lane, W, work, last):
+def wrap_crank(turning, lane, W, work, last):
     """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
-    if torque is not None or baumgarte is not None:
+    if turning:
         work[(at.Q + last) * W + lane] -= at.TURN
