@@ -10,7 +10,7 @@ from numba import njit
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics.layout import Effects
-from hpcclear.dynamics.linkage.rhs import SIGNATURE, motion
+from hpcclear.dynamics.linkage.rhs import SIGNATURE, written_by
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
 _X86 = re.compile(
@@ -103,7 +103,7 @@ def executed_arithmetic(assembly: str) -> Arithmetic:
 @cache
 def force_evaluation(effects: Effects, width: int) -> str:
     """Assembly of the kernel's force evaluation for `width` lanes, as steppers call it."""
-    text = one_text(motion, f"motion_{width}", effects=effects, W=width)
+    text = one_text(written_by(effects).motion, f"motion_{width}", effects=effects, W=width)
     compiled = njit(
         SIGNATURE,
         error_model="numpy",

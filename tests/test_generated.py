@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dense_linkage import Dense
 from linkages import LINKAGES, four_bar, six_bar, slider_crank
+from motions_by_hand import lane_motion
 from numba import njit
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from plain_lane import joints_of as joints_of_lane
@@ -15,7 +16,7 @@ from scipy.integrate import solve_ivp
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage import motion, rhs
+from hpcclear.dynamics.linkage import motion
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.elements import sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
@@ -122,9 +123,7 @@ def compiled(lane, effects, W):
     @njit(error_model="numpy")
     def by_hand(effects, joints, work, par):
         for i in range(W):
-            rhs.lane_motion(
-                effects, effects.baumgarte, effects.crank_rod, effects.rod_slider, work, par, i, W
-            )
+            lane_motion(effects, effects.crank_rod, effects.rod_slider, work, par, i, W)
 
     return [
         lambda work, par, run=run: run(effects, joints, work, par) for run in (generated, by_hand)

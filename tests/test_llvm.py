@@ -17,7 +17,7 @@ from numba import njit, types
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.rhs import accelerations
+from hpcclear.dynamics.linkage.rhs import written_by
 from hpcclear.dynamics.physics.angles import sincos
 
 FLAT = types.float64[::1]
@@ -38,7 +38,7 @@ def compiled_motion(effects, W=1):
     """The kernel's right-hand side with these effects on."""
 
     flags = at.Effects(**dict.fromkeys(effects, 1))
-    text = one_text(accelerations, f"looked_at_{W}", effects=flags, W=W)
+    text = one_text(written_by(flags).accelerations, f"looked_at_{W}", effects=flags, W=W)
     return compiled(text, FLAT, FLAT, FLAT)
 
 
@@ -202,8 +202,10 @@ def test_the_kernel_by_hand_computes_the_same():
     values = np.abs(rng.normal(size=at.PARAMETERS * W)) + 0.1
     mine[:] = hers[:] = rng.normal(size=at.WORK * W)
     njit(hertz_by_hand)(mine, values, W)
+    effects = at.Effects(crank_rod=1, rod_slider=1)
+    accelerations = written_by(effects).accelerations
     run = njit(lambda *arguments: accelerations(*arguments, W))
-    run(at.Effects(crank_rod=1, rod_slider=1), hers, values, np.zeros(at.TABLES))
+    run(effects, hers, values, np.zeros(at.TABLES))
     written = slice(at.ACC * W, (at.RATE_NOW + at.RATE_23 + 1) * W)
     np.testing.assert_allclose(mine[written], hers[written], rtol=1e-11, atol=1e-11)
     np.testing.assert_array_equal(mine[: at.ACC * W], hers[: at.ACC * W])

@@ -704,18 +704,23 @@ def one_text(function: Any, label: str, **known: Any) -> Callable[..., Any]:
     plain = getattr(function, "py_func", function)
     asked = f"{plain.__module__}.{plain.__qualname__} {sorted(known.items())!r}"
     name = f"{label}_{hashlib.sha256(asked.encode()).hexdigest()[:12]}"
+    return getattr(module_of(name, lambda: text_of(function, name, known)), name)  # type: ignore[no-any-return]
+
+
+def module_of(name: str, write: Callable[[], str]) -> ModuleType:
+    """The module of a text that is kept for the next process; `write` is called where there is none yet."""
     module_name = f"hpcclear_texts.{name}"
     if module_name not in sys.modules:
         path = _folder() / f"{name}.py"
         if not path.exists():
-            _keep(path, text_of(function, name, known))
+            _keep(path, write())
         spec = importlib.util.spec_from_file_location(module_name, path)
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[module_name] = module  # Numba looks a cached function's module up there
         spec.loader.exec_module(module)
-    return getattr(sys.modules[module_name], name)  # type: ignore[no-any-return]
+    return sys.modules[module_name]
 
 
 def _keep(path: Path, text: str) -> None:

@@ -1,17 +1,13 @@
-"""Equations of motion in minimal coordinates, one lane at a time.
+"""The laws that motions call, one lane at a time, and the one motion in minimal coordinates that is written by hand.
 
-Each topology reads the stage's coordinates and velocities of lane ``i``, adds up the forces that are on, and
-writes accelerations and gaps, forces and powers to their rows of `work`.
+A motion reads the stage's coordinates and velocities of lane ``i``, adds up the forces that are on, and writes
+accelerations and gaps, forces and powers to their rows of `work`. With a joint open its text is generated (`generator`).
 
 Conventions: crank pin and slider pin are the journals, the rod carries both bearings; e = journal centre -
 bearing centre; the contact point lies half-way through the overlap, so the pair of contact forces exerts no
 net couple; angles counter-clockwise; gravity towards -y.
 
-Coordinates (free crank angle last, only with a torque drive):
-
-- both joints open: rod x, rod y, rod angle, slider x;
-- one joint open: rod angle, slider x (the ideal joint removes two);
-- both ideal: none (with a torque drive: the crank angle).
+With both joints ideal a torque drive leaves one coordinate, the crank angle.
 """
 
 import math
@@ -193,164 +189,12 @@ def store_power(effects, work, drive, loss, load_power, acceleration, i, W):
 
 
 @lane_function
-def store_crank(torque, work, last, acceleration, i, W):
-    """Write down the crank's angular acceleration where it is a coordinate."""
-    if torque is not None:
-        work[(at.ACC + last) * W + i] = acceleration
-
-
-@lane_function
 def drive_moment_of(torque, given, reaction):
     """Moment of the drive: given with a torque drive, the reaction at prescribed speed."""
     if torque is not None:
         return given
     else:
         return reaction
-
-
-@lane_function
-def two_open(effects, work, par, phi, omega, i, W):
-    """Both joints open: every body moves under forces alone."""
-    cphi_s = sincos(phi)
-    sphi, cphi = cphi_s[0], cphi_s[1]
-    theta = work[(at.QS + 2) * W + i]
-    st_ct = sincos(theta)
-    st, ct = st_ct[0], st_ct[1]
-    vx2 = work[(at.VS + 0) * W + i]
-    vy2 = work[(at.VS + 1) * W + i]
-    spin = work[(at.VS + 2) * W + i]
-    v3 = work[(at.VS + 3) * W + i]
-    near = par[at.ROD_NEAR * W + i]
-    far = par[at.ROD_FAR * W + i]
-    crank = par[at.CRANK_LENGTH * W + i]
-    x2 = work[(at.QS + 0) * W + i]
-    y2 = work[(at.QS + 1) * W + i]
-    fx1, fy1, mb1, mj1, loss1 = joint_force(
-        effects,
-        work,
-        par,
-        at.O12,
-        (
-            crank * cphi - (x2 - near * ct),
-            crank * sphi - (y2 - near * st),
-            -crank * omega * sphi - (vx2 + near * spin * st),
-            crank * omega * cphi - (vy2 - near * spin * ct),
-            omega,
-            spin,
-        ),
-        i,
-        W,
-    )
-    fx2, fy2, mb2, _, loss2 = joint_force(
-        effects,
-        work,
-        par,
-        at.O23,
-        (
-            work[(at.QS + 3) * W + i] - (x2 + far * ct),
-            -(y2 + far * st),
-            v3 - (vx2 - far * spin * st),
-            -(vy2 + far * spin * ct),
-            0.0,
-            spin,
-        ),
-        i,
-        W,
-    )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
-    crank_load = (
-        crank * (sphi * fx1 - cphi * fy1)
-        + mj1
-        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
-    )
-    inverse_mass = par[at.INV_ROD_MASS * W + i]
-    moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2) + mb1 + mb2
-    work[at.ACC * W + i] = (fx1 + fx2) * inverse_mass
-    work[(at.ACC + 1) * W + i] = (fy1 + fy2) * inverse_mass - g
-    work[(at.ACC + 2) * W + i] = moment * par[at.INV_ROD_INERTIA * W + i]
-    work[(at.ACC + 3) * W + i] = (load - fx2 - guide) * par[at.INV_SLIDER_MASS * W + i]
-    store_crank(
-        effects.torque, work, 4, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
-    )
-    store_power(
-        effects,
-        work,
-        (drive_moment_of(effects.torque, torque, -crank_load), omega),
-        loss1 + loss2 + guide * v3,
-        load * v3,
-        work[(at.ACC + 3) * W + i],
-        i,
-        W,
-    )
-
-
-@apart
-@lane_function
-def crank_rod_open(effects, work, par, phi, omega, i, W):
-    """O12 open, O23 ideal: coordinates rod angle and slider x, coupled by the rod's mass."""
-    s_c = sincos(phi)
-    sphi, cphi = s_c[0], s_c[1]
-    s_c = sincos(work[(at.QS + 0) * W + i])
-    st, ct = s_c[0], s_c[1]
-    x3 = work[(at.QS + 1) * W + i]
-    spin = work[(at.VS + 0) * W + i]
-    v3 = work[(at.VS + 1) * W + i]
-    length = par[at.ROD_LENGTH * W + i]
-    far = par[at.ROD_FAR * W + i]
-    crank = par[at.CRANK_LENGTH * W + i]
-    fx, fy, mb, mj, loss = joint_force(
-        effects,
-        work,
-        par,
-        at.O12,
-        (
-            crank * cphi - (x3 - length * ct),
-            crank * sphi + length * st,
-            -crank * omega * sphi - (v3 + length * spin * st),
-            crank * omega * cphi + length * spin * ct,
-            omega,
-            spin,
-        ),
-        i,
-        W,
-    )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
-    m2 = par[at.ROD_MASS * W + i]
-    m3 = par[at.SLIDER_MASS * W + i]
-    a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
-    a12 = m2 * far * st
-    a22 = m2 + m3
-    b1 = length * (st * fx - ct * fy) + mb + product(effects.gravity, m2 * far * ct, g)
-    b2 = fx + load - m2 * far * ct * spin * spin
-    alpha, a3, friction = sliding_pair(
-        effects.guide, par, (a11, a12, a22), (b1, b2), (m2 * far, st, ct, spin),
-        (v3, (m2 + m3) * g - fy), i, W,
-    )  # fmt: skip
-    work[at.ACC * W + i] = alpha
-    work[(at.ACC + 1) * W + i] = a3
-    crank_load = (
-        crank * (sphi * fx - cphi * fy)
-        + mj
-        - product(effects.gravity, par[at.CRANK_MOMENT * W + i] * cphi, g)
-    )
-    store_crank(
-        effects.torque, work, 2, (torque + crank_load) / par[at.CRANK_INERTIA * W + i], i, W
-    )
-    store_power(
-        effects,
-        work,
-        (drive_moment_of(effects.torque, torque, -crank_load), omega),
-        loss + friction * v3,
-        load * v3,
-        a3,
-        i,
-        W,
-    )
 
 
 @lane_function
@@ -386,90 +230,6 @@ def sliding_pair(guide, par, matrix, right, rod, slider, i, W):
     else:
         inverse = 1.0 / (a11 * a22 - a12 * a12)
         return (b1 * a22 - a12 * b2) * inverse, (a11 * b2 - a12 * b1) * inverse, 0.0
-
-
-@apart
-@lane_function
-def rod_slider_open(effects, work, par, phi, omega, i, W):
-    """O12 ideal, O23 open: coordinates rod angle, slider x (and the crank angle, coupled by the rod's mass)."""
-    s_c = sincos(phi)
-    sphi, cphi = s_c[0], s_c[1]
-    s_c = sincos(work[(at.QS + 0) * W + i])
-    st, ct = s_c[0], s_c[1]
-    x3 = work[(at.QS + 1) * W + i]
-    spin = work[(at.VS + 0) * W + i]
-    v3 = work[(at.VS + 1) * W + i]
-    length = par[at.ROD_LENGTH * W + i]
-    near = par[at.ROD_NEAR * W + i]
-    crank = par[at.CRANK_LENGTH * W + i]
-    fx, fy, mb, _, loss = joint_force(
-        effects,
-        work,
-        par,
-        at.O23,
-        (
-            x3 - (crank * cphi + length * ct),
-            -(crank * sphi + length * st),
-            v3 + crank * omega * sphi + length * spin * st,
-            -(crank * omega * cphi + length * spin * ct),
-            0.0,
-            spin,
-        ),
-        i,
-        W,
-    )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
-    guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
-    m2 = par[at.ROD_MASS * W + i]
-    a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near
-    coupling = m2 * near * crank
-    cos_d = cphi * ct + sphi * st
-    sin_d = sphi * ct - cphi * st  # sin(phi - theta)
-    b1 = (
-        length * (ct * fy - st * fx)
-        + mb
-        - product(effects.gravity, m2 * near * ct, g)
-        + coupling * omega * omega * sin_d
-    )
-    # moment about the crank's bearing from everything but the drive and the angular accelerations
-    b3 = (
-        crank * (cphi * fy - sphi * fx)
-        - product(effects.gravity, (par[at.CRANK_MOMENT * W + i] + m2 * crank) * cphi, g)
-        - coupling * spin * spin * sin_d
-    )
-    alpha, crank_alpha = crank_pair(
-        effects.torque,
-        a11,
-        coupling * cos_d,
-        par[at.CRANK_INERTIA * W + i] + m2 * crank * crank,
-        b1,
-        b3 + torque,
-    )
-    work[at.ACC * W + i] = alpha
-    work[(at.ACC + 1) * W + i] = (load - fx - guide) * par[at.INV_SLIDER_MASS * W + i]
-    store_crank(effects.torque, work, 2, crank_alpha, i, W)
-    store_power(
-        effects,
-        work,
-        (drive_moment_of(effects.torque, torque, coupling * cos_d * alpha - b3), omega),
-        loss + guide * v3,
-        load * v3,
-        work[(at.ACC + 1) * W + i],
-        i,
-        W,
-    )
-
-
-@lane_function
-def crank_pair(torque, a11, a13, a33, b1, b3):
-    """Angular accelerations of rod and crank (the latter 0 at prescribed speed)."""
-    if torque is not None:
-        inverse = 1.0 / (a11 * a33 - a13 * a13)
-        return (b1 * a33 - a13 * b3) * inverse, (a11 * b3 - a13 * b1) * inverse
-    else:
-        return b1 / a11, 0.0
 
 
 @lane_function

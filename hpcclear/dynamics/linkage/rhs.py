@@ -3,7 +3,9 @@
 A stepper knows nothing of a motion but this address, so that one compiled stepper serves them all.
 """
 
+import sys
 from functools import cache
+from types import ModuleType
 from typing import Any
 
 from numba import carray, cfunc, types
@@ -12,25 +14,19 @@ from hpcclear.base.bits import beyond, call_at
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage import slider_crank
 from hpcclear.dynamics.linkage.baumgarte import nine_coordinates
-from hpcclear.dynamics.linkage.motion import (
-    both_ideal,
-    crank_rod_open,
-    rod_slider_open,
-    table_value,
-    two_open,
-)
+from hpcclear.dynamics.linkage.compiled import module_with
+from hpcclear.dynamics.linkage.motion import both_ideal, table_value
 
 
 @lane_function
-def crank_coordinate(baumgarte, crank_rod, rod_slider):
-    """Which coordinate is the crank angle, where it is one: the last of the formulation and the open joints."""
+def crank_coordinate(baumgarte):
+    """Which coordinate is the crank angle, where it is one: the last of the formulation."""
     if baumgarte is not None:
         return 8
-    elif crank_rod is not None:
-        return 2 if rod_slider is None else 4
     else:
-        return 0 if rod_slider is None else 2
+        return 0
 
 
 @lane_function
@@ -54,29 +50,19 @@ def look_up(effects, flag, row, work, par, tables, first, last, W):
 
 @lane_function
 def lane_motion(effects, baumgarte, crank_rod, rod_slider, work, par, i, W):
-    """Accelerations and rates of lane i, by formulation and open joints; what is not called is not compiled."""
+    """Accelerations and rates of lane i, of the formulations that are written by hand."""
     if baumgarte is not None:
         nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W)
     else:
-        last = crank_coordinate(baumgarte, crank_rod, rod_slider)
-        phi, omega = crank_motion(effects.torque, baumgarte, work, par, last, i, W)
-        if crank_rod is not None:
-            if rod_slider is not None:
-                two_open(effects, work, par, phi, omega, i, W)
-            else:
-                crank_rod_open(effects, work, par, phi, omega, i, W)
-        else:
-            if rod_slider is not None:
-                rod_slider_open(effects, work, par, phi, omega, i, W)
-            else:
-                both_ideal(effects, work, par, phi, omega, i, W)
+        phi, omega = crank_motion(effects.torque, baumgarte, work, par, 0, i, W)
+        both_ideal(effects, work, par, phi, omega, i, W)
 
 
 @lane_function
 def accelerations(effects, work, par, tables, W):
     """Accelerations and rates of W lanes at the stage held in `work`."""
     crank_rod, rod_slider, baumgarte = effects.crank_rod, effects.rod_slider, effects.baumgarte
-    last = crank_coordinate(baumgarte, crank_rod, rod_slider)
+    last = crank_coordinate(baumgarte)
     torque, load = effects.torque_table, effects.load_table
     look_up(effects, torque, at.TORQUE_VALUE, work, par, tables, at.TORQUE_TABLE, last, W)
     look_up(effects, load, at.LOAD_VALUE, work, par, tables, at.LOAD_TABLE, last, W)
@@ -115,8 +101,19 @@ def motion_of(effects: at.Effects, W: int) -> Any:
     compiled with `FASTMATH` and without branches on a lane's numbers.
     The object is kept for as long as the process lives: a stepper may hold its address.
     """
-    text = one_text(motion, f"motion_{W}", effects=effects, W=W)
+    text = one_text(written_by(effects).motion, f"motion_{W}", effects=effects, W=W)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+
+
+def written_by(effects: at.Effects) -> ModuleType:
+    """The module that holds `accelerations` and `motion` of a slider-crank with these effects.
+
+    It is generated, but for multipliers, and for both joints ideal, which have a closed form: these stand here.
+    """
+    joints = slider_crank.joints_of(effects)
+    if effects.baumgarte or not joints:
+        return sys.modules[__name__]
+    return module_with(slider_crank.motion_of(effects), joints)
 
 
 @lane_function

@@ -1,0 +1,90 @@
+"""A generated text as a module: a motion of all lanes that `rhs.motion_of` can compile and steppers call by its address.
+
+The file stands beside Numba's cache, to be read; it is named by its content.
+"""
+
+import hashlib
+from types import ModuleType
+
+from hpcclear.base.one_text import module_of
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.generator import Motion
+from hpcclear.dynamics.linkage.parts import ConstantSpeed, Force, Torque, TorqueDrive
+
+_HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
+
+from numba import carray
+
+from hpcclear.base.bits import beyond
+from hpcclear.base.jit import apart, lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.elements import harmonic, sign_of, spring_force
+from hpcclear.dynamics.linkage.motion import joint_force, table_value
+from hpcclear.dynamics.physics.angles import sincos
+from hpcclear.dynamics.physics.friction import saturated
+'''
+
+_MOTION = '''
+@lane_function
+def accelerations(effects, work, par, tables, W):
+    """Accelerations and rates of W lanes."""
+{looked_up}    for i in range(W):
+        lane(effects, JOINTS, work, par, i, W)
+
+
+@lane_function
+def motion(effects, lanes, tables, W):
+    """`accelerations` of the lanes at an address."""
+    work = carray(lanes, at.BANK * W)
+    par = beyond(work, at.WORK * W)
+    accelerations(effects, work, par, carray(tables, at.TABLES), W)
+'''
+
+_LOOK_UP = """    for i in range(W):
+        work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})
+"""
+
+
+def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
+    """The text of that module; `joints`: the rows of the joints with clearance, in the mechanism's order."""
+    rows = ", ".join(f"at.{joint!r}" for joint in joints)
+    looked_up = "".join(
+        _LOOK_UP.format(row=row, first=first, angle=_turned(motion))
+        for row, first in _curves(motion)
+    )
+    held = f"JOINTS = ({rows}{',' if joints else ''})"
+    lane = f"@apart\n@lane_function\n{motion.source}"
+    return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up)}"
+
+
+def _curves(motion: Motion) -> list[tuple[int, int]]:
+    """Rows of tabulated values, and where their tables begin."""
+    mechanism = motion.forest.mechanism
+    tabulated = [
+        load for load in mechanism.loads if isinstance(load, (Force, Torque)) and load.table
+    ]
+    found = [(at.LOAD_VALUE, at.LOAD_TABLE)] if tabulated else []
+    if any(isinstance(drive, TorqueDrive) and drive.table for drive in mechanism.drives):
+        found.append((at.TORQUE_VALUE, at.TORQUE_TABLE))
+    return found
+
+
+def _turned(motion: Motion) -> str:
+    """Angle of the body whose turn is the revolution."""
+    forest = motion.forest
+    drive = forest.mechanism.period
+    k = forest.index("angle", forest.frames[drive.body])
+    if k is not None:
+        return f"work[{at.QS + k} * W + i]"
+    assert isinstance(drive, ConstantSpeed)
+    speed = motion.parameters[f"{drive.name}_speed"]
+    start = forest.mechanism.body(drive.body).start_angle
+    turned = f"par[{speed} * W + i] * work[{at.STAGE_TIME} * W + i]"
+    return turned if start == 0.0 else f"{start!r} + {turned}"
+
+
+def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:
+    """The module of a motion: ``accelerations`` of all lanes and, ready for `one_text`, ``motion``."""
+    text = module_text(motion, joints)
+    name = f"linkage_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    return module_of(name, lambda: text)
