@@ -30,7 +30,20 @@ def pytest_generate_tests(metafunc):
         metafunc.parametrize("shift", shifts, scope="module", ids=lambda k: f"shift{k}")
 
 
+LONGEST = (
+    "survival", "docs", "accuracy", "release", "limits", "stiff", "collocation", "further_responses", "effects", "cli",
+    "reference", "jacobian", "llvm", "fuzz", "hard_cases", "ideal", "motion", "run", "baumgarte", "comm", "study",
+)  # fmt: skip
+"""Files that take a minute or more, the longest first: one that begins last keeps a single worker busy at the end."""
+
+
+def _turn(item):
+    name = item.path.stem.removeprefix("test_")
+    return LONGEST.index(name) if name in LONGEST else len(LONGEST)
+
+
 def pytest_collection_modifyitems(config, items):
+    items.sort(key=_turn)
     if config.getoption("--other-seeds"):
         items[:] = [item for item in items if "shift" in item.fixturenames]
 

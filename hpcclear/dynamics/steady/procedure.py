@@ -300,12 +300,6 @@ def _judge(history: _History, target: float, rtol: float) -> "_Found | str":
     tolerance = float(np.abs(loose - f.mean()).max())
     if seen.apart > 0.25 * level and revolutions >= PATIENCE and not seen.joining:
         return "irregular"
-    if (
-        seen.period is None
-        and revolutions >= CHECKPOINTS[-1]
-        and seen.settling + kick > 0.5 * level
-    ):
-        return "irregular" if not _drifts(history, level) else _unsteady(history)
     settled = seen.settling + kick <= 0.5 * level and (seen.period is not None or revolutions >= 32)
     if settled and tolerance > level and rtol / STRICTER >= TIGHTEST:
         return "tighten"
@@ -484,7 +478,7 @@ def _limits(copies: _Copies) -> _Limits:
     coherent = len(kept) >= 4 and float(between[first:].mean()) < 0.3 * float(within)
     if coherent:  # copies have not parted: their mean scatters in time like one of them
         limit = judging.student(kept.mean(axis=1))[2]
-    moved, settling = judging.approach(kept) if len(kept) >= 4 else (0.0, 0.0)
+    moved, settling = judging.approach(kept) if len(kept) >= 4 else (0.0, np.inf)
     several = bool(len(kept) > 1 and apart > 4.0 * within / len(kept))
     regime = Regime.SEVERAL if several else Regime.CHAOTIC
     if coherent or max(apart, within if np.isfinite(within) else 0.0) < (1e-5 * mean) ** 2:
