@@ -259,3 +259,18 @@ def test_the_figure_of_samples_marks_none_as_failed_where_the_scatter_is_not_kno
     assert sum(len(line.get_xdata()) for line in crosses) == 0
     words = " ".join(text.get_text() for axes in figure.axes for text in axes.texts)
     assert "not known of this objective" in words
+
+
+def test_a_free_cranks_speed_and_its_drift_are_told(tmp_path, capsys):
+    """A constant torque of 5 N m on 0.2 kg m2 without load: 25 rad/s2, 0.5 rad/s a turn of 20 ms."""
+    more = (
+        'drive={ kind = "torque", torque = 5.0, flywheel_inertia = 0.2, initial_speed = "3000 rpm" }',
+        "effects.slider_load=none",
+        "numerics.averaged_revolutions=3",
+    )
+    describe_response(hpcclear.simulate(engine(*more, study=False)), tmp_path / "a.nc")
+    told = " ".join(capsys.readouterr().out.split())
+    found = re.search(r"crank speed 3000 rpm at the start.* revolution ([+-][\d.]+) rpm", told)
+    assert float(found[1]) == pytest.approx(0.5 * 30 / np.pi, rel=0.1)
+    describe_response(hpcclear.simulate(engine(study=False)), tmp_path / "b.nc")
+    assert "crank speed" not in capsys.readouterr().out

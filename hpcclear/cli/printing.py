@@ -188,10 +188,26 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
         peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
         told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
         rows.append((f"{joint}", told + _at_instants(response, k)))
-    out.print(table("Response", rows))
+    out.print(table("Response", rows + _crank(response)))
     for text in flag_remarks(int(response["flags"])):
         out.print(f"[yellow]Mind:[/] {text}")
     out.print(f"written  {output}")
+
+
+def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
+    """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
+    if "crank_speed" not in response:
+        return []
+    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
+    if np.ptp(speed) < 1e-9 * abs(speed[0]):
+        return []
+    turns = response["crank_angle"].to_numpy() / (2.0 * np.pi)
+    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, response["time"])
+    told = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
+    means = 60.0 / np.diff(ends)
+    if len(means) > 1:
+        told += f"; drift of the last revolution {means[-1] - means[-2]:+.2g} rpm"
+    return [("crank speed", told)]
 
 
 def _at_instants(response: xr.Dataset, joint: int) -> str:
