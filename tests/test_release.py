@@ -14,7 +14,12 @@ from patience import crowded
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
-DATA = {"hpcclear/py.typed", "hpcclear/report/html/page.css", "hpcclear/report/html/page.js"} | {
+DATA = {
+    "hpcclear/cli/starter.toml",
+    "hpcclear/py.typed",
+    "hpcclear/report/html/page.css",
+    "hpcclear/report/html/page.js",
+} | {
     f"hpcclear/report/html/templates/{path.name}"
     for path in (ROOT / "hpcclear" / "report" / "html" / "templates").glob("*.html")
 }
