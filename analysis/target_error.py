@@ -81,13 +81,14 @@ def random_scene(number: int) -> tuple[str, Scene]:
 
 
 def truth(scene: Scene, rtol: float) -> tuple[float, float, int]:
-    """Mean of f over 64 copies of 300 revolutions after 100, its relative standard error, and copies that ended."""
+    """Mean of f over 64 copies of 300 revolutions after a spin-up, its relative standard error, copies that ended."""
     par = parameters(scene)
     start = kicked(start_states(scene, par), scales(scene), range(1000, 1064))
+    spin_up = 1000 if scene.drive.kind == "torque" else 100
     numerics = {
         "rtol": rtol,
         "atol": None,
-        "transient_revolutions": 100,
+        "transient_revolutions": spin_up,
         "averaged_revolutions": 300,
     }
     problem = problem_of(scene.with_({f"numerics.{k}": v for k, v in numerics.items()}))
