@@ -110,7 +110,7 @@ def sample_points(
     *,
     stage: str = "samples",
     first: int = 0,
-    maker: "Callable[[Mapping[str, Any], Ranks], Worker]" = make_evaluator,
+    maker: "Callable[[Mapping[str, Any], Ranks], Worker] | None" = None,
 ) -> np.ndarray:
     """Simulate a design on all ranks; call it on root.
 
@@ -129,7 +129,7 @@ def sample_points(
     first : int
         Number of the first point in the checkpoint, for designs that come one after the other.
     maker : function of a payload and the ranks, optional
-        Makes a rank's worker.
+        Makes a rank's worker; by default `make_evaluator`.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def sample_points(
     StorageError
         The disk refuses.
     """
-    task = Task(stage, maker, payload_of(scene, points))
+    task = Task(stage, maker or make_evaluator, payload_of(scene, points))
     if checkpoint is None:
         return ranks.run_points(task, points.values, progress=progress)
     completed = checkpoint.completed()

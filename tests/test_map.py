@@ -1,0 +1,142 @@
+"""Maps: exponents, periods and kinds of motion; the same bytes for any ranks and after a kill."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from commands import finish, kill, ranks_of, result_files, run, start
+from patience import crowded
+
+from hpcclear import grid
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Regime
+from hpcclear.cli import cli
+from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+from hpcclear.dynamics.steady.mapping import mapped
+from hpcclear.ensemble.api import as_points
+from hpcclear.ensemble.maps import SHAPE, axis, cells
+from hpcclear.scene import load_scene
+
+FILE = Path(__file__).parent.parent / "jobs" / "hunt_crossley.toml"
+BASE = load_scene(FILE)
+DAMPED = ("--set", "effects.contact.damping=0.05")
+
+
+def words(output: Path, *axes: str) -> list[str]:
+    named = [
+        word for name, axis in zip(("--x", "--y"), axes, strict=False) for word in (name, axis)
+    ]
+    return ["map", str(FILE), *named, "-o", str(output), "--progress", "quiet", *DAMPED]
+
+
+def judged(clearances: list[float], damping: float) -> np.ndarray:
+    scene = BASE.with_({"effects.contact.damping": damping})
+    points = as_points(scene, {"C": clearances})
+    worker = SteadyEvaluator(scene, points, procedure=mapped)
+    worker.submit(np.arange(len(points)), points.values)
+    found = []
+    while worker.pending:
+        found.append(worker.advance(0.5))
+    records = np.concatenate(found)
+    return records[np.argsort(records["sample"])]
+
+
+def test_exponents_are_those_of_an_independent_model():
+    """`python analysis/lyapunov.py`: scipy at 1e-12, three starts of 60 revolutions, with their standard error."""
+    for damping, clearance, expected, error in (
+        (0.5, 0.3e-3, -4.431, 0.003),
+        (0.1, 0.6e-3, -1.610, 0.011),
+    ):
+        found = judged([clearance], damping)[0]
+        assert found["regime"] == Regime.REGULAR
+        assert found["period"] == 1
+        assert found["kick_growth"] == pytest.approx(expected, rel=0.05)
+        assert abs(found["kick_growth"] - expected) <= found["kick_growth_limit"] + 3.0 * error
+
+
+def test_chaos_is_found_where_revolutions_differ_for_good():
+    regular, chaotic = judged([0.2e-3, 0.95e-3], 0.05)
+    assert regular["kick_growth"] < 0.0
+    assert regular["regime"] == Regime.REGULAR
+    assert chaotic["kick_growth"] > chaotic["kick_growth_limit"]
+    assert chaotic["regime"] == Regime.CHAOTIC
+    assert np.isnan(chaotic["period"])
+    assert chaotic["objective_spread"] > 100.0 * regular["objective_spread"]
+
+
+def test_periods_double_on_the_way_to_chaos():
+    """Of the 90 clearances from 0.1 to 1 mm 16 have the period 1, 6 two, one each 4 and 8."""
+    periods = judged(np.linspace(0.1e-3, 1e-3, 90).tolist(), 0.05)["period"]
+    counts = [int((periods == period).sum()) for period in (1, 2)]
+    assert counts[0] >= 10
+    assert counts[1] >= 3
+    assert ((periods == 4) | (periods == 8)).any()
+
+
+def test_axes_take_names_paths_and_units():
+    name, paths, values = axis(BASE, "C=0.1mm:1 mm:4")
+    assert name == "C"
+    assert set(paths) == {"joints.crank_rod.clearance", "joints.rod_slider.clearance"}
+    np.testing.assert_allclose(values, [1e-4, 4e-4, 7e-4, 1e-3])
+    assert axis(BASE, "drive.speed=500 rpm:6000 rpm:2")[2][0] == pytest.approx(500 * np.pi / 30)
+    points, shape = cells(BASE, ("C=1e-4:1e-3:3", "m3=0.1:0.2:2"))
+    assert shape == (3, 2)
+    np.testing.assert_allclose(points.values[1], [1e-4, 0.2])
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [("C=1",), ("C=1e-4:1e-3:0",), ("C=a:b:3",), ("nothing=1:2:3",), ("C=1e-4:nan:3",), ("C=1e-4:30 rpm:3",),
+     ("C=1e-4:1e-3:3", "joints.crank_rod.clearance=1e-4:1e-3:3"), ("C=0:1:3",)],
+    ids=lambda axes: " ".join(axes),
+)  # fmt: skip
+def test_what_is_no_grid_is_refused(axes):
+    with pytest.raises(InputError):
+        cells(BASE, axes)
+
+
+def test_a_map_folds_back_into_a_grid(tmp_path):
+    out = tmp_path / "map.nc"
+    result = CliRunner().invoke(
+        cli, words(out, "C=0.2mm:0.95mm:2", "m3=0.1:0.2:3"), standalone_mode=False
+    )
+    assert result.exit_code == 0, result.output
+    assert "6 of 6 without failure" in result.output
+    with xr.open_dataset(out) as content:
+        assert content.attrs[SHAPE] == "2 3"
+        folded = grid(content.load())
+    assert folded["kick_growth"].dims == ("C", "m3")
+    np.testing.assert_allclose(folded["C"], [0.2e-3, 0.95e-3])
+    assert float(folded["objective"][1, 2]) == float(content["objective"][5])
+    assert folded["mean_gap"].dims == ("C", "m3", "joint")
+    with pytest.raises(InputError):
+        grid(content.drop_attrs())
+
+
+@pytest.mark.mpi
+def test_ranks_and_a_kill_change_no_byte(tmp_path):
+    grids = ("C=0.3mm:1mm:8", "m3=0.1:0.2:4")
+    files = []
+    for ranks in (0, 2, 3):
+        out = tmp_path / str(ranks) / "map.nc"
+        out.parent.mkdir()
+        code, output = run(words(out, *grids), ranks)
+        assert code == 0, output
+        files.append(out.read_bytes())
+    assert files[0] == files[1] == files[2]
+    out = tmp_path / "killed" / "map.nc"
+    out.parent.mkdir()
+    job = start([*words(out, *grids), "--checkpoint-interval", "0.1"], 2)
+    deadline = time.time() + crowded(60.0)
+    while not result_files(out.parent):
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.02)
+    kill(ranks_of(job)[1])
+    finish(job)
+    code, output = run(words(out, *grids), 2)
+    assert code == 0, output
+    assert out.read_bytes() == files[0]
