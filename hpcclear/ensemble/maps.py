@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import first_compiled, sample_points
+from hpcclear.ensemble.simulate import first_compiled, sample_points, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -143,11 +143,12 @@ def run_map(
                 scene, points, ranks, checkpoint, progress, stage="map", maker=make_mapper
             )
             attributes = {**session.attributes, SHAPE: " ".join(str(n) for n in shape)}
-            content = session.write(
-                dataset.samples_dataset(
-                    points.names, points.values, units, records, attributes, words=points.words
+            with saving(checkpoint.flush):
+                content = session.write(
+                    dataset.samples_dataset(
+                        points.names, points.values, units, records, attributes, words=points.words
+                    )
                 )
-            )
         session.close()
     return session.finished(content, began)
 

@@ -9,7 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -86,14 +86,15 @@ def _simulate(scene: Scene, points: Points, session: Session) -> xr.Dataset:
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress)
     attributes = session.attributes | recorded(scene, records)
-    return session.write(
-        dataset.samples_dataset(
-            points.names,
-            points.values,
-            units,
-            records,
-            attributes,
-            scene.objective,
-            points.words,
+    with saving(checkpoint.flush):  # what came since the last save, if the file cannot be written
+        return session.write(
+            dataset.samples_dataset(
+                points.names,
+                points.values,
+                units,
+                records,
+                attributes,
+                scene.objective,
+                points.words,
+            )
         )
-    )
