@@ -188,3 +188,12 @@ def test_kicks_are_of_their_size_and_number_nought_is_none():
     np.testing.assert_array_equal(copies.rows[0], start.rows[0])
     apart = separation(copies, type(copies)(np.repeat(start.rows, 4, axis=0)), scale)
     np.testing.assert_allclose(apart, [0.0, 1e-3, 1e-3, 1e-3], rtol=1e-6)
+
+
+def test_a_budget_that_ends_in_an_ensemble_s_first_stretch_still_gives_limits():
+    """Wherever the budget ends: from the look on to the first look at an ensemble, and after the tolerance was given up."""
+    for budget in (100, 400, 700, 1000, 2100):
+        found = record(CHAOTIC, 1e-6, target_revolutions=budget)
+        assert found["flags"] & Flag.TARGET_MISSED
+        assert found["objective_limit"] > 0.0
+        assert found["steady_revolutions"] >= budget

@@ -63,10 +63,10 @@ class Row:
     reached: str
 
     def settings(self) -> str:
-        """Tolerance and revolutions in words; of a steady mean what was reached."""
+        """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
         n = self.scene.numerics
         if self.reached:
-            return self.reached
+            return ", ".join(self.reached.split(", ")[:2])
         return f"rtol {n.rtol:.1e}, {n.transient_revolutions}+{n.averaged_revolutions} rev"
 
 

@@ -463,6 +463,7 @@ def _limits(copies: _Copies) -> _Limits:
     total = len(y)
     between = y.var(axis=1, ddof=1)
     first = max(judging.spin_up(y.mean(axis=1)), min(judging.parted(between), total // 2), 1)
+    first = min(first, total - 1)  # the budget may end at once
     kept = y[first:]
     loose, strict = (kept[:, k::2].mean(axis=0) for k in (0, 1))
     doubt = float(
