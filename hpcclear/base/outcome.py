@@ -100,14 +100,17 @@ _REGIMES = {
 RESPONSES = ("mean_contact_force", "peak_crank_moment", "slider_acceleration_deviation")
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
+ON_REQUEST = (*RESPONSES, "energy_error")
+"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
+
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
-"""Fields of `OUTCOME` that a target error fills in; `regime` goes with them."""
+"""Fields of `OUTCOME` that a target error fills in, and that datasets hold where a `regime` was judged."""
 
 MAPPED = ("kick_growth_limit", "attractors")
 """Fields that a map fills in besides."""
 
-ON_REQUEST = (*RESPONSES, "energy_error", *STEADY, *MAPPED, "regime")
-"""Fields of `OUTCOME` that are NaN (a regime: 0), and left out of datasets, unless a scene asks for them."""
+JUDGED = (*STEADY, *MAPPED, "regime")
+"""All that stands in datasets only where a `regime` was judged."""
 
 OUTCOME = np.dtype(
     [

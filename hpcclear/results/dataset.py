@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS, ON_REQUEST, OUTCOME, STEADY, Status
+from hpcclear.base.outcome import JOINTS, JUDGED, ON_REQUEST, OUTCOME, STEADY, Status
 from hpcclear.results import netcdf
 from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
 
@@ -207,24 +207,21 @@ def samples_dataset(
     if len(data) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    asked = {name for name in ON_REQUEST if _filled(records[name])}
-    asked |= set(STEADY) if "regime" in asked else set()  # no period anywhere is an answer as well
-    left_out = {"sample", *ON_REQUEST} - asked
+    asked = {name for name in ON_REQUEST if np.isfinite(records[name]).any()}
+    asked |= {name for name in JUDGED if np.nan_to_num(records[name]).any()}
+    if "regime" in asked:  # no period anywhere is an answer as well
+        asked |= set(STEADY)
+    left_out = {"sample", *ON_REQUEST, *JUDGED} - asked
     data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
     coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
     return dataset("samples", coords, data, attributes, units, objective, words)
-
-
-def _filled(values: np.ndarray) -> bool:
-    """Whether a field that is made on request was."""
-    return bool(np.isfinite(values).any() if values.dtype.kind == "f" else values.any())
 
 
 def records(samples: xr.Dataset) -> np.ndarray:
     """The outcome records in a dataset of kind ``samples``, shape (n,) of `OUTCOME`."""
     found = np.zeros(samples.sizes["sample"], OUTCOME)
     for name in OUTCOME.names or ():
-        absent = name in ON_REQUEST and name not in samples
+        absent = name in (*ON_REQUEST, *JUDGED) and name not in samples
         nothing = np.nan if OUTCOME[name].base.kind == "f" else 0
         found[name] = nothing if absent else samples[name].to_numpy()
     return found

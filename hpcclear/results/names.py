@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.outcome import ON_REQUEST, Flag, Regime, Status
+from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
 from hpcclear.results.columns import Column, Columns
 
@@ -75,7 +75,9 @@ def _kind(
     """A kind of file; of a `whole` one only what is made on request may be missing."""
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
-    required = set(data) - set(ON_REQUEST) if whole else {n for n in data if data[n].required}
+    required = (
+        set(data) - {*ON_REQUEST, *JUDGED} if whole else {n for n in data if data[n].required}
+    )
     return Kind(title, coords, data, frozenset(required), design_dims, limit_dims)
 
 

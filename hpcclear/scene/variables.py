@@ -8,7 +8,7 @@ from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
 from hpcclear.base.normal import TAIL
-from hpcclear.base.outcome import ON_REQUEST
+from hpcclear.base.outcome import JUDGED, ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, invalid, nearest
 from hpcclear.scene.paths import described, quantities
 
@@ -31,7 +31,15 @@ LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 RESERVED = frozenset(
     (
         *("sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap"),
-        *("peak_contact_force", "latched", "rhs_evaluations", "status", "flags", *ON_REQUEST),
+        *(
+            "peak_contact_force",
+            "latched",
+            "rhs_evaluations",
+            "status",
+            "flags",
+            *ON_REQUEST,
+            *JUDGED,
+        ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
     )
 )

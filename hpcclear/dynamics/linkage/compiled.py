@@ -25,11 +25,17 @@ from hpcclear.dynamics.physics.friction import saturated
 '''
 
 _MOTION = '''
+lane_in_place = lane_function(lane.py_func)
+
+
 @lane_function
 def accelerations(effects, work, par, tables, W):
     """Accelerations and rates of W lanes."""
 {looked_up}    for i in range(W):
-        lane(effects, JOINTS, work, par, i, W)
+        if W == {bank}:  # a loop over calls is so short that it would be unrolled before it could be vectorised
+            lane_in_place(effects, JOINTS, work, par, i, W)
+        else:
+            lane(effects, JOINTS, work, par, i, W)
 
 
 @lane_function
@@ -39,6 +45,9 @@ def motion(effects, lanes, tables, W):
     par = beyond(work, at.WORK * W)
     accelerations(effects, work, par, carray(tables, at.TABLES), W)
 '''
+
+BANK = 8
+"""Lanes of an implicit step's and of collocation's motion."""
 
 _LOOK_UP = """    for i in range(W):
         work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})
@@ -54,7 +63,7 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"
-    return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up)}"
+    return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
 
 
 def _curves(motion: Motion) -> list[tuple[int, int]]:
