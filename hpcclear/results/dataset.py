@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS, JUDGED, ON_REQUEST, OUTCOME, STEADY, Status
+from hpcclear.base.outcome import JOINTS, JUDGED, MAPPED, ON_REQUEST, OUTCOME, STEADY, Status
 from hpcclear.results import netcdf
 from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
 
@@ -207,10 +207,9 @@ def samples_dataset(
     if len(data) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    asked = {name for name in ON_REQUEST if np.isfinite(records[name]).any()}
-    asked |= {name for name in JUDGED if np.nan_to_num(records[name]).any()}
-    if "regime" in asked:  # no period anywhere is an answer as well
-        asked |= set(STEADY)
+    asked = {n for n in (*ON_REQUEST, *STEADY, *MAPPED) if np.isfinite(records[n]).any()}
+    if records["regime"].any():  # no period anywhere is an answer as well
+        asked |= {*STEADY, "regime"}
     left_out = {"sample", *ON_REQUEST, *JUDGED} - asked
     data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
     coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
@@ -404,7 +403,8 @@ def _outcome_fault(content: xr.Dataset) -> str | None:
     if bool((finished & ~np.isfinite(content["objective"])).any()):
         return "a finished simulation has no objective"
     for name in _NUMBERS:
-        if name in content and bool((~finished & content[name].notnull()).any()):
+        judged = name not in JUDGED or "regime" in content  # 0 where nobody looked
+        if judged and name in content and bool((~finished & content[name].notnull()).any()):
             return f"a failed simulation has a number in {name}"
     if "sample" in content.coords:
         samples = content["sample"].to_numpy()
