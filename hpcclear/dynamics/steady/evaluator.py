@@ -125,10 +125,11 @@ class SteadyEvaluator:
         """Queue designs: indices (m,), values (m, d) in the columns' order, SI."""
         par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
         start = start_states(self.scene, par)
-        for k, sample in enumerate(np.asarray(index, np.int64).tolist()):
+        numbers = np.asarray(index, np.int64).tolist()
+        for k, sample in enumerate(numbers):
             design = Sample(par[k : k + 1], start[k : k + 1], self._scale, self._latched)
             self._asks[sample] = _Ask(sample, design.par, self._procedure(design))
-            self._queue([self._asks[sample]])
+        self._queue([self._asks[sample] for sample in numbers])
 
     def _queue(self, asks: "list[_Ask]") -> None:
         """Hand the stretches that procedures ask for to the lanes."""

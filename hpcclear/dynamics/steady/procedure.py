@@ -394,8 +394,9 @@ def _ensemble(
         unsteady = restless >= RESTLESS
         if unsteady or spent or met:
             regime = Regime.UNSTEADY if unsteady else Regime.SETTLING if drifting else seen.regime
+            limit = seen.limit + seen.settling
             return effort.mean(
-                regime=regime, limit=np.nan if unsteady else seen.limit + seen.settling,
+                regime=regime, limit=np.nan if unsteady or np.isinf(limit) else limit,
                 outcomes=copies.kept(seen), stretch=STRETCH, rtol=rtol, met=bool(met and not unsteady),
                 growth=growth,
             )  # fmt: skip

@@ -23,6 +23,8 @@ def why_missed(record: Any, target: float | None) -> str:
     regime, spent = Regime(int(record["regime"])), int(record["steady_revolutions"])
     if regime is Regime.UNSTEADY:
         return f"there is no steady mean to aim at: f still drifts after {spent} revolutions"
+    if not np.isfinite(float(record["objective_limit"])):
+        return f"{spent} revolutions are too few to give limits of f; raise numerics.target_revolutions"
     share = float(record["objective_limit"]) / float(record["objective"])
     return (
         f"f is known to {share:.1e} of itself after {spent} revolutions, not to {target:g} ({regime.meaning}); "
