@@ -8,9 +8,9 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import kicked
+from hpcclear.dynamics.steady.copies import LENGTH, kicked
 from hpcclear.dynamics.steady.procedure import Effort, Mean, Sample, Stretch
-from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 RTOL = 1e-8
 """Tolerance of a map. The exponent of the paper's scene is -0.32 at 1e-11; this finds -0.31."""
@@ -22,8 +22,8 @@ motion does (at 1e-6 it finds 2.2 where -0.32 is right); more, and it is not sma
 OWN, OTHER = 4, 4
 """Copies of the scene's own start, each with a shadow; and other starts."""
 
-FAR = 0.05
-"""Kicks of the other starts over scale: a twentieth of a millimetre, of a metre a second."""
+FAR = 0.2
+"""Kicks of the other starts over the least clearance (of velocities, over as many m/s as it has mm): journals stay inside."""
 
 SPIN_UP = 20
 LOOKS = (20, 40, 80)
@@ -81,8 +81,10 @@ def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
 
 
 def _starts(sample: Sample) -> Start:
+    clearance = Parameters(sample.par).clearance
+    far = FAR * float(clearance[clearance > 0.0].min()) / LENGTH
     own = kicked(sample.start, sample.scale, range(OWN))
-    other = kicked(sample.start, sample.scale, range(OWN, OWN + OTHER), FAR)
+    other = kicked(sample.start, sample.scale, range(OWN, OWN + OTHER), far)
     return Start(np.concatenate([own.rows, other.rows]))
 
 

@@ -37,9 +37,6 @@ TIGHTEST = 1e-11
 STRICTER = 10.0
 """How many times tighter than the others' the tolerances of half of the copies are."""
 
-LOOK = 4
-"""Copies of a look: two at its tolerance, two at a stricter one, one of each kicked."""
-
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
@@ -86,9 +83,6 @@ class Stretch:
     revolutions: int
     par: Array
     start: Start
-
-
-Asking = Generator[Stretch, Outcome]
 
 
 @dataclass
