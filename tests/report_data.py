@@ -203,12 +203,26 @@ def accuracy() -> xr.Dataset:
         "Radau IIA",
     ]
     rung, draws = np.arange(5), 10 ** np.arange(2, 6)
+    spent, price = 10 * 2 ** np.arange(7), 1e-4 * np.array([1.0, 1.2, 1.5, 2.0])
+    bias = np.array([-0.2, 1e-3, np.nan, np.nan])
+    model = np.hypot(np.nan_to_num(bias)[:, None], 0.3 / np.sqrt(spent))
     setting = np.tile(10.0 ** -(3.0 + rung), (4, 1))
     evaluations = 600 * setting**-0.2 * np.arange(1, 5)[:, None]
     error = setting[..., None] * np.array([1e-2, 0.1, 1.0, 0.3]) + 1e-9
     moments = np.stack([1.0 / np.sqrt(draws), 0.7 / np.sqrt(draws)])
     moment = np.stack([moments, np.where(draws > 10**4, np.nan, moments)])
     data = {
+        "spent_error": 1.1 * model,
+        "spent_model": model,
+        "spent_seconds": price[:, None] * (spent + 640),
+        "tolerance_bias": bias,
+        "tolerance_bias_error": np.array([1e-3, 1e-3, np.nan, np.nan]),
+        "turn_variance": np.full(4, 0.09),
+        "tolerance_seconds": price,
+        "spin_up": 20.0,
+        "cheapest_tolerance": np.array([1e-4, 1e-4, np.nan]),
+        "cheapest_revolutions": np.array([9.0, 910.0, np.nan]),
+        "cheapest_seconds": np.array([0.08, 0.2, np.nan]),
         "setting": setting,
         "error": error,
         "seconds": 1e-7 * evaluations,
@@ -236,6 +250,9 @@ def accuracy() -> xr.Dataset:
         "lost_seconds": np.array([0.5, 2.0, 0.3, 0.1]),
     }
     coords = {
+        "tolerance": 10.0 ** -np.arange(3, 7),
+        "spent": spent,
+        "aim": np.array([0.1, 0.01, 0.001]),
         "integrator": np.array(methods),
         "rung": rung,
         "quantity": np.array(
@@ -252,7 +269,12 @@ def accuracy() -> xr.Dataset:
         "loss": np.array(["start-up", "compilation", "imbalance", "writing"]),
     }
     words = {"designs": "16 designs over the box", "repeats": "median of 5 repeats"}
-    words |= {"copies": "16 copies", "study": "m2, m3, u2, I2, C", "batch": "512 samples"}
+    words |= {
+        "motion": "3.36 +- 0.03 um (chaotic)",
+        "copies": "16 copies",
+        "study": "m2, m3, u2, I2, C",
+        "batch": "512 samples",
+    }
     return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words)
 
 

@@ -7,7 +7,7 @@ import pytest
 from margins import FALSE_RED, at_least, at_most, fewest, most
 from scipy.stats import chi2, f
 
-from hpcclear.accuracy import averaging, integration, methods, random_inputs, surrogate
+from hpcclear.accuracy import averaging, integration, methods, random_inputs, spending, surrogate
 from hpcclear.accuracy.methods import LARGEST_STEP, QUANTITIES
 from hpcclear.accuracy.profile import FULL, QUICK, Profile
 from hpcclear.accuracy.run import measure
@@ -47,6 +47,7 @@ TINY = Profile(
     more_methods=False,
     revolutions=16,
     copies=4,
+    stretches=8,
     training=(20, 40),
     tests=20,
     draws=(16, 64, 1024),  # 256 simulations do for the first two
@@ -128,6 +129,96 @@ def test_a_transient_that_decays_and_copies_that_settle_apart():
     first = found.error[0] ** 2 - (2.0 / 3.0) * 3e-3**2
     share = [0.1 * (2.0 - 2.0 ** (1 - a)) / a for a in found.averaged.astype(float)]
     np.testing.assert_allclose(np.sqrt(first), share, rtol=1e-2)
+
+
+# ---- tolerance and revolutions -------------------------------------------------------------------
+
+
+def planted(bias, deviation, stretches=64, seed=7):
+    """Copies whose stretches scatter independently about a mean that goes by the tolerance."""
+    rng = np.random.default_rng(seed)
+    shape = (stretches, len(spending.TOLERANCES), spending.COPIES)
+    f = 1.0 + np.array(bias)[:, None] + deviation * rng.standard_normal(shape)
+    gaps = 1e-5 * np.stack([0.6 * f, 0.8 * f], axis=-1)
+    done = stretches * spending.COPIES * spending.STRETCH
+    price = np.array([1.0, 1.1, 1.3, 1.6, 2.0, 2.5]) * 1e-3
+    return spending.Run(gaps, price * done, np.empty((6, spending.COPIES, 0)))
+
+
+def test_bias_variance_and_price_that_were_planted_are_found():
+    found = spending.analyse(planted([0.1, 0.005, 0.0, 0.0, 0.0, 0.0], 0.03))
+    off = (found.bias - [0.1, 0.005, 0.0, 0.0, 0.0, 0.0]) / found.bias_error
+    assert (np.abs(off) < 4.5).all()
+    # of ten revolutions 0.03^2; a variance over 32 copies scatters by a quarter of itself
+    np.testing.assert_allclose(found.variance, 10 * 0.03**2, rtol=0.9)
+    np.testing.assert_allclose(found.turn_seconds, [1e-3, 1.1e-3, 1.3e-3, 1.6e-3, 2e-3, 2.5e-3])
+    assert (found.error[0] > 0.095).all()  # no revolutions help against a bias
+    np.testing.assert_allclose(found.error[3, :5], found.model[3, :5], rtol=0.7)
+    assert found.error[3, 0] > 3.0 * found.error[3, 5]
+
+
+def test_the_cheapest_tolerance_is_the_loosest_that_is_not_off():
+    found = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03))
+    rtol, spent, seconds = found.cheapest(0.05)
+    assert rtol == 1e-4
+    assert spent == pytest.approx(10 * 0.03**2 / (0.05**2 - 0.01**2), abs=5)
+    assert seconds == pytest.approx(1.1e-3 * (spent + 32 * found.spin_up), rel=0.01)
+    assert found.cheapest(0.004)[0] <= 1e-5  # 1e-4 is off by more
+    assert np.isnan(found.cheapest(1e-5)).all()  # no bias is known so well
+    two = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03, stretches=32))
+    assert found.cheapest(0.004)[1] > found.cheapest(0.02)[1] > 0
+    assert two.revolutions == found.revolutions // 2
+
+
+def test_copies_that_fail_are_left_out():
+    run = planted([0.0] * 6, 0.03)
+    run.gaps[10:, 2, 5] = np.nan
+    found = spending.analyse(run)
+    assert np.isfinite(found.error[:, :5]).all()
+    assert abs(found.bias[2]) < 4.5 * found.bias_error[2]
+
+
+def test_a_run_that_was_cut_goes_on_as_if_it_had_not_been():
+    whole = list(spending.measure(TWIN, spending.Run.of(TWIN), 16))
+    assert [len(run.gaps) for run in whole] == [8, 16]
+    (again,) = spending.measure(TWIN, whole[0], 16)
+    np.testing.assert_array_equal(again.gaps, whole[1].gaps)
+    np.testing.assert_array_equal(again.start, whole[1].start)
+
+
+class Shelf(dict):
+    """A store in memory."""
+
+    def save_stage(self, name, data):
+        self[name] = {key: np.asarray(value) for key, value in data.items()}
+
+    def load_stage(self, name):
+        return self.get(name)
+
+
+def test_what_was_measured_is_shown_at_once_and_not_measured_again(monkeypatch):
+    class Enough(Exception):
+        pass
+
+    def stop(*_):
+        raise Enough
+
+    shelf, shown, told = Shelf(), [], []
+    with monkeypatch.context() as patch:
+        patch.setattr(averaging, "measure", stop)
+        with pytest.raises(Enough):
+            measure(TWIN, alone(), TINY, told.append, shelf, shown.append)
+    assert "spent_error" in shown[0]
+    assert "error" not in shown[0]
+    assert "error" in shown[-1]
+    assert {"motion", "copies", "integration"} <= set(shelf)
+    told.clear()
+    monkeypatch.setattr(integration, "measure", stop)  # never called
+    content = measure(TWIN, alone(), TINY, told.append, shelf, shown.append)
+    assert content.attrs["motion"].endswith("revolutions)")
+    assert "regular" in content.attrs["motion"]
+    assert not [text for text in told if text in ("motion", "integration")]
+    np.testing.assert_array_equal(content["error"], shelf["integration"]["error"])
 
 
 # ---- surrogates and random inputs -----------------------------------------------------------------
@@ -223,6 +314,8 @@ def test_figures_and_tables(measured, tmp_path, capsys):
     describe(measured, {"accuracy": tmp_path})
     shown = capsys.readouterr().out
     for word in (
+        "A steady mean",
+        "of a core",
         "dormand-prince",
         "Kriging",
         "floor",

@@ -26,7 +26,6 @@ class Parallel:
     ranks: Integers
     strong: Array
     weak: Array
-    samples: int  # of the fixed batch
     lost: Array  # (4,), as in `LOSSES`, over all ranks, core-seconds
 
 
@@ -35,7 +34,7 @@ def measure(
 ) -> Parallel:
     """Time a fixed batch, and one that grows with the ranks, on 1, 2, 4, ... ranks."""
     numbers = np.unique([*2 ** np.arange(1 + int(np.log2(ranks.size))), ranks.size])
-    samples = int(np.clip(profile.strong_seconds / sample_seconds, 64, 10**6))
+    samples = samples_of(sample_seconds, profile)
     each = max(samples // ranks.size, 32)
     strong = np.array([_timed(scene, case, samples, int(n), ranks) for n in numbers])
     last = ranks.stage_seconds[_stage(int(numbers[-1]), samples)]
@@ -48,7 +47,12 @@ def measure(
         float(last[:, column["idle"]].sum()),
         float(total[:, column["write"]].sum()),  # type: ignore[call-overload,index]
     ]
-    return Parallel(numbers.astype(np.int64), strong, weak, samples, np.array(lost))
+    return Parallel(numbers.astype(np.int64), strong, weak, np.array(lost))
+
+
+def samples_of(sample_seconds: float, profile: Profile) -> int:
+    """Of the fixed batch."""
+    return int(np.clip(profile.strong_seconds / sample_seconds, 64, 10**6))
 
 
 def _stage(number: int, samples: int) -> str:

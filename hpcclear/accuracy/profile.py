@@ -24,6 +24,8 @@ class Profile:
         Of the long runs of the averaging panel.
     copies : int
         Long runs that differ by tiny kicks at their start.
+    stretches : int
+        Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions.
     training : tuple of int
         Sample sizes of the surrogates.
     tests : int
@@ -46,6 +48,7 @@ class Profile:
     more_methods: bool
     revolutions: int
     copies: int
+    stretches: int
     training: tuple[int, ...]
     tests: int
     draws: tuple[int, ...]
@@ -63,6 +66,7 @@ QUICK = Profile(
     more_methods=False,
     revolutions=160,
     copies=16,
+    stretches=16,
     training=(25, 50, 100),
     tests=100,
     draws=tuple(4**k for k in range(2, 7)),
@@ -80,6 +84,7 @@ FULL = Profile(
     more_methods=True,
     revolutions=1000,
     copies=32,
+    stretches=64,
     training=(25, 50, 100, 200, 400),
     tests=200,
     draws=tuple(4**k for k in range(2, 10)),

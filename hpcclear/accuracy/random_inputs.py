@@ -12,6 +12,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
+from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -38,8 +39,30 @@ class RandomInputs:
     quadrature_seconds: float
 
 
+def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
+    """The objective at draws of the random inputs about the middle of the design space, and core-seconds of one of them.
+
+    Shape (n,); what failed is left out. `scene` has a study that has the case.
+    """
+    names, middle = middle_of(scene, case)
+    chosen = dict(zip(names, middle[0], strict=True))
+    random = scene.required_study.case(case).random
+    points = monte_carlo(
+        scene, profile.simulations, random=random, design=chosen, purpose="accuracy"
+    )
+    values, each = objectives(scene, points, ranks, "random inputs: simulations")
+    return values[np.isfinite(values)], each
+
+
+def middle_of(scene: Scene, case: str) -> tuple[tuple[str, ...], Array]:
+    """Names of the case's design variables, and the design in the middle of their space, SI, shape (1, d)."""
+    names = scene.required_study.design_variables(case)
+    region = box(scene, names)
+    return names, to_physical(scene, names, 0.5 * (region.lower + region.upper)[None])
+
+
 def measure(
-    scene: Scene, case: str, model: Kriging, profile: Profile, ranks: Ranks
+    scene: Scene, case: str, model: Kriging, profile: Profile, values: Array, each: float
 ) -> RandomInputs:
     """Measure at the middle of the design space.
 
@@ -51,11 +74,12 @@ def measure(
     model : Kriging
         In the inputs of the study's optimisation.
     profile : Profile
-    ranks : Ranks
+    values : ndarray, shape (n,)
+    each : float
+        Of `simulate`.
     """
     problem = problem_of(scene, case, model)  # type: ignore[arg-type]
-    region = problem.region
-    design = problem.physical(0.5 * (region.lower + region.upper)[None])
+    _, design = middle_of(scene, case)
     problem.objective.monte_carlo(design, 4, np.random.default_rng(0))  # compiles
     problem.objective(design)
     started = time.perf_counter()
@@ -78,13 +102,6 @@ def measure(
         seconds[0, k] = (time.perf_counter() - started) / profile.blocks
         table = np.array([[one.mean[0], one.deviation[0]] for one in found])
         error[0, :, k], lower[0, :, k], upper[0, :, k] = root_mean_square(table / exact - 1.0, 0)
-    chosen = dict(zip(problem.names, design[0], strict=True))
-    random = scene.required_study.case(case).random
-    points = monte_carlo(
-        scene, profile.simulations, random=random, design=chosen, purpose="accuracy"
-    )
-    values, each = objectives(scene, points, ranks, "random inputs: simulations")
-    values = values[np.isfinite(values)]
     true = sample_moments(values[None])
     truth = np.array([true.mean[0], true.deviation[0]])
     for k, size in enumerate(sizes):

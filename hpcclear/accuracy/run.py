@@ -1,26 +1,31 @@
-"""The `accuracy` command: every panel measured, written, drawn and printed."""
+"""The `accuracy` command: every panel measured, written, drawn."""
 
-import shlex
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from hpcclear.accuracy import averaging, integration, parallel, random_inputs, surrogate
-from hpcclear.accuracy.methods import QUANTITIES
+from hpcclear.accuracy import surrogate
+from hpcclear.accuracy.panels import Nowhere, Panels, Store, Tell
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
+from hpcclear.ensemble.identity import run_key
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session
 from hpcclear.ranks.team import Ranks
-from hpcclear.results import dataset, files
+from hpcclear.results import dataset
 from hpcclear.scene import Scene
+
+FILE = "accuracy.nc"
 
 
 def measure(
-    scene: Scene, ranks: Ranks, profile: Profile, tell: Callable[[str], object] = lambda text: None
+    scene: Scene,
+    ranks: Ranks,
+    profile: Profile,
+    tell: Tell = lambda text: None,
+    store: Store | None = None,
+    show: Callable[[xr.Dataset], object] = lambda content: None,
 ) -> xr.Dataset:
     """Measure what accuracy costs for a scene; on root.
 
@@ -32,6 +37,10 @@ def measure(
     profile : Profile
     tell : callable
         Gets what is going on, a line at a time.
+    store : Store, optional
+        Where finished work is kept, and found again.
+    show : callable
+        Gets the dataset of all that is there whenever there is more of it.
 
     Returns
     -------
@@ -47,108 +56,30 @@ def measure(
         raise InputError(
             "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"
         )
-    studied, case, where = with_case(scene)
+    panels = Panels(scene, ranks, profile, tell, Nowhere() if store is None else store, show)
     tell("compilation")
+    studied, case, _ = with_case(scene)
     surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
-    parts: list[tuple[Mapping[str, Any], Mapping[str, Any]]] = []
-    with ranks.stage("integration"):
-        parts.append(_integration(integration.measure(scene, profile, _checked(tell, ranks))))
-    tell("averaging")
-    with ranks.stage("averaging"):
-        parts.append(_averaging(averaging.measure(scene, profile)))
-    tell("surrogates")
-    fitted = surrogate.measure(studied, case, profile, ranks)
-    parts.append(_surrogates(fitted))
-    tell("random inputs")
-    parts.append(_random(random_inputs.measure(studied, case, fitted.model, profile, ranks)))
-    tell("ranks")
-    scaling = parallel.measure(studied, case, fitted.sample_seconds, profile, ranks)
-    parts.append(_parallel(scaling))
-    coords: dict[str, Any] = {}
-    data: dict[str, Any] = {}
-    for some_coords, some_data in parts:
-        coords.update(some_coords)
-        data.update(some_data)
-    attributes = {
-        **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
-        "profile": profile.name,
-        "command": shlex.join(sys.argv),
-        "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",
-        "repeats": f"medians of {profile.repeats} runs ({profile.outside_repeats} for scipy's solvers)",
-        "copies": f"averaging: {profile.copies} copies over {profile.revolutions} revolutions",
-        "study": where,
-        "batch": f"ranks: {scaling.samples} samples, or as many a rank",
-        "mpi_ranks": ranks.size,
-    }
-    return dataset.dataset("accuracy", coords, data, attributes)
-
-
-def _checked(tell: Callable[[str], object], ranks: Ranks) -> Callable[[str], object]:
-    """Say it, after looking whether the run shall stop."""
-
-    def say(text: str) -> None:
-        ranks.raise_if_stopped()
-        tell(text)
-
-    return say
-
-
-def _integration(found: integration.Integration) -> tuple[dict[str, Any], dict[str, Any]]:
-    coords = {
-        "integrator": np.array(found.methods),
-        "rung": np.arange(found.setting.shape[1]),
-        "quantity": np.array(QUANTITIES),
-    }
-    names = ("setting", "error", "seconds", "evaluations", "order", "reference_error")
-    return coords, {name: getattr(found, name) for name in names}
-
-
-def _averaging(found: averaging.Averaging) -> tuple[dict[str, Any], dict[str, Any]]:
-    data = {
-        "averaging_error": found.error,
-        "averaging_floor": found.floor,
-        "turn_seconds": found.seconds,
-    }
-    return {"transient": found.transient, "averaged": found.averaged}, data
-
-
-def _surrogates(found: surrogate.Surrogates) -> tuple[dict[str, Any], dict[str, Any]]:
-    coords = {"surrogate": np.array(surrogate.SURROGATES), "training": found.training}
-    names = ("r2", "rmae", "leave_one_out", "fit_seconds", "sample_seconds")
-    return coords, {name: getattr(found, name) for name in names}
-
-
-def _random(found: random_inputs.RandomInputs) -> tuple[dict[str, Any], dict[str, Any]]:
-    coords = {
-        "estimate": np.array(random_inputs.ESTIMATES),
-        "moment": np.array(random_inputs.MOMENTS),
-        "draws": found.draws,
-    }
-    data = {
-        "moment_error": found.error,
-        "moment_lower": found.lower,
-        "moment_upper": found.upper,
-        "moment_seconds": found.seconds,
-        "moment_bias": found.bias,
-        "bias_error": found.bias_error,
-        "closed_form": found.closed_form,
-        "quadrature_seconds": found.quadrature_seconds,
-    }
-    return coords, data
-
-
-def _parallel(found: parallel.Parallel) -> tuple[dict[str, Any], dict[str, Any]]:
-    coords = {"ranks": found.ranks, "loss": np.array(parallel.LOSSES)}
-    data = {"strong_seconds": found.strong, "weak_seconds": found.weak, "lost_seconds": found.lost}
-    return coords, data
+    panels.add_motion()
+    panels.add_spending()
+    panels.add_integration()
+    panels.add_averaging()
+    panels.add_study()
+    return panels.content()
 
 
 def run_accuracy(
-    scene: Scene, directory: Path, ranks: Ranks, profile: Profile, tell: Callable[[str], object]
+    scene: Scene,
+    directory: Path,
+    ranks: Ranks,
+    profile: Profile,
+    tell: Tell,
+    options: Options = DEFAULT_OPTIONS,
 ) -> tuple[xr.Dataset, dict[str, Path]]:
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 
-    `tell` gets what is going on, a line at a time.
+    Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from
+    there. `tell` gets what is going on, a line at a time.
 
     Raises
     ------
@@ -158,16 +89,29 @@ def run_accuracy(
     from hpcclear.report.figures import style
 
     style.matplotlib()  # said before the measuring, not after
-    place = directory / "accuracy.nc"
-    try:
-        directory.mkdir(exist_ok=True)
-    except OSError as error:
-        raise files.refused(directory, error) from error
-    files.probe(place)
+    place = Place.of_directory(directory, options.fresh)
+    key = {**run_key(scene, "accuracy"), "profile": profile.name, "ranks": str(ranks.size)}
+    drawn: dict[str, Path] = {}
+    shown: dict[str, xr.DataArray] = {}
 
-    found = measure(scene, ranks, profile, tell)
-    dataset.write(found, place)
-    written = {"accuracy": place}
-    for name, draw in accuracy_figures.FIGURES.items():
-        written[name] = style.save(draw(found), directory / f"{name}.png")
-    return found, written
+    def draw(content: xr.Dataset) -> None:
+        """Figures of what is there, and was not when they were drawn."""
+        for name, figure in accuracy_figures.FIGURES.items():
+            found = content.get(accuracy_figures.MAIN[name])
+            if found is not None and not (name in shown and found.identical(shown[name])):
+                drawn[name] = style.save(figure(content), place.output / f"{name}.png")
+                shown[name] = found
+
+    with Session(place, key, ranks, options) as session:
+        if session.has_all([FILE]):
+            content = dataset.read(place.output / FILE, "accuracy")
+        else:
+            session.describe(scene)
+            store = session.opened()
+            content = measure(scene, ranks, profile, tell, store, draw)
+            content.attrs.update(session.attributes)
+            dataset.write(content, place.output / FILE)
+            shown.clear()  # all say now what they were made of
+        draw(content)
+        session.close()
+    return content, {"accuracy": place.output / FILE, **drawn}

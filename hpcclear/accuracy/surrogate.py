@@ -43,15 +43,33 @@ def region_of(scene: Scene, case: str) -> Box:
     return box(scene, study.optimisation, study.case(case).random)
 
 
-def measure(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> Surrogates:
-    """Fit both surrogates to samples of each size and compare them with fresh simulations."""
+def designs_of(scene: Scene, case: str, profile: Profile, rng: np.random.Generator) -> list[Array]:
+    """Designs of every training sample, then of the test, in sampling coordinates, shape (size, d) each."""
     region = region_of(scene, case)
-    sizes = [*profile.training, profile.tests]
-    rng = generator(scene.required_study.seed, "accuracy", "surrogate")
-    unit = [unit_lhs(size, len(region.names), rng) for size in sizes]
-    coordinates = [region.lower + u * (region.upper - region.lower) for u in unit]
-    values, sample_seconds = simulated(scene, region, np.concatenate(coordinates), ranks)
-    parts = np.split(values, np.cumsum(sizes)[:-1])
+    unit = [unit_lhs(size, len(region.names), rng) for size in (*profile.training, profile.tests)]
+    return [region.lower + u * (region.upper - region.lower) for u in unit]
+
+
+def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
+    """The objective at all designs, one after the other, shape (n,), and core-seconds of one of them."""
+    coordinates = designs_of(scene, case, profile, _generator(scene))
+    return simulated(scene, region_of(scene, case), np.concatenate(coordinates), ranks)
+
+
+def _generator(scene: Scene) -> np.random.Generator:
+    return generator(scene.required_study.seed, "accuracy", "surrogate")
+
+
+def measure(
+    scene: Scene, case: str, profile: Profile, values: Array, sample_seconds: float
+) -> Surrogates:
+    """Fit both surrogates to samples of each size and compare them with fresh simulations.
+
+    `values`, shape (n,), and `sample_seconds` are those of `simulate`.
+    """
+    region, rng = region_of(scene, case), _generator(scene)
+    coordinates = designs_of(scene, case, profile, rng)
+    parts = np.split(values, np.cumsum([len(one) for one in coordinates])[:-1])
     bounds = np.column_stack([region.lower, region.upper])
     names = [coordinate(scene.required_study.variable(name)) for name in region.names]
     shape = (len(SURROGATES), len(profile.training))

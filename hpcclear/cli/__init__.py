@@ -366,8 +366,19 @@ def run(
 @click.option(
     "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
 )
-def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) -> int:
-    """Show what accuracy costs in time: integration, averaging, surrogates, Monte Carlo, ranks.
+@_FRESH
+@_LIMIT
+def accuracy(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    quick: bool,
+    fresh: bool,
+    time_limit: float | None,
+) -> int:
+    """Show what accuracy costs in time: tolerance and revolutions, integration, averaging, surrogates, Monte Carlo, ranks.
+
+    Each figure is written when its panel is done, and what is done is kept: the same command goes on from there.
 
     Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
     """
@@ -376,14 +387,16 @@ def accuracy(file: Path, overrides: tuple[str, ...], output: Path, quick: bool) 
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.accuracy import describe
+        from hpcclear.ensemble.session import Options
 
         def tell(text: str) -> None:
             click.echo(f"accuracy: {text}", err=True)
 
         profile = PROFILES["quick" if quick else "full"]
-        describe(*run_accuracy(_scene(file, overrides), _place(output), ranks, profile, tell))
+        scene, place = _scene(file, overrides), _place(output)
+        describe(*run_accuracy(scene, place, ranks, profile, tell, Options(fresh=fresh)))
 
-    return _on_ranks(program)
+    return _on_ranks(program, time_limit)
 
 
 @cli.command(short_help="Say what a run will cost.")

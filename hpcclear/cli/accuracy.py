@@ -7,8 +7,10 @@ import xarray as xr
 from rich import box
 from rich.table import Table
 
+from hpcclear.accuracy import spending
 from hpcclear.accuracy.integration import MARGIN
 from hpcclear.cli.printing import console, table
+from hpcclear.report.figures.accuracy import AIM
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
@@ -16,6 +18,8 @@ TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     """Print every panel as a table, the cheapest settings, and where the files are."""
     out = console()
+    out.print(_spending(found))
+    out.print(table("Cheapest way to a standard error of f, steady mean", _cheapest(found)))
     out.print(_integration(found))
     out.print(table("Cheapest way to an error of f, one revolution", advice(found)))
     out.print(table("Averaging", _averaging(found)))
@@ -25,6 +29,8 @@ def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     out.print(f"{found.attrs['versions']}\n{found.attrs['processor']}; {found.attrs['repeats']}")
     for what, path in files.items():
         out.print(f"{what:14} {path}", soft_wrap=True)
+    out.print(f"motion         {found.attrs['motion']}", soft_wrap=True)
+    out.print(f"result         {result(found)}", soft_wrap=True)
 
 
 def _integration(found: xr.Dataset) -> Table:
@@ -43,6 +49,47 @@ def _integration(found: xr.Dataset) -> Table:
                 f"{1e3 * float(row['seconds'][k]):.3g}",
             )
     return made
+
+
+def _spending(found: xr.Dataset) -> Table:
+    """A row a tolerance."""
+    made = _grid("A steady mean: what a tolerance is off by, and its price")
+    for name in ("rtol", "bias", "+-", "variance", "ms", "error/formula"):
+        made.add_column(name, no_wrap=True, justify="right")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        holds = found["spent_error"].to_numpy() / found["spent_model"].to_numpy()
+    for k, rtol in enumerate(found["tolerance"].to_numpy()):
+        known = holds[k][np.isfinite(holds[k])]
+        made.add_row(
+            f"{rtol:.0e}",
+            f"{float(found['tolerance_bias'][k]):+.1e}",
+            f"{2.0 * float(found['tolerance_bias_error'][k]):.0e}",
+            f"{float(found['turn_variance'][k]):.1e}",
+            f"{1e3 * float(found['tolerance_seconds'][k]):.3g}",
+            f"{known.min():.2f} to {known.max():.2f}" if known.size else "",
+        )
+    return made
+
+
+def _cheapest(found: xr.Dataset) -> list[tuple[str, str]]:
+    wait = f"{spending.COPIES} copies that wait {float(found['spin_up']):.0f} revolutions each"
+    rows = [(f"{aim:.1%}", cheapest(found, float(aim))) for aim in found["aim"].to_numpy()]
+    return [*rows, ("price", f"of the revolutions averaged, and of {wait}")]
+
+
+def cheapest(found: xr.Dataset, aim: float) -> str:
+    """Tolerance, revolutions and core time that reach a relative standard error at the least cost."""
+    here = found.sel(aim=aim, method="nearest")
+    seconds = float(here["cheapest_seconds"])
+    if not np.isfinite(seconds):
+        return "not resolved by so many revolutions"
+    spent = int(here["cheapest_revolutions"])
+    return f"rtol {float(here['cheapest_tolerance']):.0e}, {spent} revolutions, {seconds:.2g} s"
+
+
+def result(found: xr.Dataset) -> str:
+    """What it comes to, in one line."""
+    return f"f to a standard error of {AIM:.0%} at the least cost: {cheapest(found, AIM)} of a core"
 
 
 def _grid(title: str) -> Table:

@@ -40,6 +40,8 @@ def dataset(
     units: Mapping[str, str] | None = None,
     objective: Objective = MEAN_GAP,
     words: Mapping[str, str] | None = None,
+    *,
+    whole: bool = True,
 ) -> xr.Dataset:
     """A dataset of one kind of result file, with every attribute the table knows.
 
@@ -61,6 +63,8 @@ def dataset(
         global attribute ``objective`` too where it is not the mean gap.
     words : mapping of str to str, optional
         Long names of design variables: what they drive, whatever they are called.
+    whole : bool
+        Whether all that is required must be there: what is drawn on the way may lack some, a file may not.
 
     Returns
     -------
@@ -74,15 +78,14 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    if set(coords) != set(table.coords):
+    if set(coords) != set(table.coords) and (whole or not set(coords) < set(table.coords)):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
     missing = table.required - set(data)
-    if missing:
+    if whole and missing:
         raise ValueError(f"{kind} lacks {sorted(missing)}")
-    sizes = {name: np.shape(coords[name])[0] for name in table.coords}
-    variables = {
-        name: _variable(name, row, coords[name], sizes) for name, row in table.coords.items()
-    }
+    there = {name: row for name, row in table.coords.items() if name in coords}
+    sizes = {name: np.shape(coords[name])[0] for name in there}
+    variables = {name: _variable(name, row, coords[name], sizes) for name, row in there.items()}
     for name, values in data.items():
         if name in table.data:
             variables[name] = _variable(name, table.data[name].of(objective), values, sizes)

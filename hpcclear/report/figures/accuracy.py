@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 MARGIN = 100.0
 """Errors count as resolved from this many times the reference's own error on."""
 
+AIM = 0.01
+"""Relative standard error whose cheapest tolerance is marked."""
+
 _WORDS = {
     "slider_position": "slider position",
     "slider_velocity": "slider velocity",
@@ -250,7 +253,57 @@ def parallel_figure(found: xr.Dataset) -> "Figure":
     return figure
 
 
+@style.drawn
+def spending_figure(found: xr.Dataset) -> "Figure":
+    """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
+    figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
+    top, bottom = axes[:, 0]
+    tolerance, seconds = found["tolerance"].to_numpy(), found["spent_seconds"].to_numpy()
+    model = np.where(found["spent_model"] > 0.0, found["spent_model"], np.nan)
+    best = float(found["cheapest_tolerance"].sel(aim=AIM, method="nearest"))
+    for k, rtol in enumerate(tolerance):
+        look = k % len(style.CYCLE)
+        if rtol == best:
+            top.loglog(seconds[k], model[k], color="#cccccc", lw=5.0, solid_capstyle="round")
+        top.loglog(seconds[k], model[k], color=style.CYCLE[look], ls=style.DASHES[look], lw=0.8)
+        top.plot(
+            seconds[k], found["spent_error"].to_numpy()[k], ls="none", marker=style.MARKERS[look],
+            ms=2.8, color=style.CYCLE[look],
+        )  # fmt: skip
+        top.plot(
+            [], [], color=style.CYCLE[look], ls=style.DASHES[look], marker=style.MARKERS[look],
+            ms=2.8, label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""),
+        )  # fmt: skip
+    top.plot(
+        found["cheapest_seconds"], found["aim"], ls="none", marker="*", ms=6.0, color="black",
+        mfc="white", label="cheapest to an error",
+    )  # fmt: skip
+    top.set_xlabel("core time, spin-up included (s)")
+    top.set_ylabel("relative error of $f$ (–)")
+    bias, doubt = (found[name].to_numpy() for name in ("tolerance_bias", "tolerance_bias_error"))
+    bottom.errorbar(
+        tolerance, np.abs(bias), 2.0 * doubt, ls="none", marker="o", ms=2.8, elinewidth=0.6,
+        color=style.CYCLE[0],
+    )  # fmt: skip
+    bottom.set_xscale("log")
+    bottom.set_yscale("log")
+    bottom.invert_xaxis()
+    bottom.set_xlabel("relative tolerance (–)")
+    bottom.set_ylabel("bias of $f$ (–)")
+    style.settle(axes)
+    handles, names = top.get_legend_handles_labels()
+    figure.legend(handles, names, title="relative tolerance", loc="outside upper center", ncols=2)
+    _foot(
+        figure,
+        found,
+        f"Marks: measured; lines: bias and variance over revolutions; grey: cheapest to {AIM:.0%}.",
+        f"{found.attrs.get('motion', '')}.",
+    )
+    return figure
+
+
 FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
+    "spending": spending_figure,
     "integration": integration_figure,
     "averaging": averaging_figure,
     "surrogate": surrogate_figure,
@@ -258,3 +311,13 @@ FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
     "parallel": parallel_figure,
 }
 """The figures of a dataset, by the name of their file."""
+
+MAIN = {
+    "spending": "spent_error",
+    "integration": "error",
+    "averaging": "averaging_error",
+    "surrogate": "r2",
+    "random_inputs": "moment_error",
+    "parallel": "strong_seconds",
+}
+"""The variable that each of them shows: it can be drawn as soon as that is there."""

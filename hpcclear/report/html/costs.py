@@ -18,7 +18,7 @@ def accuracy(content: Content) -> list[object] | None:
     cheapest = Table(
         header, _cheapest(found), "The cheapest way to an error of f over one revolution"
     )
-    rows = [*_averaging(found), *_surrogates(found), *_moments(found)]
+    rows = [*_steady(found), *_averaging(found), *_surrogates(found), *_moments(found)]
     others = Table(
         ["what", "relative error", "cost"], rows, "Errors of what comes after, and their price"
     )
@@ -58,6 +58,17 @@ def _cheapest(found: xr.Dataset) -> list[list[object]]:
         rows.append(
             [f"{target:.0e}", name, Number(f"{setting:.0e}"), Number(f"{1e3 * price[k, rung]:.3g}")]
         )
+    return rows
+
+
+def _steady(found: xr.Dataset) -> list[list[object]]:
+    rows: list[list[object]] = []
+    for aim in found["aim"].to_numpy():
+        one = found.sel(aim=aim)
+        if np.isfinite(float(one["cheapest_seconds"])):
+            spent, rtol = int(one["cheapest_revolutions"]), float(one["cheapest_tolerance"])
+            words = f"steady mean over {spent} revolutions after a spin-up, tolerance {rtol:.0e}"
+            rows.append([words, *_cells(float(aim), float(one["cheapest_seconds"]))])
     return rows
 
 

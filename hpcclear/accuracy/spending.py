@@ -1,0 +1,236 @@
+"""Error of a steady mean against time, with a tolerance and revolutions as the two ways to spend.
+
+A mean over N revolutions at a tolerance is off by error^2 = bias(rtol)^2 + variance / N: the first buys a tighter tolerance
+off, the second revolutions (Oliver et al. 2014, doi:10.1063/1.4866813). It costs (N + spin-up) revolutions of that
+tolerance, which makes of every error a cheapest pair (Frontin and Darmofal 2022, arXiv:2210.07939). Kicked copies run at
+every tolerance of a ladder; their means, cut short, are measured against the mean of all that agree, and the formula
+against that.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcclear.accuracy.averaging import doubling
+from hpcclear.accuracy.methods import one_turn
+from hpcclear.base.arrays import Array, Integers
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.revolutions import objective
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady import judging
+from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.steady.procedure import POOLED
+from hpcclear.dynamics.views import Start
+from hpcclear.scene import Scene
+
+TOLERANCES = tuple(10.0**-k for k in range(3, 9))
+COPIES = 32
+"""At each tolerance: as many as lanes, each with a spin-up of its own."""
+
+STRETCH = 10
+"""Revolutions at a time."""
+
+FIRST = 8
+"""Stretches of all copies after which there is something to show; they are doubled from there."""
+
+AIMS = (0.1, 0.03, 0.01, 0.003, 0.001)
+"""Relative standard errors whose cheapest price is told."""
+
+
+@dataclass(frozen=True)
+class Spending:
+    """The panel; relative errors are root mean squares, seconds those of one core in full lanes.
+
+    Attributes
+    ----------
+    tolerance : ndarray, shape (r,)
+    spent : ndarray of int, shape (n,)
+        Revolutions averaged, over all copies.
+    error, model : ndarray, shape (r, n)
+        Measured over disjoint means of so many revolutions, NaN where there are fewer than four; and by the formula.
+    bias, bias_error : ndarray, shape (r,)
+        Of the mean at each tolerance against the mean of the tightest that agree, with its standard error; NaN where it is
+        that mean.
+    variance : ndarray, shape (r,)
+        Of the mean of one revolution among many, relative.
+    spin_up : float
+        Revolutions that each copy leaves out: the motion's, whatever the tolerance.
+    turn_seconds : ndarray, shape (r,)
+        Of a revolution.
+    revolutions : int
+        Of all copies at all tolerances.
+    """
+
+    tolerance: Array
+    spent: Integers
+    error: Array
+    model: Array
+    bias: Array
+    bias_error: Array
+    variance: Array
+    spin_up: float
+    turn_seconds: Array
+    revolutions: int
+
+    @property
+    def seconds(self) -> Array:
+        """What a mean costs, its spin-up included, shape (r, n)."""
+        return self.turn_seconds[:, None] * (self.spent[None, :] + COPIES * self.spin_up)
+
+    def cheapest(self, aim: float) -> tuple[float, float, float]:
+        """Tolerance, revolutions and seconds that reach a standard error at the least cost by the formula.
+
+        NaN where no tolerance is known to be off by less than the aim.
+        """
+        bias = _known_bias(self.bias, self.bias_error)
+        doubtful = np.nan_to_num(np.abs(self.bias)) + 2.0 * np.nan_to_num(self.bias_error) > aim
+        left = np.where((bias < aim) & ~doubtful, aim**2 - bias**2, np.nan)
+        spent = np.maximum(self.variance / left, 1.0)
+        price = self.turn_seconds * (spent + COPIES * self.spin_up)
+        if np.isnan(price).all():
+            return np.nan, np.nan, np.nan
+        best = int(np.nanargmin(price))
+        return float(self.tolerance[best]), float(np.ceil(spent[best])), float(price[best])
+
+
+@dataclass(frozen=True)
+class Run:
+    """Copies at every tolerance, and what they did so far.
+
+    Attributes
+    ----------
+    gaps : ndarray, shape (stretches, r, copies, 2)
+    seconds : ndarray, shape (r,)
+        Processor time so far.
+    start : ndarray, shape (r, copies, Start.size)
+        Where they go on from.
+    """
+
+    gaps: Array
+    seconds: Array
+    start: Array
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Run":
+        """Nothing simulated yet: every copy of every tolerance has a kick of its own."""
+        here = one_turn(scene)
+        first, scale = start_states(here, parameters(here)), scales(here)
+        starts = [
+            kicked(first, scale, range(1 + k * COPIES, 1 + (k + 1) * COPIES)).rows
+            for k in range(len(TOLERANCES))
+        ]
+        nothing = np.empty((0, len(TOLERANCES), COPIES, 2))
+        return cls(nothing, np.zeros(len(TOLERANCES)), np.stack(starts))
+
+
+def measure(
+    scene: Scene, run: Run, stretches: int, check: Callable[[], object] = lambda: None
+) -> Iterator[Run]:
+    """Go on until there are so many stretches of every copy; yields at every doubling.
+
+    `check` is called between stretches, to raise what ends it. A copy that fails is NaN from there.
+    """
+    here = one_turn(scene)
+    par = np.repeat(parameters(here), COPIES, axis=0)
+    lanes = [_lanes(here, rtol) for rtol in TOLERANCES]
+    while len(run.gaps) < stretches:
+        until = min(max(FIRST, 2 * len(run.gaps)), stretches)
+        gaps, seconds, start = list(run.gaps), run.seconds.copy(), run.start.copy()
+        while len(gaps) < until:
+            gaps.append(np.empty(run.gaps.shape[1:]))
+            for k, one in enumerate(lanes):
+                check()
+                began = time.process_time()
+                outcome = one.run(par, Start(start[k]))
+                seconds[k] += time.process_time() - began
+                gaps[-1][k] = np.where((outcome.status == 0)[:, None], outcome.mean_gap, np.nan)
+                start[k] = outcome.end().rows
+        run = Run(np.stack(gaps), seconds, start)
+        yield run
+
+
+def _lanes(scene: Scene, rtol: float) -> Lanes:
+    changes = {"rtol": rtol, "atol": None, "averaged_revolutions": STRETCH}
+    lanes = Lanes(
+        problem_of(scene.with_({f"numerics.{k}": v for k, v in changes.items()})), DEFAULT_LANES
+    )
+    lanes.step(1)  # without samples it only compiles
+    return lanes
+
+
+def analyse(run: Run) -> Spending:
+    """Biases, variances and errors of what was simulated so far; copies that failed are left out."""
+    kept = [one[:, np.isfinite(one).all(axis=(0, 2))] for one in np.moveaxis(run.gaps, 1, 0)]
+    spin_up = int(np.median([_spin_up(gaps) for gaps in kept]))
+    kept = [gaps[spin_up:] for gaps in kept]
+    means = [objective(gaps.mean(axis=0)) for gaps in kept]  # (copies,) each
+    mean, square = (
+        np.array([function(one) for one in means]) for function in (np.mean, _square_error)
+    )
+    truth, pool = _truth(mean, square)
+    share = np.zeros(len(mean))
+    share[pool:] = 1.0 / (len(mean) - pool)
+    of_truth = float((share**2 * square).sum())
+    bias_error = np.sqrt(np.maximum(square * (1.0 - 2.0 * share) + of_truth, 0.0)) / truth
+    alone = share == 1.0
+    bias = np.where(alone, np.nan, mean / truth - 1.0)
+    bias_error = np.where(alone, np.nan, bias_error)
+    turns = np.array([STRETCH * gaps.shape[0] * gaps.shape[1] for gaps in kept])
+    variance = square * turns / truth**2
+    spent = doubling(int(turns.min()) // (4 * STRETCH), start=1) * STRETCH
+    error = np.array([[_error(gaps, int(n) // STRETCH, truth) for n in spent] for gaps in kept])
+    model = np.sqrt(_known_bias(bias, bias_error)[:, None] ** 2 + variance[:, None] / spent)
+    done = STRETCH * COPIES * len(run.gaps)
+    return Spending(
+        np.array(TOLERANCES), spent, error, model, bias, bias_error, variance,
+        float(STRETCH * spin_up), run.seconds / done, done * len(TOLERANCES),
+    )  # fmt: skip
+
+
+def _spin_up(gaps: Array) -> int:
+    """Stretches (stretches, copies, 2) to leave out: until copies have parted and their mean has settled, half at most."""
+    if gaps.shape[1] < 3:
+        return 0
+    y = judging.projected(gaps)
+    parted = min(judging.parted(y.var(axis=1, ddof=1)), len(y) // 2)
+    return max(judging.spin_up(y.mean(axis=1)), parted, 1)
+
+
+def _square_error(values: Array) -> float:
+    """Of the mean of independent values (n,)."""
+    return float(np.var(values, ddof=1) / len(values)) if len(values) > 2 else np.nan
+
+
+def _truth(mean: Array, square: Array) -> tuple[float, int]:
+    """Mean of the tightest tolerances that agree, and the first of them."""
+    pool = len(mean) - 1
+    while pool > 0:
+        inside = mean[pool:]
+        doubt = np.sqrt(square[pool - 1] + square[pool:].mean() / len(inside))
+        if not abs(mean[pool - 1] - inside.mean()) <= POOLED * doubt:
+            break
+        pool -= 1
+    return float(mean[pool:].mean()), pool
+
+
+def _known_bias(bias: Array, error: Array) -> Array:
+    """Its size without what chance adds to it."""
+    return np.sqrt(np.maximum(np.nan_to_num(bias) ** 2 - np.nan_to_num(error) ** 2, 0.0))
+
+
+def _error(gaps: Array, stretches: int, truth: float) -> float:
+    """Relative error of means of so many stretches, from gaps (stretches, copies, 2): of one copy, or of several at once."""
+    length, copies = gaps.shape[:2]
+    together = -(-stretches // length)  # copies in a mean
+    long = stretches // together
+    groups, pieces = copies // together, length // long
+    if groups * pieces < 4:
+        return np.nan
+    used = gaps[: pieces * long, : groups * together]
+    parts = used.reshape(pieces, long, groups, together, 2).mean(axis=(1, 3))
+    return float(np.sqrt(np.mean((objective(parts) / truth - 1.0) ** 2)))
