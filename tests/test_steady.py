@@ -80,6 +80,31 @@ def test_a_common_drift_shows_though_copies_differ_for_good():
     assert judging.approach(10.0 + places + 1e-3 * rng.standard_normal((16, 32))) == (0.0, 0.0)
 
 
+def test_a_drift_is_followed_to_its_end_and_one_that_does_not_slow_down_has_none():
+    rng = np.random.default_rng(4)
+    k = np.arange(40)[:, None]
+    noise = 1e-4 * rng.standard_normal((40, 32))
+    series = 2.0 + 0.5 * np.exp(-k / 12.0) + noise
+    _, settling = judging.approach(series)
+    assert settling == pytest.approx(float(series.mean()) - 2.0, rel=0.05)
+    assert judging.approach(2.0 + 1e-2 * k + noise) == (pytest.approx(0.1, rel=0.05), np.inf)
+
+
+def test_the_speed_of_a_free_crank_shows_what_its_gaps_hide():
+    k = np.arange(24)[:, None]
+    speeds = 100.0 * (1.0 - 0.3 * np.exp(-k / 60.0)) * np.ones(2)
+    late = 100.0 / speeds[12:].mean() - 1.0
+    assert judging.speed_settling(speeds, 1e-3) == pytest.approx(late, rel=0.1)
+    assert judging.speed_settling(100.0 + 0.1 * k * np.ones(2), 1e-3) == np.inf
+    assert judging.speed_settling(100.0 + 1e-7 * k * np.ones(2), 1e-2) == 0.0
+
+
+def test_noise_alone_is_hardly_ever_cut():
+    rng = np.random.default_rng(5)
+    cuts = [judging.spin_up(rng.standard_normal(12)) for _ in range(200)]
+    assert np.mean(cuts) < 1.2  # the least error itself cuts 1.3
+
+
 def test_the_projection_has_the_objective_for_its_mean():
     gaps = np.random.default_rng(3).uniform(0.5, 1.5, (5, 8, 2))
     mean = gaps.reshape(-1, 2).mean(axis=0)

@@ -17,6 +17,7 @@ from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady import procedure
 from hpcclear.dynamics.steady.copies import kicked, scales, separation
 from hpcclear.ensemble.api import evaluate
 from hpcclear.scene import Scene, load_scene
@@ -99,6 +100,22 @@ def test_a_motion_that_slows_down_has_no_steady_mean():
     found = record(SLOWING, 1e-3)
     assert found["regime"] in (Regime.UNSTEADY, Regime.SETTLING)
     assert found["flags"] & Flag.TARGET_MISSED
+
+
+def test_a_chaotic_motion_whose_speed_still_moves_is_not_called_met():
+    """The crank gathers speed for thousands of revolutions, by less in a look than chaos scatters."""
+    drive = {"kind": "torque", "torque": 0.5, "initial_speed": 60.0}
+    found = record(CHAOTIC | {"drive": drive, "mechanism.crank.inertia": 0.05}, 1e-2)
+    assert found["regime"] in (Regime.UNSTEADY, Regime.SETTLING)
+    assert found["flags"] & Flag.TARGET_MISSED
+
+
+def test_a_looser_tolerance_that_is_off_is_given_up_and_the_stricter_kept(monkeypatch):
+    monkeypatch.setattr(procedure, "LOOSEST", 1e-3)  # where this motion is off by 0.3 %
+    found = record(CHAOTIC, 5e-4, target_revolutions=60_000)
+    assert found["steady_rtol"] <= 1.01e-5
+    mean, error = truth(True)
+    assert abs(found["objective"] - mean) <= found["objective_limit"] + 3.0 * error
 
 
 def test_neither_lanes_nor_company_change_a_bit():

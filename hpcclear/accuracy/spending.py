@@ -24,7 +24,7 @@ from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import kicked, scales
-from hpcclear.dynamics.steady.procedure import POOLED
+from hpcclear.dynamics.steady.ensemble import POOLED
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 

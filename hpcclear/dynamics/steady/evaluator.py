@@ -13,7 +13,8 @@ from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
-from hpcclear.dynamics.steady.procedure import Mean, Sample, Stretch, steady_mean
+from hpcclear.dynamics.steady.effort import Mean, Sample, Stretch
+from hpcclear.dynamics.steady.procedure import steady_mean
 from hpcclear.dynamics.views import Outcome, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
@@ -98,6 +99,7 @@ class SteadyEvaluator:
         self._asks: dict[int, _Ask] = {}
         contact = scene.effects.contact
         self._latched = contact is not None and contact.latched
+        self._free = scene.drive.kind == "torque"
         self._responses = bool(
             self._lanes_of(1e-4, 1).problem.effects.responses
         )  # refuses what cannot be simulated
@@ -127,7 +129,9 @@ class SteadyEvaluator:
         start = start_states(self.scene, par)
         numbers = np.asarray(index, np.int64).tolist()
         for k, sample in enumerate(numbers):
-            design = Sample(par[k : k + 1], start[k : k + 1], self._scale, self._latched)
+            design = Sample(
+                par[k : k + 1], start[k : k + 1], self._scale, self._latched, self._free
+            )
             self._asks[sample] = _Ask(sample, design.par, self._procedure(design))
         self._queue([self._asks[sample] for sample in numbers])
 

@@ -12,6 +12,12 @@ LEVEL = 0.97
 """Of the limits that are called 95 %: a mean is looked at several times until its limits are narrow enough, and each look is
 one more chance to stop on limits that are too narrow."""
 
+NEARLY = 1.1
+"""Square of a standard error over the least, that is as good."""
+
+SLOWEST = 0.97
+"""Ratio of a geometric approach beyond which nobody knows where it ends."""
+
 DRIFT = 3.5
 """Standard errors of a drift, or of a difference between tolerances, that is no chance."""
 
@@ -64,8 +70,7 @@ def windows(gaps: Array, tolerance: float) -> Windows:
     quarters = [gaps[len(gaps) - (k + 1) * length : len(gaps) - k * length] for k in range(4)]
     means = np.stack([quarter.mean(axis=0) for quarter in quarters[::-1]])  # (4, copies, 2)
     steps = np.abs(np.diff(objective(means), axis=0)).max(axis=1)
-    ratio = min(steps[2] / max(steps[1], 1e-300), 0.9)  # of a geometric approach
-    settling = float(steps[2]) * 0.5 * (1.0 + ratio) / (1.0 - ratio)
+    settling = remaining(float(steps[2]), float(steps[1]), believed=0.9)
     before, apart = np.ptp(objective(means[2:]), axis=1)
     late = means[2:].mean(axis=0)
     return Windows(
@@ -77,6 +82,28 @@ def windows(gaps: Array, tolerance: float) -> Windows:
         float(apart),
         bool(apart < 0.3 * before),
     )
+
+
+def remaining(moved: float, before: float, believed: float = np.inf) -> float:
+    """How far an average of two quarters still moves that moved so far over the latest one, and over the one before.
+
+    The ratio of a geometric approach is taken for `believed` where it is more: such movements scatter. Else what moves on
+    nearly as before (`SLOWEST`) has no end: infinite.
+    """
+    ratio = min(moved / max(before, 1e-300), believed)
+    return moved * 0.5 * (1.0 + ratio) / (1.0 - ratio) if ratio <= SLOWEST else np.inf
+
+
+def speed_settling(speeds: Array, tolerance: float) -> float:
+    """How far the mean speed of copies of a free crank still moves, relative, from speeds (n, copies), n at least 4.
+
+    Movements below a thousandth of the tolerance are none.
+    """
+    quarters = np.stack([part.mean() for part in np.array_split(speeds, 4)])
+    steps = np.abs(np.diff(quarters)) / abs(quarters[-1])
+    if steps[2] <= 1e-3 * tolerance:
+        return 0.0
+    return remaining(float(steps[2]), float(steps[1]))
 
 
 def student(values: Array) -> tuple[float, float, float]:
@@ -98,11 +125,12 @@ def projected(gaps: Array) -> Array:
 def spin_up(series: Array) -> int:
     """Values at the start of a series (n,) to leave out, at most half of them: those that widen the limits of its mean.
 
-    MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601).
+    MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
+    first that makes it nearly so, since in noise the least is anywhere.
     """
     n = len(series)
-    errors = [np.var(series[d:]) / (n - d) for d in range(n // 2 + 1)]
-    return int(np.argmin(errors))
+    errors = np.array([np.var(series[d:]) / (n - d) for d in range(n // 2 + 1)])
+    return int(np.argmax(errors <= NEARLY * errors.min()))
 
 
 def parted(between: Array) -> int:
@@ -112,15 +140,18 @@ def parted(between: Array) -> int:
 
 
 def approach(series: Array) -> tuple[float, float]:
-    """How far the mean of copies still moves, from series (n, copies), n at least 4: over the latest quarter, and in the end.
+    """How far copies moved over the latest quarter, and how far from their mean they end: series (n, copies), n at least 3.
 
     Each copy is compared with itself, so that copies which differ for good do not hide a common drift. Both are 0 where the
-    movement is no more than chance.
+    movement is no more than chance; the second is infinite where it does not slow down.
     """
-    quarters = np.stack([part.mean(axis=0) for part in np.array_split(series, 4)])
-    steps = np.diff(quarters, axis=0)  # (3, copies)
-    moved = float(abs(steps[2].mean()))
-    if moved <= DRIFT * steps[2].std(ddof=1) / np.sqrt(series.shape[1]):
+    parts = np.stack([part.mean(axis=0) for part in np.array_split(series, min(4, len(series)))])
+    steps = np.diff(parts, axis=0)  # (2 or 3, copies)
+    last = float(steps[-1].mean())
+    if abs(last) <= DRIFT * steps[-1].std(ddof=1) / np.sqrt(series.shape[1]):
         return 0.0, 0.0
-    ratio = min(moved / max(abs(float(steps[1].mean())), 1e-300), 0.9)  # of a geometric approach
-    return moved, moved * 0.5 * (1.0 + ratio) / (1.0 - ratio)
+    ratio = abs(last) / max(abs(float(steps[-2].mean())), 1e-300)  # of a geometric approach
+    if ratio > SLOWEST:
+        return abs(last), np.inf
+    end = float(parts[-1].mean()) + last * ratio / (1.0 - ratio)
+    return abs(last), abs(end - float(series.mean()))

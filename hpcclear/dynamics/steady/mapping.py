@@ -9,7 +9,7 @@ from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import LENGTH, kicked
-from hpcclear.dynamics.steady.procedure import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 RTOL = 1e-8

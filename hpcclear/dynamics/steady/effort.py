@@ -1,0 +1,155 @@
+"""What the procedures of steady means share: a design, the stretches of it that are asked for, what was found.
+
+Each procedure is a generator: it yields the `Stretch` it wants simulated, is sent its `Outcome`, and returns a `Mean`. So
+that thousands of designs share the lanes, and a design's numbers depend on nothing but the design.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Regime, Status
+from hpcclear.dynamics.steady.copies import kicked
+from hpcclear.dynamics.views import Outcome, Parameters, Start
+
+STRICTER = 10.0
+"""How many times tighter than the others' the tolerances of half of the copies are."""
+
+TIGHTEST = 1e-11
+"""Looser of two tolerances, at least."""
+
+SPEED = 2.0
+"""Relative movement of f, at most, over that of a free crank's mean speed."""
+
+STEADY = 0.8
+"""Change of the average over a doubling of the revolutions, over that of the doubling before, that shows no settling."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A design to simulate: parameters (1, PARAMETERS), one start, scale of kicks (2 n,), kinds of damping and drive."""
+
+    par: Array
+    start: Start
+    scale: Array
+    latched: bool
+    free: bool  # crank: its speed is the last velocity
+
+    def speeds(self, outcomes: "list[Outcome]") -> Array | None:
+        """Of a free crank at the ends of stretches, shape (stretches, copies)."""
+        if not self.free:
+            return None
+        n = len(self.scale) // 2
+        return np.stack([outcome.velocities(n)[..., -1] for outcome in outcomes])
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Revolutions of some copies to simulate, the average over all of them.
+
+    Parameters of a copy hold how many times stricter than `rtol` its own tolerance is.
+    """
+
+    rtol: float
+    revolutions: int
+    par: Array
+    start: Start
+
+
+@dataclass
+class Mean:
+    """What was found.
+
+    Attributes
+    ----------
+    regime : Regime
+    limit : float
+        Half-width of the limits of f, m; NaN where there is no steady mean.
+    outcomes : Outcome, shape (stretches, copies)
+        What the average is made of.
+    stretch : int
+        Revolutions of each of these.
+    rtol : float
+        The looser of the two tolerances, the other one is `STRICTER` times tighter.
+    period : int or None
+    growth : float
+        Of a kick, per revolution: mean of the logarithm, as far as the look told.
+    growth_limit : float
+        Half-width of its limits, if it was measured on purpose.
+    attractors : int or None
+        Kinds of motion found from several starts, if they were looked for.
+    met : bool
+    status : Status
+    revolutions, evaluations : int
+        All that was simulated.
+    """
+
+    regime: Regime
+    limit: float
+    outcomes: Outcome
+    stretch: int
+    rtol: float
+    met: bool
+    period: int | None = None
+    growth: float = np.nan
+    growth_limit: float = np.nan
+    attractors: int | None = None
+    status: Status = Status.OK
+    revolutions: int = 0
+    evaluations: float = 0.0
+
+    @property
+    def tightest(self) -> float:
+        """The tightest tolerance among the copies."""
+        return self.rtol / STRICTER if np.isnan(self.growth_limit) else self.rtol
+
+    @property
+    def gaps(self) -> Array:
+        """Mean gaps, m, shape (2,)."""
+        return self.outcomes.mean_gap.mean(axis=(0, 1))
+
+
+@dataclass
+class Effort:
+    """What was simulated so far, and how a stretch of it is asked for."""
+
+    sample: Sample
+    budget: int
+    revolutions: int = 0
+    evaluations: float = 0.0
+    failed: Status | None = None
+    kicks: int = 0
+
+    def more_starts(self, count: int) -> Start:
+        """Starts of so many copies, each with a kick that none had before."""
+        numbers = range(self.kicks, self.kicks + count)
+        self.kicks += count
+        return kicked(self.sample.start, self.sample.scale, numbers)
+
+    def run(
+        self, rtol: float, revolutions: int, start: Start, strictness: Array
+    ) -> Generator[Stretch, Outcome, Outcome]:
+        """A stretch of each of these copies; how many times stricter each one's tolerance is, shape (copies,)."""
+        par = np.repeat(self.sample.par, len(start), axis=0)
+        Parameters(par).strictness = strictness**2  # squared, as the kernel keeps it
+        outcome = yield Stretch(rtol, revolutions, par, start)
+        self.revolutions += revolutions * len(start)
+        self.evaluations += float(outcome.evaluations.sum())
+        bad = outcome.status[outcome.status != Status.OK]
+        if len(bad):
+            self.failed = Status(int(bad[0]))
+        return outcome
+
+    def mean(self, **found: object) -> Mean:
+        """What was found, with what it took."""
+        return Mean(**found, revolutions=self.revolutions, evaluations=self.evaluations)  # type: ignore[arg-type]
+
+    def failure(self, outcome: Outcome, rtol: float) -> Mean:
+        """Some copy did not reach its end."""
+        assert self.failed is not None
+        return self.mean(
+            regime=Regime.UNJUDGED, limit=np.nan, outcomes=outcome[None], stretch=1, rtol=rtol, met=False,
+            status=self.failed,
+        )  # fmt: skip
