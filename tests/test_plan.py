@@ -68,12 +68,20 @@ def test_what_is_printed_is_the_row_that_was_asked_for(made: Plan, capsys):
 
 
 def test_simulations_of_a_study_are_counted():
-    study = load_scene(JOBS / "robust_slider_crank.toml")
-    count = sum(extent.samples_of(study).values())
-    fewer = sum(extent.samples_of(study.with_({"study.verification.samples": 10})).values())
-    cut = study.study.verification.samples - 10
-    designs = 2 * (4 + study.study.verification.designs + 1) + 4  # printed in the paper's Table 4
-    assert count - fewer == designs * cut
+    def counted(draws: int, rounds: int) -> int:
+        more = [
+            f"study.verification.{k}={n}"
+            for k, n in (("samples", draws), ("infill_rounds", rounds))
+        ]
+        return sum(extent.samples_of(load_scene(JOBS / "robust_slider_crank.toml", more)).values())
+
+    verified = load_scene(JOBS / "robust_slider_crank.toml").study.verification
+    designs = 2 * (4 + verified.designs + 1) + 4  # printed in the paper's Table 4
+    assert counted(10_000, 0) - counted(10, 0) == designs * 9_990
+    rays, swarm = 2 * 6 * 4, 2 * (4 + verified.designs)
+    search = rays + swarm + 2 * 3 * verified.infill_designs
+    beside = 2 * 2 * 10_000  # runners-up
+    assert counted(10_000, 3) - counted(10_000, 0) == search * verified.infill_samples + beside
 
 
 def test_a_measured_plan_orders_the_ladder_and_names_its_settings():

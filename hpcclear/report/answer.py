@@ -134,12 +134,21 @@ def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
 
 
 def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Designs whose limits of mean and of deviation both overlap with those of the best."""
+    """Designs that cannot be told apart from the best: as the file says, else those whose limits overlap."""
+    names = [str(name) for name in ours["design"].to_numpy()]
+    own = str(best["design"].item())
+    if "same_as" in ours:
+        first = [
+            str(same) or name for same, name in zip(ours["same_as"].to_numpy(), names, strict=True)
+        ]
+        group = first[names.index(own)]
+        return [
+            name for name, one in zip(names, first, strict=True) if one == group and name != own
+        ]
     if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
         return []
     alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")
-    names = [str(name) for name in ours["design"].to_numpy()[alike]]
-    return [name for name in names if name != str(best["design"].item())]
+    return [name for name, one in zip(names, alike, strict=True) if one and name != own]
 
 
 def _alike(ours: xr.Dataset, best: xr.Dataset) -> str:
@@ -174,7 +183,8 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
 def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     count = int(best["samples"]) if "samples" in best else 0
     level = float(verified.attrs.get("confidence", np.nan))
-    text = f"{count} direct simulations of each design"
+    text = f"{count} direct simulations of it"
+    text += " by scrambled Sobol sequences" if verified.attrs.get("method") == "qmc" else ""
     text += f", limits of {level:.0%}" if np.isfinite(level) else ""
     errors = _surrogate_errors(best)
     if len(errors) == 2:
@@ -196,7 +206,9 @@ def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
         yield "widen the ranges of the variables on a bound if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):
         yield "raise study.samples: the surrogate is off there, and a better design may hide"
-    if _twins(ours, best) and "samples" in best:
+    if _twins(ours, best) and ours.attrs.get("method") == "qmc":
+        yield "a smaller study.verification.accuracy tells designs apart that read the same"
+    elif _twins(ours, best) and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
     yield (
         f"hpcclear report {place}"

@@ -60,6 +60,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "surface_accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "verified": {"flag_values": _NO_YES, "flag_meanings": "not_simulated simulated"},
+    "dominated": {"flag_values": _NO_YES, "flag_meanings": "not_surely dominated"},
 }
 """CF attributes beyond units and long name: what the codes mean."""
 

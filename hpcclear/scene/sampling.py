@@ -1,4 +1,4 @@
-"""Points to simulate: Latin hypercubes, Monte Carlo samples, and a user's own table.
+"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences, and a user's own table.
 
 Every number follows from the study's seed, a purpose ("train", "test", ...) and, for Monte Carlo,
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
@@ -109,6 +109,7 @@ def monte_carlo(
     design: Mapping[str, float] | None = None,
     purpose: str = "train",
     first: int = 0,
+    scrambling: int | None = None,
 ) -> Points:
     """Samples `first` to `first + samples` of the study's random inputs.
 
@@ -127,6 +128,9 @@ def monte_carlo(
         and inputs scatter about the scene.
     purpose, first
         Which stream, and where in it to begin.
+    scrambling : int, optional
+        Samples of the scrambled Sobol sequence of that number, in place of independent ones: each
+        scrambling is one independent estimate. Begin and end at powers of two.
 
     Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
     """
@@ -144,16 +148,25 @@ def monte_carlo(
     names = (*free, *(name for name in chosen if name not in free))
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
+    moving = [name for name in names if name in chosen or fixed is None]
+    if scrambling is None:
+        label = f"monte-carlo {purpose}"
+        uniform = [_uniform(study.seed, label, name, first, count) for name in moving]
+    else:
+        rng = generator(study.seed, f"sobol {purpose}", str(scrambling))
+        uniform = list(_sobol(len(moving), rng, first, count).T)
     for column, name in enumerate(names):
-        uniform = _uniform(study.seed, f"monte-carlo {purpose}", name, first, count)
+        if name not in moving:
+            assert fixed is not None
+            values[:, column] = fixed[name]
+            continue
+        place = uniform[moving.index(name)]
         if name in chosen:
             centre = (fixed or {}).get(name, scene.number(paths[column][0]))
-            values[:, column] = _quantile(inputs[name], centre, uniform)
-        elif fixed is not None:
-            values[:, column] = fixed[name]
+            values[:, column] = _quantile(inputs[name], centre, place)
         else:
             lower, upper = study.variable(name).bounds
-            values[:, column] = lower + uniform * (upper - lower)
+            values[:, column] = lower + place * (upper - lower)
     if fixed is None:
         for column, name in enumerate(names):
             if name not in chosen and study.variable(name).ratio is not None:
@@ -195,6 +208,23 @@ def _uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Arra
     return (
         numbers + 2.0**-54
     )  # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
+
+
+SOBOL_BITS = 30
+"""Digits of a point of a Sobol sequence; a sequence has as many points as they can tell apart."""
+
+
+def _sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
+    """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1,
+    shape (count, dimensions)."""
+    from scipy.stats import qmc  # as in `unit_lhs`
+
+    if dimensions == 0:
+        return np.empty((count, 0))
+    sequence = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, rng=rng)
+    if first:
+        sequence.fast_forward(first)
+    return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `_uniform`, off 0
 
 
 def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:

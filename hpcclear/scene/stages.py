@@ -6,6 +6,8 @@ them; names never decide a default, only what a variable drives does.
 
 from typing import Annotated, Literal
 
+from pydantic import model_validator
+
 from hpcclear.scene.fields import Count, Quantity, Table, invalid
 
 Names = tuple[str, ...]
@@ -103,23 +105,47 @@ class Swarm(Table):
     """Samples a design, for "monte-carlo"."""
 
 
+class MomentAccuracy(Table):
+    """Half-widths of confidence limits, relative."""
+
+    mean: Share = 0.002
+    """Of the mean."""
+    deviation: Share = 0.005
+    """Of the deviation."""
+
+
+SCRAMBLINGS = 16
+"""Independent scramblings of the Sobol sequence, each as many simulations: enough to know their spread,
+few enough to be long."""
+
+
 class Verification(Table):
     """Chosen designs through the true dynamics."""
 
-    samples: Annotated[int, Count(2, 10**9)] = 10_000
-    """Direct Monte Carlo samples a design."""
+    method: Literal["qmc", "monte-carlo"] | None = None
+    """What is simulated of a design: "qmc", 16 scramblings of a Sobol sequence over the random inputs, as long as `accuracy`
+    asks for; or "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
+    accuracy: MomentAccuracy = MomentAccuracy()
+    """Half-widths of the limits that "qmc" goes on for, from 512 simulations a design, doubled until they are met."""
+    most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
+    """Simulations of a design at most, for "qmc"."""
+    samples: Annotated[int, Count(2, 10**9)] | None = None
+    """Draws of a design, for "monte-carlo"; 10 000 if it is asked for without a number."""
     designs: Annotated[int, Count(0, 10**5)] = 10
     """Designs of each front, spread along it, beside alpha, beta and the original."""
     confidence: Share = 0.95
     """Level of the confidence limits."""
     tolerance: Share = 0.02
-    """Relative difference of surrogate and true mean above which points are added."""
+    """Relative difference of surrogate and true mean of alpha and beta above which it is said."""
     deviation_tolerance: Share = 0.05
     """The same for the deviation."""
-    infill_rounds: Annotated[int, Count(0, 100)] = 3
-    """Rounds of added points at most."""
-    infill_samples: Annotated[int, Count(1, 10**5)] = 40
-    """Points added a round."""
+    infill_rounds: Annotated[int, Count(0, 100)] = 8
+    """Rounds of further designs at most, beside those of the swarm: they are simulated where they decide the front. 0
+    verifies the swarm's designs alone."""
+    infill_designs: Annotated[int, Count(1, 10**4)] = 12
+    """Designs of a case in each round."""
+    infill_samples: Annotated[int, Count(SCRAMBLINGS * 2, 10**9)] = 256
+    """Simulations of each of these at most, by scrambled Sobol sequences; no more than `samples`, where that is given."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Clearance of all joints in the responses that are compared, m; default those of the scene and the design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2
@@ -130,3 +156,23 @@ class Verification(Table):
     audit_samples: Annotated[int, Count(0, 10**6)] = 1000
     """Direct Monte Carlo samples of each of the paper's designs under each reading of its text; 0
     leaves the comparison out."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Verification":
+        if self.method == "qmc" and self.samples is not None:
+            raise invalid(
+                "how many points of a Sobol sequence are simulated follows from the accuracy",
+                'Leave it out and set accuracy or most_samples, or write method = "monte-carlo"',
+                key="samples",
+                value=self.samples,
+            )
+        return self
+
+    @property
+    def draws(self) -> int | None:
+        """Independent draws of a design; None for scrambled Sobol sequences."""
+        return (
+            None
+            if self.method in (None, "qmc") and self.samples is None
+            else self.samples or 10_000
+        )

@@ -3,11 +3,12 @@
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
 2. Kriging: models of the objective; the swarm searches one of them.
-3. Optimisation: fronts of mean and deviation of every case, several runs each; alpha has the least
-   mean, beta the least deviation.
-4. Verification: these designs back through the true dynamics by direct Monte Carlo. Where the
-   surrogate's mean is off, it gets more points there and the swarm starts again.
-5. Findings: responses of the optimised designs; for the scene of a publication also what it prints
+3. Optimisation: fronts of mean and deviation of every case by the model, several runs each.
+4. Refinement: designs of these fronts and others through the true dynamics, more where the front is
+   decided, until it stands.
+5. Verification: the best of them, on scatter of their own. Alpha has the least mean, beta the least
+   deviation, and each design of the front is surely better than each other in one of the two.
+6. Findings: responses of the optimised designs; for the scene of a publication also what it prints
    and claims, beside ours (`hpcclear.study.paper`).
 
 Root tells this story; every simulation in it goes to all ranks. Each stage is kept on disk when it
@@ -16,7 +17,6 @@ and ends with the same bytes.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +31,16 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study import optimisation, paper, responses, sensitivities, surrogates, verification
-from hpcclear.study.optimisation import Choice
+from hpcclear.study import (
+    optimisation,
+    paper,
+    refinement,
+    responses,
+    sensitivities,
+    surrogates,
+    truth,
+    verification,
+)
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.simulations import Simulations
 from hpcclear.study.stages import Stages
@@ -120,63 +127,27 @@ def _tell_the_story(run: StudyRun) -> None:
     kriging = run.stage("kriging", surrogates.fit_all)
     _write_samples(run)
 
-    found = _search_until_true(run, kriging)
-    surrogates.write(run, found.kriging)
-    designs = [
-        *optimisation.spread(run, found.fronts),
-        *verification.original(run),
-        *paper.printed_designs(run.scene),
-    ]
-    rest = run.stage("verification", verification.simulate, designs, "verification")
-    true = {name: np.concatenate([found.true[name], rest[name]]) for name in rest}
-    designs = [*found.designs, *designs]
-    optimisation.write(run, found.fronts, designs)
-    printed = paper.printed_moments(run.scene, designs)
-    verification.write(run, designs, true, found.model, found.remarks, printed)
+    model = surrogates.models_of(kriging)[-1]
+    surrogates.write(run, kriging)
+    fronts = run.stage("optimisation", optimisation.optimise, model)
+    ends, between = optimisation.extremes(run, fronts), optimisation.spread(run, fronts)
+    optimisation.write(run, fronts, [*ends, *between])
+    finalists, remarks = refinement.search(run, [*ends, *between])
 
-    series = run.stage("responses", responses.simulate_all, designs)
-    responses.write(run, designs)
-    paper.write_findings(run, sensitivity, found.kriging, series)
+    designs = [*ends, *(finalists or between)]
+    designs += [*verification.original(run), *paper.printed_designs(run.scene)]
+    true = run.stage("verification", truth.simulate, designs, "verification")
+    table = verification.named(run, designs, true)
+    true = {name: values[table.rows] for name, values in true.items()}
+    remarks += verification.missed(run, table.choices, true, model)
+    for text in remarks:
+        run.tell(text)
+    printed = paper.printed_moments(run.scene, table.choices)
+    verification.write(run, table, true, model, remarks, printed)
 
-
-@dataclass(frozen=True)
-class _Found:
-    """Outcome of the search: the last models and fronts, alpha and beta with their true moments."""
-
-    kriging: Result
-    fronts: Result
-    designs: list[Choice]
-    true: Result
-    remarks: list[str]
-
-    @property
-    def model(self) -> PiecewiseKriging:
-        """The surrogate the swarm searched."""
-        return surrogates.models_of(self.kriging)[-1]
-
-
-def _search_until_true(run: StudyRun, kriging: Result) -> _Found:
-    """Optimise and verify alpha and beta; add points where the surrogate fails, until it holds."""
-    remarks: list[str] = []
-    round_ = 0
-    while True:
-        model = surrogates.models_of(kriging)[-1]
-        fronts = run.stage(f"optimisation-{round_}", optimisation.optimise, model)
-        designs = optimisation.extremes(run, fronts)
-        stage = f"check-{round_}"
-        true = run.stage(stage, verification.simulate, designs, stage)
-        missed, texts = verification.misses(run, designs, true, model)
-        if missed and round_ == run.study.verification.infill_rounds:
-            texts.append("The surrogate failed there to the end: trust the true values.")
-        for text in texts:
-            run.tell(text)
-        remarks += texts
-        if not missed or round_ == run.study.verification.infill_rounds:
-            return _Found(kriging, fronts, designs, true, remarks)
-        where = verification.infill_points(run, missed, str(round_))
-        stage = f"infill-{round_}"
-        kriging = run.stage(stage, surrogates.grow, kriging, where, stage)
-        round_ += 1
+    series = run.stage("responses", responses.simulate_all, table.choices)
+    responses.write(run, table.choices)
+    paper.write_findings(run, sensitivity, kriging, series)
 
 
 def _write_samples(run: StudyRun) -> None:

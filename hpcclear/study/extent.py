@@ -1,15 +1,17 @@
 """How much a study simulates, from what each of its stages says of itself."""
 
 from hpcclear.scene import Scene
-from hpcclear.study import optimisation, responses, sensitivities, surrogates
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.study import optimisation, refinement, responses, sensitivities, surrogates, truth
 from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
 
 def samples_of(scene: Scene) -> dict[str, int]:
-    """Samples on the ranks by stage, if no surface or model is refused and the surrogate holds at once.
+    """Samples on the ranks by stage, if no surface or model is refused.
 
-    The most there can be then: a short front has fewer designs to verify.
+    The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
+    accuracy verified designs are taken to need twice the simulations that it is first judged by.
 
     Raises
     ------
@@ -19,12 +21,16 @@ def samples_of(scene: Scene) -> dict[str, int]:
     study = scene.required_study
     extremes, spread = optimisation.chosen_in_all(study)
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
-    count = study.verification.samples
+    count = study.verification.draws or 2 * SCRAMBLINGS * truth.first_length(study.verification)
+    if study.verification.infill_rounds:
+        verified += refinement.RUNNERS_UP * len(study.cases)
+    begun, rounds = refinement.simulations(study)
     return {
         "sensitivity": sensitivities.simulations(study),
         "kriging": surrogates.simulations(study),
-        "check": extremes * count,
-        "verification": verified * count,
+        "check": begun,
+        "infill": rounds,
+        "verification": (extremes + verified) * count,
         "readings": readings.simulations(scene)[0],
     }
 

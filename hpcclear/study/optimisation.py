@@ -191,16 +191,20 @@ class Choice:
     Attributes
     ----------
     name, case : str
+        The name is empty until a design has earned one.
     design : dict of str to float
         SI.
     place : (int, int) or None
         Run of the swarm and solution, for one that stands on a front.
+    origin : str
+        "search", or "given": the original, and what a publication prints.
     """
 
     name: str
     case: str
     design: Mapping[str, float]
     place: tuple[int, int] | None = None
+    origin: str = "search"
 
 
 _ENDS = ((-2, "alpha"), (-1, "beta"))
@@ -213,10 +217,10 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Alpha (least mean) and beta (least deviation) of each case.
+    """Designs of least mean and of least deviation of each case, by the surrogate.
 
-    Averaged over the runs, as the paper does it, in sampling coordinates, so that the average keeps
-    the bounds; and the best single ones.
+    Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
+    average keeps the bounds; and the best single ones.
     """
     chosen = []
     for index, case in enumerate(run.study.cases):
@@ -226,7 +230,9 @@ def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
             own = padded[np.arange(len(padded)), best]
             average = own[:, :-2].mean(axis=0)
             chosen.append(
-                Choice(f"{case.name} {letter}", case.name, _design(run, case.name, average))
+                Choice(
+                    f"{case.name} averaged {letter}", case.name, _design(run, case.name, average)
+                )
             )
             winner = int(own[:, column].argmin())
             place = winner, int(best[winner])
@@ -246,11 +252,10 @@ def spread(run: StudyRun, fronts: Result) -> list[Choice]:
         points, places = points[kept], places[kept]
         points_wanted = cut(points[:, -2:], run.study.verification.designs + 2)
         inner = points_wanted[np.argsort(points[points_wanted, -2], kind="stable")][1:-1]
-        for number, row in enumerate(inner):
+        for row in inner:
             number_of_run, solution = (int(index) for index in places[row])
             design = _design(run, case.name, points[row, :-2])
-            name = f"{case.name} front {number + 1}"
-            chosen.append(Choice(name, case.name, design, (number_of_run, solution)))
+            chosen.append(Choice("", case.name, design, (number_of_run, solution)))
     return chosen
 
 

@@ -11,16 +11,16 @@ _WORDS = {
     "sensitivity": "which variables matter",
     "kriging": "models of the objective",
     "optimisation": "the swarm on the model",
-    "check": "its best designs by direct simulation",
-    "infill": "more points where the model is off",
-    "verification": "designs along the fronts by direct simulation",
+    "check": "its designs by direct simulation",
+    "infill": "more designs where the front is decided",
+    "verification": "the best designs by direct simulation",
     "responses": "responses of the original and the best designs",
     "readings": "the printed designs under readings of the text",
 }
 """What each stage does, by its name without the number of a round."""
 
 _SEARCH = ("optimisation", "check", "infill")
-"""Stages that are repeated until the model holds: one of those that are counted."""
+"""Stages that look for the front, the last one as often as it takes: one of those that are counted."""
 
 
 class Stages:
@@ -39,7 +39,7 @@ class Stages:
         if step not in self._steps:
             return
         number = self._steps.index(step) + 1
-        again = f", round {int(round_) + 1}" if round_ else ""
+        again = f", round {int(round_) + 1}" if kind == "infill" else ""
         spent = duration(time.monotonic() - self._began)
         text = f"stage {number} of {len(self._steps)}: {_WORDS[kind]}{again} ({spent} so far)"
         print(text, file=sys.stderr, flush=True)

@@ -1,17 +1,15 @@
-"""Kriging models of the objective: fitted, checked on fresh points, grown, written and read back."""
+"""Kriging models of the objective: fitted, checked on fresh points, written and read back."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
-from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
@@ -60,7 +58,7 @@ def fit_all(run: StudyRun) -> Result:
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
         )
-        result |= _packed(k, model) | _checked(run, k, model, STAGE)
+        result |= _packed(k, model) | _checked(run, k, model)
     return result
 
 
@@ -75,7 +73,7 @@ def _tests(study: Study) -> int:
 
 
 def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
-    """The models in a result of `fit_all` or `grow`, in the order of the study's."""
+    """The models in a result of `fit_all` (arrays of any shape, by name), in the order of the study's."""
     found: list[PiecewiseKriging] = []
     while f"model{len(found)}_names" in result:
         start = f"model{len(found)}_"
@@ -85,57 +83,17 @@ def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
     return found
 
 
-def grow(run: StudyRun, before: Result, coordinates: Array, stage: str) -> Result:
-    """The last model, the optimisation's, with further training points (adaptive infill).
-
-    Parameters
-    ----------
-    before : dict
-        Result of `fit_all` or of an earlier call.
-    coordinates : array, shape (n, d)
-        Where to simulate, inside the model's domain.
-    stage : str
-        Name of the stage, for reports.
-    """
-    models = models_of(before)
-    names, model = run.study.optimisation, models[-1]
-    values = run.simulations.values(names, coordinates, stage)
-    rng = run.rng(stage)
-    leaves = []
-    for leaf in model.leaves:
-        here = ((coordinates >= leaf.lower) & (coordinates <= leaf.upper)).all(axis=1)
-        leaves.append(_refitted(run, leaf, coordinates[here], values[here], rng))
-    k = len(models) - 1
-    grown = PiecewiseKriging(tuple(leaves), model.r2, model.rmae, model.accepted)
-    return {**before, **_packed(k, grown), **_checked(run, k, grown, stage)}
-
-
-def _refitted(
-    run: StudyRun, leaf: Kriging, points: Array, values: Array, rng: np.random.Generator
-) -> Kriging:
-    if len(points) == 0:
-        return leaf
-    return fit_kriging(
-        np.concatenate([leaf.inputs, points]),
-        np.concatenate([leaf.values, values]),
-        np.column_stack([leaf.lower, leaf.upper]),
-        rng=rng,
-        names=leaf.names,
-        restarts=run.study.surrogate.restarts,
-    )
-
-
 def _packed(k: int, model: PiecewiseKriging) -> Result:
     return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
 
 
-def _checked(run: StudyRun, k: int, model: PiecewiseKriging, stage: str) -> Result:
+def _checked(run: StudyRun, k: int, model: PiecewiseKriging) -> Result:
     """Accuracy over the whole domain on fresh points, which decided nothing."""
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
     unit = unit_lhs(_tests(run.study), len(names), rng)
     points = model.lower + unit * (model.upper - model.lower)
-    truth = run.simulations.values(names, points, f"{stage} check")
+    truth = run.simulations.values(names, points, f"{STAGE} check")
     reached = accuracy(truth, model.predict(points))
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
 

@@ -1,23 +1,17 @@
-"""Chosen designs back through the true dynamics: direct Monte Carlo, and what the surrogate missed."""
+"""Verified designs: which of them is alpha, beta and the front, and where the surrogate missed the truth."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.outcome import Flag
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box, to_coordinates
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import monte_carlo
-from hpcclear.statistics.random.moments import sample_moments
+from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study import surrogates
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
-
-_COLUMNS = ("mean", "mean_error", "deviation", "deviation_error", "failed")
 
 ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
@@ -29,56 +23,8 @@ def original(run: StudyRun) -> list[Choice]:
     for case in run.study.cases:
         names = run.study.design_variables(case.name)
         design = {n: run.scene.number(run.study.variable(n).paths[0]) for n in names}
-        found.append(Choice(f"{case.name} original", case.name, design))
+        found.append(Choice(f"{case.name} original", case.name, design, origin="given"))
     return found
-
-
-def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
-    """Monte Carlo samples of a design in all study variables.
-
-    Every design of a case meets the same scatter, so that differences between designs are not
-    noise.
-    """
-    random = run.study.case(choice.case).random
-    points = monte_carlo(
-        run.scene, count, random=random, design=dict(choice.design), purpose=purpose
-    )
-    return run.simulations.filled(points.names, points.values)
-
-
-def simulate(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
-    """True mean and deviation of designs with standard errors, and counts, arrays over the designs.
-
-    Raises
-    ------
-    InputError
-        If all simulations fail.
-    """
-    count = run.study.verification.samples
-    batches = [samples_of(run, choice, count) for choice in choices]
-    points = Points(
-        batches[0].names, np.concatenate([batch.values for batch in batches]), batches[0].paths
-    )
-    records = run.simulations.records(points, stage)
-    values = run.simulations.objective(records)
-    table = np.array([moments(one) for one in values.reshape(len(choices), count)])
-    beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
-    found = {name: table[:, k] for k, name in enumerate(_COLUMNS)}
-    return found | {"beyond_hertz": beyond.reshape(len(choices), count).sum(axis=1)}
-
-
-def moments(values: Array) -> tuple[float, float, float, float, int]:
-    """Mean, deviation (each followed by its standard error) and number of failed samples (NaN).
-
-    All NaN when fewer than four are left.
-    """
-    finite = values[np.isfinite(values)]
-    failed = len(values) - len(finite)
-    if len(finite) < 4:
-        return np.nan, np.nan, np.nan, np.nan, failed
-    found = sample_moments(finite[None])
-    mean, mean_error = float(found.mean[0]), float(found.mean_error[0])
-    return mean, mean_error, float(found.deviation[0]), float(found.deviation_error[0]), failed
 
 
 def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging) -> Array:
@@ -93,22 +39,98 @@ def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging)
     return np.array(found).reshape(-1, 2)
 
 
-def misses(
+def missed(
     run: StudyRun, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
-) -> tuple[list[Choice], list[str]]:
-    """Designs at which the surrogate is further from the truth than the study allows; in words."""
-    settings, missed, texts = run.study.verification, [], []
-    surrogate = predicted(run, choices, model)
-    for k, choice in enumerate(choices):
-        errors = surrogate[k] / [true["mean"][k], true["deviation"][k]] - 1.0
+) -> list[str]:
+    """Where the surrogate of f is further from the truth than the study allows at alpha and beta, in words."""
+    settings, texts = run.study.verification, []
+    rows = [k for k, choice in enumerate(choices) if choice.name in _ends(choice.case)]
+    surrogate = predicted(run, [choices[k] for k in rows], model)
+    for k, guess in zip(rows, surrogate, strict=True):
+        errors = guess / [true["mean"][k], true["deviation"][k]] - 1.0
         good = abs(errors) <= (settings.tolerance, settings.deviation_tolerance)  # False for NaN
         if not good.all():
-            missed.append(choice)
             texts.append(
-                f"At {choice.name} the surrogate's mean is {100 * errors[0]:+.1f} % and its "
-                f"deviation {100 * errors[1]:+.1f} % off the true one."
+                f"At {choices[k].name} the surrogate's mean is {100 * errors[0]:+.1f} % and its "
+                f"deviation {100 * errors[1]:+.1f} % off the true one: trust the true values."
             )
-    return missed, texts
+    return texts
+
+
+def _ends(case: str) -> tuple[str, str]:
+    return f"{case} alpha", f"{case} beta"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Verified designs under their names.
+
+    Attributes
+    ----------
+    choices : list of Choice
+        Alpha, beta and the front of each case, then all others that were verified. An end of the swarm that is
+        also alpha or beta stands there twice.
+    rows : list of int
+        Number of each in what was simulated.
+    same_as : list of str
+        The first design before it that it cannot be told apart from; empty if there is none.
+    dominated : list of bool
+        Whether another design of its case is surely better in mean and deviation.
+    """
+
+    choices: list[Choice]
+    rows: list[int]
+    same_as: list[str]
+    dominated: list[bool]
+
+
+def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
+    """Verified designs under the names that they have earned.
+
+    Alpha has the least mean, beta the least deviation; of those that cannot be told from it at the study's
+    confidence, the best in the other. Each design of the front is surely better than each
+    other in one of the two.
+    """
+    table = Table([], [], [], [])
+    for case in run.study.cases:
+        rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
+        _name_case(run, case.name, rows, choices, true, table)
+    return table
+
+
+def _name_case(
+    run: StudyRun,
+    case: str,
+    rows: Sequence[int],
+    choices: Sequence[Choice],
+    true: Result,
+    table: Table,
+) -> None:
+    values = np.column_stack([true["mean"][rows], true["deviation"][rows]])
+    shifts = np.stack([true["mean_shifts"][rows], true["deviation_shifts"][rows]])
+    everything = Compared(values, shifts, run.study.verification.confidence)
+    ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
+    mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
+    ends = [ours[mine.best(0)], ours[mine.best(1)]] if mine.known.any() else ours[:1] * 2
+    front = mine.front(run.study.verification.designs + 2) if mine.known.any() else []
+    inner = sorted(
+        (ours[k] for k in front if ours[k] not in ends), key=lambda k: float(values[k, 0])
+    )
+    named = [*zip(ends, _ends(case), strict=True)]
+    named += [(k, f"{case} front {number + 1}") for number, k in enumerate(inner)]
+    taken = {k for k, _ in named}
+    left = [k for k in range(len(rows)) if k not in taken or choices[rows[k]].name]
+    unnamed = [k for k in left if not choices[rows[k]].name]
+    named += [
+        (k, choices[rows[k]].name or f"{case} candidate {unnamed.index(k) + 1}") for k in left
+    ]
+    seen: list[tuple[int, str]] = []
+    for k, name in named:
+        table.choices.append(replace(choices[rows[k]], name=name))
+        table.rows.append(rows[k])
+        table.same_as.append(next((label for j, label in seen if everything.one[j, k]), ""))
+        table.dominated.append(bool(everything.beaten[k]))
+        seen.append((k, name))
 
 
 def _on_bounds(run: StudyRun, choice: Choice) -> str:
@@ -125,26 +147,9 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
     return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
 
 
-def infill_points(run: StudyRun, choices: Sequence[Choice], label: str) -> Array:
-    """Where the surrogate needs more points: over the scatter of the designs it missed, (n, d).
-
-    In sampling coordinates of the optimisation's model.
-    """
-    names = run.study.optimisation
-    count = -(-run.study.verification.infill_samples // len(choices))
-    found = []
-    for choice in choices:
-        points = samples_of(run, choice, count, f"infill {label} {choice.name}")
-        values = np.column_stack([points.column(name) for name in names])
-        region = surrogates.domain(run, names)
-        coordinates = to_coordinates(run.scene, names, values)
-        found.append(np.clip(coordinates, region.lower, region.upper))  # round-off at the border
-    return np.concatenate(found)
-
-
 def write(
     run: StudyRun,
-    choices: Sequence[Choice],
+    table: Table,
     true: Result,
     model: PiecewiseKriging,
     remarks: Sequence[str],
@@ -155,9 +160,9 @@ def write(
     Parameters
     ----------
     run : StudyRun
-    choices : sequence of Choice
-    true : dict of arrays, shape (n,)
-        Of `simulate`, over the same designs.
+    table : Table
+    true : dict of arrays, shape (n, ...)
+        Of `hpcclear.study.truth.simulate`, over the same designs.
     model : PiecewiseKriging
         The surrogate that was searched.
     remarks : sequence of str
@@ -165,8 +170,8 @@ def write(
     printed : mapping of str to array, shape (n,)
         ``mean`` and ``deviation`` of the same designs in a publication, to stand beside ours.
     """
-    study, surrogate = run.study, predicted(run, choices, model)
-    z = float(ndtri(0.5 + study.verification.confidence / 2.0))
+    study, choices = run.study, table.choices
+    surrogate = predicted(run, choices, model)
     used = [n for n in study.optimisation if any(n in choice.design for choice in choices)]
     data: dict[str, np.ndarray] = {
         name: np.array([choice.design.get(name, np.nan) for choice in choices]) for name in used
@@ -174,22 +179,26 @@ def write(
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]
-        data[f"{name}_lower"] = true[name] - z * true[f"{name}_error"]
-        data[f"{name}_upper"] = true[name] + z * true[f"{name}_error"]
+        data[f"{name}_lower"] = true[name] - true[f"{name}_reach"]
+        data[f"{name}_upper"] = true[name] + true[f"{name}_reach"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
         if name in printed:
             data[f"{name}_paper"] = printed[name]
-    data["failed"] = true["failed"].astype(np.int64)
-    data["beyond_hertz"] = true["beyond_hertz"]
+    for name in ("percentile", "percentile_lower", "percentile_upper"):
+        data[name] = true[name]
+    for name in ("samples", "failed", "beyond_hertz"):
+        data[name] = true[name].astype(np.int64)
+    data["same_as"] = np.array(table.same_as)
+    data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
     data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])
-    data["samples"] = np.full(len(choices), study.verification.samples)
     units = {name: study.variable(name).unit or "1" for name in used}
     coords = {"design": np.array([choice.name for choice in choices])}
     content = dataset.dataset(
         "verification", coords, data, None, units, run.scene.objective, run.words
     )
     content.attrs["confidence"] = study.verification.confidence
+    content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"
     content.attrs["remarks"] = " ".join(remarks) if remarks else "none"
     run.write(content, "verification.nc")

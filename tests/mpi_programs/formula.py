@@ -92,6 +92,7 @@ designs = 4
 audit_samples = 20
 response_windows = 3
 infill_rounds = 1
+infill_designs = 6
 """
 
 FIELD = ""  # of a record that gets the objective as well

@@ -25,6 +25,7 @@ def fit_kriging(
     rng: np.random.Generator,
     names: Sequence[str] | None = None,
     restarts: int = 3,
+    lengths: tuple[float, float] = LENGTH_BOUNDS,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -42,6 +43,8 @@ def fit_kriging(
         Names of the inputs, for messages and files (default x1, x2, ...).
     restarts : int
         Starting points of the likelihood's maximisation besides the first.
+    lengths : (float, float)
+        Between which the length scales are, in the unit cube.
 
     Returns
     -------
@@ -63,13 +66,17 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts)
+    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts, lengths)
     samples = {"inputs": inputs, "values": values[valid], "dropped": int((~valid).sum())}
     return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples)
 
 
 def _maximise_likelihood(
-    unit: np.ndarray, normalised: np.ndarray, rng: np.random.Generator, restarts: int
+    unit: np.ndarray,
+    normalised: np.ndarray,
+    rng: np.random.Generator,
+    restarts: int,
+    lengths: tuple[float, float],
 ) -> dict[str, Any]:
     """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
     # Imported here: only fitting needs scikit-learn, and loading it takes a second.
@@ -80,7 +87,8 @@ def _maximise_likelihood(
 
     dims = unit.shape[1]
     signal = ConstantKernel(1.0, SIGNAL_BOUNDS)
-    kernel = signal * RBF(np.full(dims, 0.5), LENGTH_BOUNDS) + WhiteKernel(1e-3, NOISE_BOUNDS)
+    first = np.full(dims, min(0.5, lengths[1]))
+    kernel = signal * RBF(first, lengths) + WhiteKernel(1e-3, NOISE_BOUNDS)
     seed = int(rng.integers(2**31))
     regressor = GaussianProcessRegressor(
         kernel, alpha=0.0, n_restarts_optimizer=restarts, random_state=seed

@@ -140,13 +140,15 @@ class Kriging:
             As in `predict`.
         """
         points = inside(points, self.names, self.lower, self.upper)
-        train = self.to_unit(self.inputs)
-        matrix = self._covariance(train, train)
-        matrix[np.diag_indices_from(matrix)] += self.noise_variance
-        cross = self._covariance(train, self.to_unit(points))
-        known = np.einsum("ij,ij->j", cross, cho_solve(cho_factor(matrix, lower=True), cross))
+        cross = self._covariance(self.to_unit(self.inputs), self.to_unit(points))
+        known = np.einsum("ij,ij->j", cross, cho_solve(self._factor, cross))
         left = np.maximum(self.signal_variance - known, 0.0)
         return self.scale**2 * (left + (self.noise_variance if noise else 0.0))
+
+    @cached_property
+    def _factor(self) -> tuple[Array, bool]:
+        """Cholesky factor of the covariance of the training values."""
+        return cho_factor(self._noisy_covariance(), lower=True)
 
     def leave_one_out(self) -> Array:
         """At each training point, what the model without that point predicts, shape (n,).
@@ -154,10 +156,15 @@ class Kriging:
         Closed form: the error is the weight over the diagonal of the inverse covariance (Rasmussen
         and Williams, eq. 5.12).
         """
+        inverse = np.linalg.inv(self._noisy_covariance())
+        return self.values - self.scale * self.alpha / np.diag(inverse)
+
+    def _noisy_covariance(self) -> Array:
+        """Covariance of the training values, in units of ``scale**2``."""
         unit = self.to_unit(self.inputs)
         matrix = self._covariance(unit, unit)
         matrix[np.diag_indices_from(matrix)] += self.noise_variance
-        return self.values - self.scale * self.alpha / np.diag(np.linalg.inv(matrix))
+        return matrix
 
     def _covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         steps = (a[:, None, :] - b[None, :, :]) / self.length_scales

@@ -61,7 +61,8 @@ def _table_4(scene: Scene) -> list[tuple[Choice, tuple[float, float]]]:
         name = cases[case]
         if name is not None:
             design = {own[symbol]: value for symbol, value in zip(DESIGN, values, strict=True)}
-            found.append((Choice(f"{name} paper {letter}", name, design), printed))
+            chosen = Choice(f"{name} paper {letter}", name, design, origin="given")
+            found.append((chosen, printed))
     return found
 
 

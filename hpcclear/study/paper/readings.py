@@ -20,11 +20,12 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.statistics.random.replicates import moments
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper.printed import printed_designs, printed_moments
 from hpcclear.study.paper.recognition import own_names
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verification import moments, samples_of
+from hpcclear.study.truth import samples_of
 
 STAGE = "readings"
 OTHER_RESTITUTION = 0.46
@@ -145,7 +146,7 @@ def _over_time(
         stage=f"{STAGE}: simulations",
     )
     f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
-    return [(*moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
+    return [(*_moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
 
 
 def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float, ...]:
@@ -155,7 +156,14 @@ def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float,
         _mean_over_steps(run, scene, sampled.names, row)
         for row in np.vstack([sampled.values, _smallest(run, choice).values])
     ]
-    return (*moments(np.array(values[:-1])), values[-1])
+    return (*_moments(np.array(values[:-1])), values[-1])
+
+
+def _moments(values: Array) -> tuple[float, ...]:
+    """`_COLUMNS` of independent draws."""
+    mean, deviation = moments(values[:, None])
+    failed = int(np.isnan(values).sum())
+    return mean.value, mean.error, deviation.value, deviation.error, failed
 
 
 def _mean_over_steps(run: StudyRun, scene: Scene, names: Sequence[str], row: Array) -> float:

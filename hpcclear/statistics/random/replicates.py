@@ -1,0 +1,151 @@
+"""Mean, deviation and a quantile from independent replicates, with confidence limits.
+
+A replicate is one scrambling of a Sobol sequence, or one draw of plain Monte Carlo: what differs
+between replicates is all that is known about the error, whatever is inside them. So one
+set of formulas serves both, and the limits take Student's t by the number of replicates.
+
+Sources: A. B. Owen, "Monte Carlo variance of scrambled net quadrature", SIAM J. Numer. Anal. 34
+(1997), doi:10.1137/S0036142994277468; P. L'Ecuyer and C. Lemieux, "Recent advances in randomized
+quasi-Monte Carlo methods" (2002), doi:10.1007/0-306-48102-2_20; for the quantile R. S. Woodruff,
+"Confidence intervals for medians and other position measures", J. Amer. Stat. Assoc. 47 (1952),
+doi:10.1080/01621459.1952.10483443.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from hpcclear.base.arrays import Array, Booleans
+
+FEWEST = 4
+"""Replicates, or values, from which on an error is told."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number that was estimated from replicates.
+
+    Attributes
+    ----------
+    value : float
+    shifts : array, shape (r,)
+        By how much each replicate would move it (its influence), of mean 0; NaN for a replicate
+        without a value.
+    """
+
+    value: float
+    shifts: Array
+
+    @property
+    def error(self) -> float:
+        """Standard error."""
+        return float(spread(self.shifts[None])[0])
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the error."""
+        return int(np.isfinite(self.shifts).sum()) - 1
+
+
+def spread(shifts: Array) -> Array:
+    """Standard errors of what replicates shift so, (n, r) to (n,); NaN of fewer than two."""
+    known = np.isfinite(shifts)
+    count = known.sum(axis=1)
+    squares = np.where(known, shifts, 0.0) ** 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(count > 1, np.sqrt(squares.sum(axis=1) / (count * (count - 1.0))), np.nan)
+
+
+def student(confidence: float, freedom: int) -> float:
+    """Two-sided quantile of Student's t."""
+    return float(stdtrit(freedom, 0.5 + confidence / 2.0))
+
+
+def moments(values: Array) -> tuple[Estimate, Estimate]:
+    """Mean and deviation, free of bias to the order of their errors.
+
+    Parameters
+    ----------
+    values : array, shape (r, s)
+        s values of each of r replicates; NaN where a simulation failed, which is left out.
+
+    Returns
+    -------
+    (Estimate, Estimate)
+        All NaN where fewer than `FEWEST` values or replicates are left.
+    """
+    known = np.isfinite(values)
+    counts = known.sum(axis=1)
+    nothing = Estimate(np.nan, np.full(len(values), np.nan))
+    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+        return nothing, nothing
+    filled = np.where(known, values, 0.0)
+    mean = filled.sum() / counts.sum()
+    steps = np.where(known, values - mean, 0.0)
+    squares = steps**2
+    variance = squares.sum() / counts.sum()
+    average = _shifts(steps.sum(axis=1), counts)
+    # the mean was fitted to the same values: that took its own variance from theirs
+    whole = variance + float(spread(average[None])[0]) ** 2
+    deviation = np.sqrt(whole)
+    twice = 2.0 * deviation if deviation > 0.0 else 1.0
+    second = _shifts((squares - np.where(known, variance, 0.0)).sum(axis=1), counts) / twice
+    return Estimate(float(mean), average), Estimate(float(deviation), second)
+
+
+def _shifts(sums: Array, counts: Array) -> Array:
+    """Influence of each replicate on a ratio of sums whose remainders are `sums`."""
+    return np.where(counts > 0, sums / counts[counts > 0].mean(), np.nan)
+
+
+def quantile(values: Array, order: float, confidence: float) -> tuple[float, float, float]:
+    """A quantile and its limits: those of its order, turned back into values (Woodruff).
+
+    Parameters
+    ----------
+    values : array, shape (r, s)
+        As in `moments`.
+    order : float
+        Probability of staying below.
+    confidence : float
+        Level of the limits.
+
+    Returns
+    -------
+    (float, float, float)
+        Value, lower and upper limit; NaN where the sample does not reach that far.
+    """
+    known = np.isfinite(values)
+    counts = known.sum(axis=1)
+    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+        return np.nan, np.nan, np.nan
+    ranked = np.sort(values[known])
+    total = len(ranked)
+    value = float(np.quantile(ranked, order, method="hazen"))
+    below = (known & (values <= value)).sum(axis=1)
+    shifts = _shifts(below - counts * (below.sum() / total), counts)
+    reach = student(confidence, int((counts > 0).sum()) - 1) * float(spread(shifts[None])[0])
+    reach += 0.5 / total  # between two values nothing is known
+    places = np.arange(total) + 0.5
+    ends = np.array([order - reach, order + reach]) * total
+    lower, upper = np.interp(ends, places, ranked, left=np.nan, right=np.nan)
+    return value, float(lower), float(upper)
+
+
+def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:
+    """Whether number i is surely less than number j, (n, n); False where it cannot be told.
+
+    Replicates are paired: designs that meet the same scatter differ by less than their own errors.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    shifts : array, shape (n, r)
+        Of `Estimate`, of all numbers from the same replicates.
+    confidence : float
+        Level of each comparison, two-sided.
+    """
+    error = np.array([spread(row - shifts) for row in shifts])
+    reach = student(confidence, shifts.shape[1] - 1) * error
+    return values[:, None] - values < -reach

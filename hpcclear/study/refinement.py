@@ -1,0 +1,230 @@
+"""The front by direct simulation: the swarm's designs and others are simulated, and where it is decided, more.
+
+A surrogate of f that is good to a percent is no judge of deviations that differ by less: the swarm
+finds what its errors flatter. So its designs are only where the search begins. Every design here
+is simulated; models of the moments themselves say where to look next, until some rounds
+win nothing or all are spent.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import moocore
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene.domain import box, to_coordinates, to_physical
+from hpcclear.scene.sampling import unit_lhs
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.study import Study
+from hpcclear.statistics.search.infill import proposals
+from hpcclear.statistics.search.pareto import cut
+from hpcclear.study import truth
+from hpcclear.study.optimisation import Choice, chosen_in_all
+from hpcclear.study.run import Result, StudyRun
+
+RAYS = 6
+"""Designs along each design variable, through a design of the swarm, beside the swarm's."""
+
+PATIENCE = 3
+"""Rounds in a row that win nothing, after which a front stands."""
+
+RUNNERS_UP = 2
+"""Designs verified beside those of the front, since its ends are chosen among designs that are nearly as good."""
+
+
+@dataclass
+class Tried:
+    """Designs of one case that were simulated, in their order.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Design variables.
+    coordinates : array, shape (n, d)
+        Sampling coordinates.
+    values : array, shape (n, 2)
+        Mean and deviation.
+    """
+
+    names: tuple[str, ...]
+    coordinates: Array
+    values: Array
+
+    def best(self) -> Array:
+        """Numbers of the designs that no other one dominates."""
+        rows = np.flatnonzero(np.isfinite(self.values).all(axis=1))
+        return rows[moocore.is_nondominated(self.values[rows])]
+
+
+def simulations(study: Study) -> tuple[int, int]:
+    """Simulations of the first designs, and of all rounds, at most."""
+    if study.verification.infill_rounds == 0:
+        return 0, 0
+    extremes, spread = chosen_in_all(study)
+    rays = sum(RAYS * len(study.design_variables(case.name)) for case in study.cases)
+    rounds = study.verification.infill_rounds * study.verification.infill_designs
+    each = length(study) * SCRAMBLINGS
+    return (extremes + spread + rays) * each, rounds * len(study.cases) * each
+
+
+def length(study: Study) -> int:
+    """Points of each scrambling that a design of the search gets: fewer than verified ones, a power of two."""
+    wanted = min(study.verification.infill_samples, study.verification.draws or truth.FIRST)
+    return 2 ** max(int(np.log2(max(wanted, SCRAMBLINGS) // SCRAMBLINGS)), 1)
+
+
+def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[str]]:
+    """Designs to verify beside those of the swarm, the best that were found; and what a reader should know.
+
+    Parameters
+    ----------
+    run : StudyRun
+    start : sequence of Choice
+        Designs of the swarm, of all cases.
+
+    Raises
+    ------
+    InputError
+        If all simulations of a round fail.
+    """
+    if run.study.verification.infill_rounds == 0:
+        return [], []
+    begun = run.stage("check-0", _begin, start)
+    tried = {case.name: _tried(run, case.name, begun, None) for case in run.study.cases}
+    won = {name: [""] for name in tried}
+    for round_ in range(run.study.verification.infill_rounds):
+        going = {name: tried[name] for name in tried if not _stands(won[name])}
+        if not going:
+            break
+        stage = f"infill-{round_}"
+        found = run.stage(stage, _go_on, going, stage)
+        for name, before in going.items():
+            tried[name] = _tried(run, name, found, before)
+            won[name].append(_won(run, before, tried[name]))
+    remarks = [
+        f"The search of {name} ended with its rounds while {rounds[-1]}; more "
+        "study.verification.infill_rounds may still win."
+        for name, rounds in won.items()
+        if rounds[-1]
+    ]
+    named = [choice for choice in start if choice.name]
+    return [one for name in tried for one in _finalists(run, name, tried[name], named)], remarks
+
+
+def _stands(won: Sequence[str]) -> bool:
+    """Whether a front stands, from what each round won."""
+    return len(won) > PATIENCE and not any(won[-PATIENCE:])
+
+
+def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
+    """The swarm's designs, and rays along each variable through its design of least deviation."""
+    chosen = []
+    for case in run.study.cases:
+        own = [choice for choice in start if choice.case == case.name]
+        chosen += _distinct(own)
+        names = run.study.design_variables(case.name)
+        region, rng = box(run.scene, names), run.rng("search", case.name)
+        middle = next(choice for choice in own if choice.name == f"{case.name} best beta")
+        centre = to_coordinates(run.scene, names, np.array([list(middle.design.values())]))[0]
+        for k in range(len(names)):
+            ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
+            places = (np.arange(RAYS) + rng.random(RAYS)) / RAYS
+            ray[:, k] = region.lower[k] + places * (region.upper[k] - region.lower[k])
+            chosen += _choices(run, case.name, ray)
+    return _simulated(run, chosen, "check-0")
+
+
+def _distinct(choices: Sequence[Choice]) -> list[Choice]:
+    """Of equal designs the first."""
+    return list({tuple(choice.design.values()): choice for choice in reversed(choices)}.values())[
+        ::-1
+    ]
+
+
+def _go_on(run: StudyRun, tried: Mapping[str, Tried], stage: str) -> Result:
+    """One round of the cases that are not decided."""
+    chosen = []
+    for name, one in tried.items():
+        region = box(run.scene, one.names)
+        bounds = np.column_stack([region.lower, region.upper])
+        count, rng = run.study.verification.infill_designs, run.rng(stage, name)
+        try:
+            where = proposals(one.coordinates, one.values, bounds, count, rng)
+        except InputError:  # too few designs that did not fail for a model
+            unit = unit_lhs(count, len(one.names), rng)
+            where = region.lower + unit * (region.upper - region.lower)
+        chosen += _choices(run, name, where)
+    return _simulated(run, chosen, stage)
+
+
+def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
+    names = run.study.design_variables(case)
+    rows = to_physical(run.scene, names, coordinates)
+    return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+
+
+def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
+    """Cases, designs (NaN where a variable is none of the case's) and moments."""
+    if not choices:
+        return {"case": np.array([], "U1"), "design": np.empty((0, 1)), "values": np.empty((0, 2))}
+    count = length(run.study)
+    found = truth.sequences(run, choices, stage, "search", count, count * SCRAMBLINGS)
+    names = run.study.optimisation
+    return {
+        "case": np.array([choice.case for choice in choices]),
+        "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
+        "values": np.column_stack([found["mean"], found["deviation"]]),
+    }
+
+
+def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tried:
+    """All designs of a case so far."""
+    names = run.study.design_variables(case)
+    rows = found["case"] == case
+    columns = [run.study.optimisation.index(name) for name in names]
+    coordinates = to_coordinates(run.scene, names, found["design"][rows][:, columns])
+    region = box(run.scene, names)
+    coordinates = np.clip(coordinates, region.lower, region.upper)  # round-off at the border
+    values = found["values"][rows]
+    if before is None:
+        return Tried(names, coordinates, values)
+    return Tried(
+        names,
+        np.concatenate([before.coordinates, coordinates]),
+        np.concatenate([before.values, values]),
+    )
+
+
+def _won(run: StudyRun, before: Tried, now: Tried) -> str:
+    """What a round has won, in words; empty if nothing by more than the accuracy asked for.
+
+    Designs that only stand between those of the earlier front count for nothing.
+    """
+    old, new = (one.values[one.best()] for one in (before, now))
+    if not (len(old) and len(new)):
+        return "no design had moments"
+    wanted = run.study.verification.accuracy
+    gains = 1.0 - new / old[:, None]  # of each design of the earlier front by each of the new one
+    counts = gains > (wanted.mean, wanted.deviation)
+    for column, name in enumerate(("mean", "deviation")):
+        gain = 1.0 - new[:, column].min() / old[:, column].min()
+        if gain > getattr(wanted, name):
+            return f"the last one still lowered the least {name} by {gain:.1%}"
+    moved = int((counts.any(axis=2) & (gains >= 0.0).all(axis=2)).any(axis=1).sum())
+    return f"the last one still dominated {moved} of {len(old)} designs" if moved else ""
+
+
+def _finalists(run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice]) -> list[Choice]:
+    """The best designs of a case, well spread, for verification on scatter of its own; those of `verified` have it anyway."""
+    best = tried.best()
+    kept = best[cut(tried.values[best], run.study.verification.designs + RUNNERS_UP)]
+    own = [list(choice.design.values()) for choice in verified if choice.case == case]
+    return [
+        choice
+        for choice in _choices(run, case, tried.coordinates[kept])
+        if not any(
+            np.allclose(list(choice.design.values()), one, rtol=1e-9, atol=0.0) for one in own
+        )
+    ]

@@ -1,0 +1,156 @@
+"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Flag
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.stages import SCRAMBLINGS, Verification
+from hpcclear.statistics.random.replicates import moments, quantile, student
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+
+FIRST = 512
+"""Simulations of a design from which its accuracy is judged, as far as it may have so many."""
+
+QUANTILE = 0.95
+"""Probability of staying below the percentile that is told."""
+
+
+def samples_of(
+    run: StudyRun,
+    choice: Choice,
+    count: int,
+    purpose: str = "verification",
+    *,
+    first: int = 0,
+    scrambling: int | None = None,
+) -> Points:
+    """Samples of a design in all study variables: independent ones, or those of a scrambling.
+
+    Every design of a case meets the same scatter, so that differences between designs are not
+    noise.
+    """
+    points = monte_carlo(
+        run.scene,
+        count,
+        random=run.study.case(choice.case).random,
+        design=dict(choice.design),
+        purpose=purpose,
+        first=first,
+        scrambling=scrambling,
+    )
+    return run.simulations.filled(points.names, points.values)
+
+
+def simulate(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
+) -> Result:
+    """Moments of designs, by as many simulations as the study asks for.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
+        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``samples``, ``failed``, ``beyond_hertz``.
+
+    Raises
+    ------
+    InputError
+        If all simulations fail.
+    """
+    settings = run.study.verification
+    if settings.draws is not None:
+        return _told(settings, _values(run, choices, stage, purpose, settings.draws, None))
+    return sequences(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+
+
+def first_length(settings: Verification) -> int:
+    """Points of each scrambling from which accuracy is judged: a power of two."""
+    return 2 ** int(np.log2(min(FIRST, settings.most_samples) // SCRAMBLINGS))
+
+
+def sequences(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
+) -> Result:
+    """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
+    settings = run.study.verification
+    made = [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    rows = list(range(len(choices)))
+    while rows:
+        first = made[rows[0]].shape[2]
+        fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
+        for k, one in zip(rows, fresh, strict=True):
+            made[k] = np.concatenate([made[k], one], axis=2)
+        length = first + length  # a sequence is balanced at powers of two
+        if 2 * length * SCRAMBLINGS > most:
+            break
+        rows = [k for k in rows if not _accurate(settings, made[k][0])]
+    return _told(settings, made)
+
+
+def _values(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    stage: str,
+    purpose: str,
+    count: int,
+    first: int | None,
+) -> list[Array]:
+    """Objectives and whether beyond Hertz's range, (2, replicates, values) each: `count` draws, or points from
+    `first` on of each scrambling."""
+    if first is None:
+        batches = [samples_of(run, choice, count, purpose) for choice in choices]
+        shape = (2, count, 1)
+    else:
+        batches = [
+            samples_of(run, choice, count, purpose, first=first, scrambling=number)
+            for choice in choices
+            for number in range(SCRAMBLINGS)
+        ]
+        shape = (2, SCRAMBLINGS, count)
+    values = np.concatenate([batch.values for batch in batches])
+    records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)
+    beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
+    both = np.stack([run.simulations.objective(records), beyond])
+    return [part.reshape(shape) for part in np.split(both, len(choices), axis=1)]
+
+
+def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
+    """Half-widths of the limits of mean and deviation."""
+    return tuple(
+        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
+        for one in moments(values)
+    )  # type: ignore[return-value]
+
+
+def _accurate(settings: Verification, values: Array) -> bool:
+    """Whether both limits are as narrow as asked for; a deviation of nothing but round-off is."""
+    mean, deviation = (one.value for one in moments(values))
+    reach = _reaches(settings, values)
+    wanted = settings.accuracy
+    good = reach[0] <= wanted.mean * abs(mean)
+    return bool(good and reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean)))
+
+
+def _told(settings: Verification, made: Sequence[Array]) -> Result:
+    """All that is told of designs from their objectives."""
+    rows: list[dict[str, object]] = []
+    for values, beyond in made:
+        row: dict[str, object] = {
+            "samples": values.size,
+            "failed": int(np.isnan(values).sum()),
+            "beyond_hertz": int(beyond.sum()),
+        }
+        reaches = _reaches(settings, values)
+        for name, one, reach in zip(("mean", "deviation"), moments(values), reaches, strict=True):
+            row |= {name: one.value, f"{name}_error": one.error, f"{name}_reach": reach}
+            row[f"{name}_shifts"] = one.shifts
+        ends = quantile(values, QUANTILE, settings.confidence)
+        row |= dict(zip(("percentile", "percentile_lower", "percentile_upper"), ends, strict=True))
+        rows.append(row)
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}

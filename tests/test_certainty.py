@@ -1,0 +1,231 @@
+"""Numbers with limits: replicates, what can be told apart, and where to look next."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcclear.base.errors import InputError
+from hpcclear.scene import load_scene
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.stages import SCRAMBLINGS, Verification
+from hpcclear.statistics.random.replicates import moments, quantile, student, surely_less
+from hpcclear.statistics.search.certainty import Compared
+from hpcclear.statistics.search.infill import NEAR, TwoScales, proposals
+
+ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
+CASE = ("C", "m2", "m3", "u2", "I2")
+DESIGN = {"m2": 0.2, "m3": 0.14, "u2": 0.06, "I2": 3e-4}
+
+
+def points(scene, count=64, first=0, scrambling=0, **more):
+    return monte_carlo(
+        scene, count, random=CASE, design=DESIGN, first=first, scrambling=scrambling, **more
+    ).values
+
+
+# -- scrambled sequences ----------------------------------------------------------------------------
+
+
+def test_a_longer_sequence_begins_with_the_shorter_one():
+    scene = load_scene(ROBUST)
+    whole = points(scene, 64)
+    np.testing.assert_array_equal(whole[:32], points(scene, 32))
+    np.testing.assert_array_equal(whole[32:], points(scene, 32, first=32))
+
+
+def test_scramblings_purposes_and_seeds_differ():
+    scene = load_scene(ROBUST)
+    other = load_scene(ROBUST, ["study.seed=21"])
+    made = [
+        points(scene),
+        points(scene, scrambling=1),
+        points(scene, purpose="search"),
+        points(other),
+    ]
+    for k, one in enumerate(made):
+        assert all((one != another).any() for another in made[:k])
+
+
+def test_every_scrambling_is_balanced_in_every_input():
+    """64 points: one in each 64th of every random input's range."""
+    scene = load_scene(ROBUST)
+    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, scrambling=3)
+    for name, (middle, half) in {
+        "m2": (0.2, 0.005),
+        "u2": (0.06, 0.02),
+        "C": (6.5e-4, 3.5e-4),
+    }.items():
+        place = (names.column(name) - middle) / half / 2 + 0.5
+        assert sorted(np.floor(place * 64).astype(int)) == list(range(64))
+
+
+def test_a_number_of_draws_asks_for_draws():
+    assert Verification().draws is None
+    assert Verification(samples=500).draws == 500
+    assert Verification(method="monte-carlo").draws == 10_000
+    with pytest.raises(InputError, match="follows from the accuracy"):
+        load_scene(ROBUST, ["study.verification.method=qmc", "study.verification.samples=100"])
+
+
+# -- limits -----------------------------------------------------------------------------------------
+
+
+def sobol(dimensions, length, seed):
+    from scipy.stats import qmc
+
+    rng = np.random.default_rng(seed)
+    return np.stack(
+        [qmc.Sobol(dimensions, scramble=True, rng=rng).random(length) for _ in range(SCRAMBLINGS)]
+    )
+
+
+FUNCTIONS = {
+    "smooth": lambda u: np.exp(u[..., 0]) + u[..., 1] * u[..., 2],
+    "kink": lambda u: abs(u[..., 0] - 0.4) + 0.3 * abs(u[..., 1] - u[..., 2]),
+    "rough": lambda u: u[..., 0] + 0.2 * np.sin(1e4 * u[..., 0] * (1 + u[..., 1])),
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
+def test_limits_hold_as_often_as_they_say(name, method):
+    """200 repeats of mean, deviation and 95th percentile; 184 is two deviations below 190."""
+    function, rng = FUNCTIONS[name], np.random.default_rng(5)
+    truth = function(rng.random((2_000_000, 3)))
+    exact = truth.mean(), truth.std(), np.quantile(truth, 0.95)
+    held = np.zeros(3, int)
+    for seed in range(200):
+        if method == "qmc":
+            values = function(sobol(3, 32, seed))
+        else:
+            values = function(np.random.default_rng(seed).random((512, 1, 3)))
+        for k, one in enumerate(moments(values)):
+            held[k] += (
+                abs(one.value - exact[k])
+                <= student(0.95, one.freedom) * one.error + 5e-4 * exact[k]
+            )
+        _, lower, upper = quantile(values, 0.95, 0.95)
+        held[2] += lower <= exact[2] <= upper
+    assert (held >= 184).all(), held
+
+
+def test_draws_have_the_classical_errors():
+    values = np.random.default_rng(1).normal(3.0, 2.0, 1000)
+    mean, deviation = moments(values[:, None])
+    assert mean.value == pytest.approx(values.mean(), rel=1e-12)
+    assert mean.error == pytest.approx(values.std(ddof=1) / 1000**0.5, rel=1e-12)
+    assert deviation.value == pytest.approx(values.std(ddof=1), rel=1e-12)
+    fourth = ((values - values.mean()) ** 4).mean()
+    classical = np.sqrt((fourth - values.var() ** 2) / 1000) / (2 * values.std())
+    assert deviation.error == pytest.approx(classical, rel=2e-3)
+
+
+def test_failed_values_are_left_out_and_too_few_say_nothing():
+    values = np.random.default_rng(2).random((16, 8))
+    values[3] = np.nan
+    values[5, 2:] = np.nan
+    mean, deviation = moments(values)
+    known = values[np.isfinite(values)]
+    assert mean.value == pytest.approx(known.mean())
+    assert mean.freedom == 14
+    assert 0 < mean.error < 0.1
+    assert deviation.value == pytest.approx(known.std(), rel=1e-2)
+    few = np.full((16, 8), np.nan)
+    few[:3, 0] = 1.0
+    assert all(np.isnan(one.value) and np.isnan(one.error) for one in moments(few))
+    assert np.isnan(quantile(few, 0.95, 0.95)).all()
+
+
+def test_nothing_random_has_no_deviation():
+    mean, deviation = moments(np.full((16, 4), 2.5))
+    assert (mean.value, mean.error, deviation.value, deviation.error) == (2.5, 0.0, 0.0, 0.0)
+
+
+# -- what can be told apart -------------------------------------------------------------------------
+
+
+def test_common_scatter_tells_apart_what_single_limits_do_not():
+    rng = np.random.default_rng(3)
+    scatter = rng.normal(0.0, 1.0, 16)
+    shifts = np.stack([scatter, scatter + rng.normal(0.0, 0.01, 16)])
+    less = surely_less(np.array([5.0, 5.1]), shifts, 0.95)
+    assert less.tolist() == [[False, True], [False, False]]
+    apart = rng.normal(0.0, 1.0, (2, 16))
+    assert not surely_less(np.array([5.0, 5.1]), apart, 0.95).any()
+
+
+def compared(values, error=1e-3):
+    shifts = np.random.default_rng(4).normal(0.0, error * 4.0, (2, len(values), 16))
+    return Compared(np.array(values, float), shifts - shifts.mean(axis=2, keepdims=True), 0.95)
+
+
+def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
+    values = [
+        (1, 5),
+        (1.0005, 4),
+        (2, 3),
+        (2.0005, 3.0002),
+        (3, 2),
+        (4, 2.0003),
+        (5, 5),
+        (np.nan, 0),
+    ]
+    found = compared(values)
+    assert found.best(0) == 1  # no worse in the first that could be told, and better in the second
+    assert found.best(1) == 4
+    front = found.front(10)
+    assert set(front) == {1, 2, 4}
+    assert found.one[2, 3]
+    assert not found.one[0, 1]
+    assert found.beaten.tolist() == [False] * 6 + [True, False]
+    assert found.front(2) == [1, 4]
+
+
+def test_designs_that_are_one_make_a_front_of_one():
+    assert len(compared([(1, 2), (1.0001, 2.0001), (1.0002, 1.9999)]).front(5)) == 1
+
+
+# -- where to look next -----------------------------------------------------------------------------
+
+BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
+
+
+def rippled(x):
+    """Both least at x2 = -2; in x1 the first falls, the second has its least valley near 0.3."""
+    slope = 0.5 * (x[:, 1] + 2.0)
+    first = 2.0 - 0.3 * x[:, 0] + slope
+    second = 1.0 + 0.1 * (x[:, 0] - 0.5) ** 2 + 0.05 * np.cos(2 * np.pi * (x[:, 0] - 0.3) / 0.3)
+    return np.column_stack([first, second - 0.1 + slope])
+
+
+def test_two_scales_see_a_ripple_on_a_slope():
+    rng = np.random.default_rng(6)
+    designs = BOUNDS[:, 0] + rng.random((60, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    designs[:30, 1] = -2.0
+    model = TwoScales(designs, rippled(designs)[:, 1], BOUNDS, rng)
+    line = np.column_stack([np.linspace(0.05, 0.95, 50), np.full(50, -2.0)])
+    assert abs(model.predict(line) - rippled(line)[:, 1]).max() < 0.02
+    assert model.variance(line).shape == (50,)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_proposals_find_the_least_of_both(seed):
+    rng = np.random.default_rng(seed)
+    designs = BOUNDS[:, 0] + rng.random((16, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = rippled(designs)
+    for _ in range(5):
+        more = proposals(designs, values, BOUNDS, 8, rng)
+        assert 0 < len(more) <= 8
+        assert ((more >= BOUNDS[:, 0]) & (more <= BOUNDS[:, 1])).all()
+        designs, values = np.vstack([designs, more]), np.vstack([values, rippled(more)])
+    grid = np.column_stack([np.linspace(0, 1, 2001), np.full(2001, -2.0)])
+    assert (values.min(axis=0) < rippled(grid).min(axis=0) + 0.01).all()
+    steps = abs(designs[:, None] - designs) / (BOUNDS[:, 1] - BOUNDS[:, 0])
+    apart = steps.max(axis=2)[np.triu_indices(len(designs), 1)]
+    assert apart.min() > NEAR
+
+
+def test_too_few_designs_for_a_model_are_refused():
+    with pytest.raises(InputError, match="too few valid samples"):
+        proposals(np.full((3, 2), 0.5), np.ones((3, 2)), BOUNDS, 4, np.random.default_rng(1))
