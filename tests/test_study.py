@@ -628,10 +628,25 @@ def test_verdicts():
 
 def test_differences_count_only_beyond_their_scatter():
     rng = np.random.default_rng(2)
-    series = np.ones((3, 10, 3, 4)) + 0.01 * rng.normal(size=(3, 10, 3, 4))
+    series = np.ones((3, 6, 10, 3, 4)) + 0.01 * rng.normal(size=(3, 6, 10, 3, 4))
     series[1] *= 0.8
     found = claims.ResponseEvidence({"names": np.array(["a", "b", "c"]), "statistics": series})
     quantity = responses.QUANTITIES[0]
     assert found.judged([("b", "a", "peak", quantity, -1)])[0] == claims.HOLDS
     assert found.judged([("b", "a", "peak", quantity, 1)])[0] == claims.FAILS
     assert found.judged([("c", "a", "peak", quantity, 1)])[0] == claims.OPEN
+
+
+def test_what_copies_disagree_on_cannot_be_told():
+    """Each copy by itself is sure, with stretches that hardly differ; the copies are not."""
+    rng = np.random.default_rng(2)
+    series = np.ones((2, 6, 10, 3, 4)) + 1e-3 * rng.normal(size=(2, 6, 10, 3, 4))
+    series[1] *= 0.9
+    names, quantity = np.array(["a", "b"]), responses.QUANTITIES[0]
+    wanted = [("b", "a", "peak", quantity, -1)]
+    found = claims.ResponseEvidence({"names": names, "statistics": series})
+    assert found.judged(wanted)[0] == claims.HOLDS
+    series[1] *= 1.0 + 0.15 * rng.normal(size=(6, 1, 1, 1))
+    verdict, text = claims.ResponseEvidence({"names": names, "statistics": series}).judged(wanted)
+    assert verdict == claims.OPEN
+    assert re.search(r"told from 0 beyond \d+\.\d %", text)

@@ -27,6 +27,7 @@ from hpcclear.dynamics.problem import (
     problem_of,
 )
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.copies import kicked, scales
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Parameters, Rates, Start
@@ -51,11 +52,13 @@ class Steps:
     a: Array
 
 
-def integrate(scene: Scene) -> tuple[Steps, Records, Array]:
-    """Integrate a scene; its steps, its outcome record (1,) and its parameters (PARAMETERS,), all in SI."""
+def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
+    """Integrate a scene, or a kicked copy; its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
     problem = problem_of(scene, ledger=True, series=True, single=True)
     par = parameters(scene)
     start = start_states(scene, par)
+    if copy:
+        start = kicked(start, scales(scene), range(copy, copy + 1))
     n = problem.coordinates
     buffer = np.zeros((_CHUNK, rec.columns(n)))
     lanes = Lanes(problem, 1, buffer)
@@ -154,7 +157,7 @@ def instants(scene: Scene, steps: Steps) -> Array:
     return np.append(np.concatenate(parts), borders[-1])
 
 
-def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
+def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) -> xr.Dataset:
     """Simulate one scene; time series of the motion, forces and energies.
 
     Parameters
@@ -163,6 +166,9 @@ def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
     objective : Objective, optional
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
         need ``numerics.responses`` where there is no study that asks for them.
+    copy : int
+        Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
+        motion without clearance has no copies.
 
     Returns
     -------
@@ -180,9 +186,9 @@ def simulate(scene: Scene, objective: Objective | None = None) -> xr.Dataset:
         named, scene = scene, _shown(scene, steady)
     else:
         named = scene
-    simulated = _closed_form if coordinate_count(scene) == 0 else _integrated
     objective = named.objective if objective is None else objective
-    times, data, record = simulated(scene)
+    still = coordinate_count(scene) == 0
+    times, data, record = _closed_form(scene) if still else _integrated(scene, copy)
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
@@ -253,12 +259,12 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     return *ideal_series(scene), record
 
 
-def _integrated(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
+def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
     first, second, free = topology(scene)
     nine = scene.numerics.formulation == "baumgarte"
     turning = free or nine  # the crank angle is the last coordinate
-    steps, record, par = integrate(scene)
+    steps, record, par = integrate(scene, copy)
     times = instants(scene, steps)
     q, v, contacts, k, s = _between(steps, times, turning)
     turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]

@@ -153,6 +153,9 @@ class Verification(Table):
     response_windows: Annotated[int, Count(2, 1000)] = 10
     """How many such stretches their averages, fluctuations and peaks are taken over, to know how
     much these scatter."""
+    response_copies: Annotated[int, Count(2, 1000)] = 8
+    """Copies of each response, kicked at their start: where they disagree the motion is chaotic, and what is said of averages,
+    fluctuations and peaks is no surer than they agree."""
     audit_samples: Annotated[int, Count(0, 10**6)] = 1000
     """Direct Monte Carlo samples of each of the paper's designs under each reading of its text; 0
     leaves the comparison out."""

@@ -30,8 +30,8 @@ def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice
 
 
 def simulations(study: Study) -> int:
-    """Single responses: each is simulated for its statistics, and for its file."""
-    return 2 * (1 + 2 * len(study.cases))
+    """Single responses: each and its copies are simulated for their statistics, and it for its file."""
+    return (study.verification.response_copies + 1) * (1 + 2 * len(study.cases))
 
 
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
@@ -51,12 +51,15 @@ def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response, stretch by stretch.
+    """Statistics of each design's steady response and of copies kicked at their start, stretch by stretch.
+
+    Where motion is chaotic one response says little of a design: copies see other stretches of the
+    same motion.
 
     Returns
     -------
     dict of arrays
-        ``names`` (designs,) and ``statistics`` (designs, windows, `STATISTICS`, `QUANTITIES`), SI.
+        ``names`` (designs,) and ``statistics`` (designs, copies, windows, `STATISTICS`, `QUANTITIES`), SI.
 
     Raises
     ------
@@ -67,14 +70,13 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     chosen = compared(run, designs)
     table = []
     for name, choice in chosen:
-        run.ranks.raise_if_stopped()
         scene = scene_of(run, choice, settings.response_revolutions * settings.response_windows)
-        table.append(
-            _statistics(
-                _steady(scene, simulate(scene, run.scene.objective), name),
-                settings.response_windows,
-            )
-        )
+        copies = []
+        for copy in range(settings.response_copies):
+            run.ranks.raise_if_stopped()
+            series = _steady(scene, simulate(scene, run.scene.objective, copy), name)
+            copies.append(_statistics(series, settings.response_windows))
+        table.append(copies)
     return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
 
 

@@ -91,6 +91,7 @@ samples = 200
 designs = 4
 audit_samples = 20
 response_windows = 3
+response_copies = 3
 infill_rounds = 1
 infill_designs = 6
 """
@@ -161,7 +162,7 @@ def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
     """Takes the place of the compilers."""
 
 
-def respond(scene: Scene, judged_by: Objective = MEAN_GAP):
+def respond(scene: Scene, judged_by: Objective = MEAN_GAP, copy: int = 0):
     """A response whose forces and accelerations are the objective times a wave."""
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     angle = np.linspace(0.0, 2 * np.pi * turns, 40 * turns + 1)

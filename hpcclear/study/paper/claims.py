@@ -12,14 +12,18 @@ from scipy.special import chdtri
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
+from hpcclear.statistics.random.replicates import student
 from hpcclear.study.paper.printed import CLAIMS, case_names
 from hpcclear.study.paper.recognition import own_names
 from hpcclear.study.responses import QUANTITIES, STATISTICS
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.sensitivities import surfaces
 
+LEVEL = 0.99
+"""Confidence that decides."""
+
 SURE = 2.5758293035489004
-"""Standard errors that decide: 99 % two-sided."""
+"""Standard errors that decide: `LEVEL`, two-sided."""
 
 HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told"
 Finding = tuple[str, str]
@@ -196,7 +200,7 @@ def _global_for_masses(found: SensitivityEvidence) -> Finding:
 
 
 class ResponseEvidence:
-    """Responses at one clearance as evidence: differences between designs and their scatter."""
+    """Responses at one clearance as evidence: differences between designs, and how far copies disagree on them."""
 
     def __init__(self, series: Result) -> None:
         self.names = series["names"].tolist()
@@ -205,10 +209,10 @@ class ResponseEvidence:
     def change(self, a: str, b: str, statistic: str, quantity: str) -> tuple[float, float]:
         """Relative change from design b to design a, and what it must exceed to be sure."""
         s, q = STATISTICS.index(statistic), QUANTITIES.index(quantity)
-        one, other = (self.statistics[self.names.index(name), :, s, q] for name in (a, b))
-        error = np.hypot(*(x.std(ddof=1) / np.sqrt(len(x)) for x in (one, other)))
+        one, other = (self.statistics[self.names.index(name), ..., s, q] for name in (a, b))
+        reach = np.hypot(_reach(one), _reach(other))
         level = abs(other.mean())
-        return float((one.mean() - other.mean()) / level), float(SURE * error / level)
+        return float((one.mean() - other.mean()) / level), float(reach / level)
 
     def judged(self, wanted: Sequence[tuple[str, str, str, str, int]]) -> Finding:
         """Verdict on changes (a, b, statistic, quantity, wanted sign)."""
@@ -218,11 +222,24 @@ class ResponseEvidence:
             supported.append(sign * change > sure)
             refuted.append(sign * change < -sure)
             if not supported[-1]:
-                texts.append(f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} %")
+                texts.append(
+                    f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} % "
+                    f"(told from 0 beyond {100 * sure:.1f} %)"
+                )
         text = f"{sum(supported)} of {len(wanted)} comparisons as claimed"
         if texts:
             text += "; not: " + "; ".join(texts)
         return verdict(supported, refuted), text
+
+
+def _reach(values: Array) -> float:
+    """Half-width of the limits of a mean over copies and their stretches, (copies, stretches): Student's t of the copies
+    where they disagree, of the stretches where motion is regular and copies are one."""
+    reaches = [
+        student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))
+        for x in (values.mean(axis=1), values.mean(axis=0))
+    ]
+    return float(max(reaches))
 
 
 def _peaks_cut(run: StudyRun, found: ResponseEvidence) -> Finding:
