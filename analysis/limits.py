@@ -2,6 +2,7 @@
 
     python analysis/limits.py                  # 200 repeats of three designs, ten designs of the box; some twenty minutes
     python analysis/limits.py --repeats 20     # a look
+    python analysis/limits.py --set study.verification.accuracy.deviation=0.01
 
 Mean, deviation and 95th percentile of the paper's case 2, as `hpcclear run` finds them: scrambled Sobol sequences,
 doubled until the accuracy asked for is met. Each repeat has scramblings of its own; the truth is a sequence of 131 072.
@@ -35,8 +36,9 @@ def main() -> None:
     """Count how often limits hold, then compare costs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=200)
+    parser.add_argument("--set", action="append", default=[], help="another entry of the job")
     words = parser.parse_args()
-    scene = load_scene(JOB)
+    scene = load_scene(JOB, words.set)
     for choice in DESIGNS:
         coverage(scene, choice, words.repeats)
     cost(scene)

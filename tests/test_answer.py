@@ -13,7 +13,7 @@ from own_engine import engine
 from hpcclear.base.objectives import OBJECTIVES
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer
+from hpcclear.report.answer import answer, beside_original
 from hpcclear.report.figures import labels, style
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
@@ -76,6 +76,16 @@ def test_designs_within_each_others_limits_are_named_and_others_are_not():
     assert told(verified(MEAN, DEVIATION))["as good as it"].startswith("robust front 1:")
     assert told(verified(MEAN, DEVIATION, 1e-8))["as good as it"].startswith("none")
     assert "study.verification.samples" not in told(verified(MEAN, DEVIATION, 1e-8))["next"]
+
+
+def test_the_ends_of_a_front_stand_beside_the_original():
+    content = verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN))
+    ((case, rows),) = beside_original(content)  # "calm" has no original
+    assert case == "robust"
+    assert rows[0] == ("mean", "0.4 mm ±0.25%", "0.2 mm ±0.50% -50%", "0.3 mm ±0.33% -25%")
+    assert rows[1][2] == "40 µm ±2.50% -33%"
+    assert rows[2] == ("95 % below", "0.8 mm", "0.4 mm -50%", "0.6 mm -25%")
+    assert rows[3] == ("held at", "", "m2 lower", "none of its variables")
 
 
 def test_an_original_that_is_best_is_kept():

@@ -14,7 +14,8 @@ from rich.table import Table
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.steady.telling import in_a_line
-from hpcclear.report.answer import answer
+from hpcclear.ranks.progress import duration
+from hpcclear.report.answer import ENDS, answer, beside_original
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -52,7 +53,7 @@ def fitting(text: str) -> str:
     """A text as the terminal can show it: units in plain letters where it has no others."""
     if "utf" in (sys.stdout.encoding or "").lower():
         return text
-    return text.replace("µ", "u").replace("²", "^2").replace("–", "-")
+    return text.replace("µ", "u").replace("²", "^2").replace("–", "-").replace("±", "+-")
 
 
 def objective_of(content: xr.Dataset) -> tuple[str, str]:
@@ -258,10 +259,27 @@ def describe_statistics(found: "Finished") -> None:
 
 
 def describe_study(place: Path) -> None:
-    """Print the answer of a finished study in ten lines, and where its files are."""
-    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in ("samples", "verification")}
+    """Print the ends of its fronts beside the original, the answer of a finished study in ten lines, what it took, and
+    where its files are."""
+    kinds = ("samples", "verification", "timing")
+    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
     out = console()
+    for case, rows in beside_original(found["verification"]):
+        beside = Table(
+            title=f"Case {case}, directly simulated, against the original",
+            title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
+        )  # fmt: skip
+        for header in ("", *ENDS):
+            beside.add_column(header)
+        for row in rows:
+            beside.add_row(*(fitting(text) for text in row))
+        out.print(beside)
     lines = [(line.label, fitting(line.text)) for line in answer(found, str(place))]
+    timing = found["timing"]
+    spent = np.sum(
+        [timing[name].sum("stage") for name in ("busy", "idle", "compile", "write")], axis=0
+    )
+    lines.append(("took", f"{duration(float(spent.max()))} on {timing.sizes['rank']} ranks"))
     out.print(table("The answer", lines))
     out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
 

@@ -63,6 +63,45 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ]  # fmt: skip
 
 
+ENDS = ("original", "alpha", "beta")
+"""Designs of a case that stand beside each other."""
+
+_TOLD = {
+    "mean": "mean_true",
+    "deviation": "deviation_true",
+    "95 % below": "percentile",
+}
+"""Lines of the table of a case, and the variables they show."""
+
+
+def beside_original(verified: xr.Dataset) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """Each case, and lines of a table: what it is, and its value for each of `ENDS`, with limits and against the original."""
+    names = [str(name) for name in verified["design"].to_numpy()]
+    for case in [name.removesuffix(" original") for name in names if name.endswith(" original")]:
+        if not {f"{case} {end}" for end in ENDS} <= set(names):
+            continue
+        designs = [verified.sel(design=f"{case} {end}") for end in ENDS]
+        lines = [
+            (words, *(_against(one, designs[0], name) for one in designs))
+            for words, name in _TOLD.items()
+        ]
+        yield case, [*lines, ("held at", "", *(_bounds(one) for one in designs[1:]))]
+
+
+def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
+    """A true value, half the width of its limits, and its change from the original's."""
+    if name not in one or not np.isfinite(float(one[name])):
+        return "not known"
+    value, stem = float(one[name]), name.removesuffix("_true")
+    text = labels.quantity(value, str(one[name].attrs["units"]))
+    if f"{stem}_upper" in one and value:
+        half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
+        text += f" ±{abs(half / value):.2%}"
+    if one["design"].item() == original["design"].item():
+        return text
+    return f"{text} {value / float(original[name]) - 1.0:+.0%}"
+
+
 def _ours(verified: xr.Dataset) -> xr.Dataset:
     """Designs of the case in which most is random, the original among them, without those a publication prints."""
     rows = [k for k in range(verified.sizes["design"]) if _counts(verified.isel(design=k))]
