@@ -1,11 +1,13 @@
 """Largest Lyapunov exponents of a map's cells against those of an independent model, integrated by scipy at 1e-12 with shadows.
 
 python analysis/lyapunov.py             (a quarter of an hour on one core)
+python analysis/lyapunov.py --signs 40  (the sign alone, on random cells: fewer revolutions)
 """
 
 import argparse
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +38,9 @@ def scene_of(damping: float, clearance: float) -> Scene:
 
 def ours(scene: Scene) -> np.void:
     """The cell's record."""
-    worker = SteadyEvaluator(scene, Points((), np.empty((0, 0)), ()), procedure=mapped)
+    worker = SteadyEvaluator(
+        scene, Points((), np.empty((0, 0)), ()), procedure=partial(mapped, sure=0.05)
+    )
     worker.submit(np.zeros(1, int), np.empty((1, 0)))
     found = []
     while worker.pending:
@@ -75,17 +79,42 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--revolutions", type=int, default=60)
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--signs", type=int, default=0, metavar="CELLS")
     options = parser.parse_args()
+    if options.signs:
+        signs(options.signs)
+    else:
+        values(options.revolutions, options.seeds)
+
+
+def values(revolutions: int, seeds: int) -> None:
+    """Exponents of five cells."""
     print("damping   play     ours              theirs            difference")
     for damping, clearance in CELLS:
         scene = scene_of(damping, clearance)
         record = ours(scene)
-        found = [theirs(scene, options.revolutions, seed) for seed in range(options.seeds)]
+        found = [theirs(scene, revolutions, seed) for seed in range(seeds)]
         mean, error = np.mean(found), np.std(found, ddof=1) / math.sqrt(len(found))
         growth, limit = float(record["kick_growth"]), float(record["kick_growth_limit"])
         print(
             f"{damping:7.2f} {1e3 * clearance:5.2f} mm  {growth:6.3f} +- {limit:.3f}  {mean:6.3f} +- {error:.3f} (s.e.)  "
             f"{growth / mean - 1.0:+.1%}",
+            flush=True,
+        )
+
+
+def signs(cells: int) -> None:
+    """Signs of the exponents of random cells."""
+    rng = np.random.default_rng(7)
+    right = 0
+    for cell in range(cells):
+        damping, clearance = 10.0 ** rng.uniform(-1.7, 0.0), rng.uniform(0.1e-3, 1e-3)
+        scene = scene_of(damping, clearance)
+        growth, other = float(ours(scene)["kick_growth"]), theirs(scene, 12, cell)
+        right += growth * other > 0.0
+        print(
+            f"{cell:3} {damping:6.3f} s/m {1e3 * clearance:5.2f} mm  ours {growth:+6.2f}  theirs {other:+6.2f}  "
+            f"{right} of {cell + 1} alike",
             flush=True,
         )
 

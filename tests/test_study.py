@@ -18,6 +18,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
+from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -25,6 +26,7 @@ from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.scene.variables import SHORT_NAMES
 from hpcclear.study import (
+    chaos,
     extent,
     optimisation,
     paper,
@@ -95,7 +97,7 @@ def truth(design: dict[str, float], robust: bool) -> tuple[float, float]:
 
 def test_writes_every_result_and_leaves_no_rubbish(results):
     names = {path.name for path in results.iterdir()}
-    kinds = "samples sensitivity kriging front verification claims readings timing"
+    kinds = "samples sensitivity kriging front verification chaos claims readings timing"
     assert names == {f"{kind}.nc" for kind in kinds.split()} | {"responses"}
     for kind in kinds.split():
         found = dataset.read(results / f"{kind}.nc", kind)
@@ -237,7 +239,7 @@ def test_readings_compare_with_the_printed_values(results):
 def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_path):
     place = tmp_path / "pieces"
     stages = formula.run_in_pieces(scene_of(), place, alone())
-    assert stages == 8
+    assert stages == 9
     assert contents(place) == contents(results)
 
 
@@ -266,12 +268,40 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
     monkeypatch.setattr(readings, "simulate", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
-    at_most = ("check", "infill", "verification") if len(overrides) > 1 else ()
+    at_most = ("check", "infill", "verification", "chaos") if len(overrides) > 1 else ()
     for stage in at_most:  # rounds may win nothing, fronts be short
         assert 0.5 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]
     assert dict(made) == said
     assert extent.responses_of(scene) == responded["all"]
+
+
+def test_the_share_of_chaos_is_that_of_the_pairs():
+    rng = np.random.default_rng(11)
+    inputs, chaotic = rng.normal(10.0, 0.3, (4000, 1)), rng.normal(0.0, 0.4, (4000, 2))
+    chaotic[:1000] = 0.0  # a quarter of the samples is regular
+    deviation, share, moved = chaos.split(inputs + chaotic)
+    within = 0.75 * 0.4**2
+    assert deviation == pytest.approx(within**0.5, rel=0.05)
+    assert share == pytest.approx(within / (within + 0.3**2), rel=0.05)
+    assert moved == pytest.approx(0.75, abs=0.01)
+    assert chaos.split(np.repeat(inputs, 2, axis=1)) == (0.0, 0.0, 0.0)
+    assert np.isnan(chaos.split(np.full((8, 2), np.nan))).all()
+
+
+def test_a_formula_has_no_chaos_and_the_study_says_so(results):
+    found, verified = (dataset.read(results / f"{n}.nc") for n in ("chaos", "verification"))
+    assert set(found["design"].to_numpy()) == set(verified["design"].to_numpy())
+    assert (found["chaotic"] == 0.0).all()
+    assert (found["chaos_share"] < 1e-10).all()
+    files = {"chaos": found, "verification": verified}
+    (line,) = [one for one in answer(files, "here") if one.label == "chaos"]
+    assert line.text.startswith("0 of ")
+    spoilt = found.copy(deep=True)
+    spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
+    lines = dict(answer(files | {"chaos": spoilt}, "here"))
+    assert "moves 50% of the samples of this one, which makes 40% of its variance" in lines["chaos"]
+    assert "averaged_revolutions" in lines["next"]
 
 
 def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):
@@ -516,7 +546,7 @@ def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
     scene, place = own_scene("mechanism.rod.length=0.13"), tmp_path / "out"
     run_study(scene, place, alone(), progress_style="quiet")
     written = {path.name for path in place.glob("*.nc")}
-    kinds = ("samples", "sensitivity", "kriging", "front", "verification", "timing")
+    kinds = ("samples", "sensitivity", "kriging", "front", "verification", "chaos", "timing")
     assert written == {f"{kind}.nc" for kind in kinds}
     for path in place.rglob("*.nc"):
         found = dataset.read(path)
@@ -530,6 +560,7 @@ def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
 
 
 OF_THE_OBJECTIVE = {
+    "chaos.nc": "chaos_deviation",
     "samples.nc": "objective objective_spread objective_uncertainty",
     "sensitivity.nc": (
         "sensitivity standard_error best_sensitivity uncertainty influence mean_objective "

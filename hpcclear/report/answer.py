@@ -21,6 +21,12 @@ MANY = 0.05
 FAR = 0.2
 """Relative error of the surrogate from which it is said to be off."""
 
+SOME = 0.05
+"""Share of samples that move with a kick from which a design is called chaotic."""
+
+LARGE = 0.1
+"""Share of the variance from which chaos is worth more revolutions."""
+
 NAMED = 3
 """Designs named before the rest is counted."""
 
@@ -48,6 +54,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ours = _ours(verified)
     best = ours.isel(design=int(_judged(ours).argmin()))
     original = _original(ours)
+    scatter = _scatter(files, best)
     return [
         Line("take", _named(best)),
         Line("why", f"{labels.objective(verified)}: least mean + {SPAN:g} deviations of "
@@ -58,8 +65,9 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         Line("as good as it", _alike(ours, best)),
         Line("on a bound", _bounds(best)),
         Line("theory", _left(files, best)),
+        *([Line("chaos", scatter)] if scatter else []),
         Line("how sure", _sure(best, verified)),
-        Line("next", "; ".join(_next(ours, best, place))),
+        Line("next", "; ".join(_next(files, ours, best, place))),
     ]  # fmt: skip
 
 
@@ -219,6 +227,22 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
 
 
+def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
+    """How much of the design's scatter no input makes, and how many designs are so; "" where that was not simulated."""
+    found, name = files.get("chaos"), str(best["design"].item())
+    if found is None or name not in found["design"].to_numpy():
+        return ""
+    own = found.sel(design=name)
+    moved = (found["chaotic"] > SOME).to_numpy()
+    text = f"{int(moved.sum())} of {moved.size} designs"
+    if not float(own["chaotic"]) > SOME:
+        return f"{text}; not this one: kicks of 1e-9 leave its samples as they are"
+    return (
+        f"{text}; a kick of 1e-9 moves {float(own['chaotic']):.0%} of the samples of this one, which makes "
+        f"{float(own['chaos_share']):.0%} of its variance"
+    )
+
+
 def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     count = int(best["samples"]) if "samples" in best else 0
     level = float(verified.attrs.get("confidence", np.nan))
@@ -237,7 +261,9 @@ def _surrogate_errors(best: xr.Dataset) -> list[float]:
     return [error for error in found if np.isfinite(error)]
 
 
-def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
+def _next(
+    files: Mapping[str, xr.Dataset], ours: xr.Dataset, best: xr.Dataset, place: str
+) -> Iterator[str]:
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "mind the contact: smaller clearances or stiffer bearings, or forces are only a guide"
@@ -249,6 +275,13 @@ def _next(ours: xr.Dataset, best: xr.Dataset, place: str) -> Iterator[str]:
         yield "a smaller study.verification.accuracy tells designs apart that read the same"
     elif _twins(ours, best) and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
+    found, name = files.get("chaos"), str(best["design"].item())
+    if (
+        found is not None
+        and name in found["design"]
+        and float(found.sel(design=name)["chaos_share"]) > LARGE
+    ):
+        yield "raise numerics.averaged_revolutions: chaos falls with it, scatter of the inputs stays"
     yield (
         f"hpcclear report {place}"
         if place

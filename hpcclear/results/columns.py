@@ -256,6 +256,15 @@ VERIFICATION: Columns = {
     "on_bounds": text(("design",), "variables that sit on a bound of the study, and on which"),
 }
 
+CHAOS: Columns = {
+    "design": text(("design",), "name of the design"),
+    "chaos_deviation": number(("design",), "objective",
+        "standard deviation of the objective under kicks of 1e-9 alone", required=True),
+    "chaos_share": number(("design",), "1", "its share of the variance over random inputs", required=True),
+    "chaotic": number(("design",), "1", "share of samples whose objective moves with such a kick", required=True),
+    "pairs": count(("design",), "samples simulated twice", required=True),
+}
+
 CLAIMS: Columns = {
     "claim": count(("claim",), "number of the claim"),
     "text": text(("claim",), "what is claimed", required=True),

@@ -96,6 +96,7 @@ KINDS = {
     ),
     "front": _kind("Fronts of mean and deviation", columns.FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", columns.VERIFICATION, ("design",)),
+    "chaos": _kind("How much of the scatter of designs is chaos", columns.CHAOS),
     "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples, streamed", columns.STATISTICS),

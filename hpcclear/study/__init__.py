@@ -8,7 +8,8 @@
    decided, until it stands.
 5. Verification: the best of them, on scatter of their own. Alpha has the least mean, beta the least
    deviation, and each design of the front is surely better than each other in one of the two.
-6. Findings: responses of the optimised designs; for the scene of a publication also what it prints
+6. Chaos: samples of these designs twice, a hair beside, for the share of their scatter that is chaos.
+7. Findings: responses of the optimised designs; for the scene of a publication also what it prints
    and claims, beside ours (`hpcclear.study.paper`).
 
 Root tells this story; every simulation in it goes to all ranks. Each stage is kept on disk when it
@@ -32,6 +33,7 @@ from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study import (
+    chaos,
     optimisation,
     paper,
     refinement,
@@ -144,6 +146,9 @@ def _tell_the_story(run: StudyRun) -> None:
         run.tell(text)
     printed = paper.printed_moments(run.scene, table.choices)
     verification.write(run, table, true, model, remarks, printed)
+
+    scatter = run.stage("chaos", chaos.simulate, designs)
+    chaos.write(run, table.choices, {name: one[table.rows] for name, one in scatter.items()})
 
     series = run.stage("responses", responses.simulate_all, table.choices)
     responses.write(run, table.choices)

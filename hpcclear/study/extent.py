@@ -2,7 +2,15 @@
 
 from hpcclear.scene import Scene
 from hpcclear.scene.stages import SCRAMBLINGS
-from hpcclear.study import optimisation, refinement, responses, sensitivities, surrogates, truth
+from hpcclear.study import (
+    chaos,
+    optimisation,
+    refinement,
+    responses,
+    sensitivities,
+    surrogates,
+    truth,
+)
 from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
@@ -31,6 +39,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
         "check": begun,
         "infill": rounds,
         "verification": (extremes + verified) * count,
+        "chaos": (extremes + verified) * 2 * chaos.PAIRS,
         "readings": readings.simulations(scene)[0],
     }
 

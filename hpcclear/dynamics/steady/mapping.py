@@ -29,8 +29,9 @@ SPIN_UP = 20
 LOOKS = (20, 40, 80)
 """Revolutions after the spin-up at which the exponent is judged; the last one ends it."""
 
-SURE = 0.05
-"""Limit of an exponent that is narrow enough, over the exponent or a revolution, whichever is more."""
+SURE = 0.1
+"""Limit of an exponent that is narrow enough, over the exponent or a revolution, whichever is more: half of it takes four times
+the revolutions of a chaotic cell."""
 
 SAME = 1e-4
 """Relative difference of f between two starts that end in the same motion."""
@@ -39,8 +40,10 @@ REPEATS = 1e-5
 """Relative difference of f between two revolutions of a periodic motion that are a period apart."""
 
 
-def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
+def mapped(sample: Sample, sure: float = SURE) -> Generator[Stretch, Outcome, Mean]:
     """Judge the motion of one cell.
+
+    The other starts end with the first look at the exponent: by then they show where they end.
 
     Largest Lyapunov exponent per revolution: the mean logarithm by which the distance of a shadow grows over a revolution,
     after which it is set back along the same direction (Benettin et al. 1980, doi:10.1007/BF02128236).
@@ -48,6 +51,8 @@ def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
     Parameters
     ----------
     sample : Sample
+    sure : float
+        As `SURE`.
 
     Returns
     -------
@@ -59,8 +64,9 @@ def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
     shadow: Start | None = None
     logs: list[Array] = []
     outcomes: list[Outcome] = []
+    others: list[Outcome] = []
     for revolution in range(1, SPIN_UP + LOOKS[-1] + 1):
-        copies = OWN + OTHER
+        copies = len(start)
         rows = start.rows if shadow is None else np.concatenate([start.rows, shadow.rows])
         outcome = yield from effort.run(RTOL, 1, Start(rows), np.ones(len(rows)))
         if effort.failed is not None:
@@ -68,16 +74,19 @@ def mapped(sample: Sample) -> Generator[Stretch, Outcome, Mean]:
         end = outcome.end()
         start = end[:copies]
         if shadow is not None:
-            outcomes.append(outcome[:copies])
+            outcomes.append(outcome[:OWN])
+            if copies > OWN:
+                others.append(outcome[OWN:copies])
             grown, shadow = _set_back(start[:OWN], end[copies:], sample.scale)
             logs.append(grown)
         elif revolution == SPIN_UP:
             shadow = _shadows(start[:OWN], sample.scale)
         if len(logs) in LOOKS:
             growth, limit = _exponent(np.array(logs))
-            if limit <= SURE * max(abs(growth), 1.0) or len(logs) == LOOKS[-1]:
+            start = start[:OWN]
+            if limit <= sure * max(abs(growth), 1.0) or len(logs) == LOOKS[-1]:
                 break
-    return _judged(effort, outcomes, growth, limit)
+    return _judged(effort, outcomes, others, growth, limit)
 
 
 def _starts(sample: Sample) -> Start:
@@ -122,23 +131,36 @@ def _exponent(logs: Array) -> tuple[float, float]:
     return mean, limit
 
 
-def _judged(effort: Effort, outcomes: list[Outcome], growth: float, growth_limit: float) -> Mean:
-    gaps = np.stack([outcome.mean_gap for outcome in outcomes])  # (revolutions, copies, 2)
-    f = objective(gaps)
-    own = gaps[:, :OWN]
+def _judged(
+    effort: Effort,
+    outcomes: list[Outcome],
+    others: list[Outcome],
+    growth: float,
+    growth_limit: float,
+) -> Mean:
+    own = np.stack([outcome.mean_gap for outcome in outcomes])  # (revolutions, copies, 2)
+    f = objective(own)
     mean = float(objective(own.mean(axis=(0, 1))))
-    period = judging.period_of(f[:, :OWN], REPEATS * mean)
-    means = objective(gaps.mean(axis=0))
-    scatter = f.std(axis=0, ddof=1) / np.sqrt(len(f))
-    limit = judging.student(means[:OWN])[2]
-    several = bool(np.ptp(means[:OWN]) > 2.0 * SAME * mean + 6.0 * scatter[:OWN].max())
+    period = judging.period_of(f, REPEATS * mean)
+    means, scatter = _averages(own)
+    limit = judging.student(means)[2]
+    several = bool(np.ptp(means) > 2.0 * SAME * mean + 6.0 * scatter.max())
     chaotic = growth > growth_limit and period is None
     regime = Regime.CHAOTIC if chaotic else Regime.SEVERAL if several else Regime.REGULAR
-    kept = Outcome(np.stack([outcome.rows[:OWN] for outcome in outcomes]))
+    further = _averages(np.stack([outcome.mean_gap for outcome in others]))
+    every, doubts = (np.concatenate([means, further[0]]), np.concatenate([scatter, further[1]]))
+    kinds = _kinds(every, doubts, mean)
+    kept = Outcome(np.stack([outcome.rows for outcome in outcomes]))
     return effort.mean(
         regime=regime, limit=limit, outcomes=kept, stretch=1, rtol=RTOL, met=True, period=period, growth=growth,
-        growth_limit=growth_limit, attractors=_kinds(means, scatter, mean),
+        growth_limit=growth_limit, attractors=kinds,
     )  # fmt: skip
+
+
+def _averages(gaps: Array) -> tuple[Array, Array]:
+    """f and its standard error of each copy, shape (copies,), from mean gaps (revolutions, copies, 2)."""
+    scatter = objective(gaps).std(axis=0, ddof=1) / np.sqrt(len(gaps))
+    return objective(gaps.mean(axis=0)), scatter
 
 
 def _kinds(means: Array, scatter: Array, f: float) -> int:

@@ -1,0 +1,82 @@
+"""How much of a verified design's scatter is chaos: the same samples once more, a hair beside.
+
+Where motion is chaotic, or settles on an orbit that the smallest kick decides, a finite average of it is a random number
+whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `KICK` tell how much.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcclear.results import dataset
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+
+PAIRS = 64
+"""Samples of a design that are simulated twice: the variance of pairs is known to a fifth of itself."""
+
+KICK = 1e-9
+"""Relative change of all variables of a sample."""
+
+SAME = 1e-4
+"""Relative difference of a pair that a regular motion stays below."""
+
+
+def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
+    """Deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where all failed.
+
+    Raises
+    ------
+    InputError
+        If all simulations fail.
+    """
+    batches = []
+    for choice in choices:
+        points = monte_carlo(
+            run.scene, PAIRS, random=run.study.case(choice.case).random,
+            design=dict(choice.design), purpose="chaos",
+        )  # fmt: skip
+        batches.append(run.simulations.filled(points.names, points.values))
+    values = np.stack([batch.values for batch in batches])
+    pairs = np.stack([values, values * (1.0 + KICK)], axis=2)  # (designs, PAIRS, 2, variables)
+    names, paths = batches[0].names, batches[0].paths
+    points = Points(names, pairs.reshape(-1, len(names)), paths)
+    f = run.simulations.objective(run.simulations.records(points, "chaos"))
+    table = np.array([split(one) for one in f.reshape(len(choices), PAIRS, 2)])
+    return {"deviation": table[:, 0], "share": table[:, 1], "chaotic": table[:, 2]}
+
+
+def split(pairs: np.ndarray) -> tuple[float, float, float]:
+    """Deviation within pairs, its share of the variance, share of pairs that differ, from values (n, 2), NaN where failed."""
+    good = pairs[np.isfinite(pairs).all(axis=1)]
+    if len(good) < 4:
+        return np.nan, np.nan, np.nan
+    apart = good[:, 1] - good[:, 0]
+    within = float(np.mean(apart**2)) / 2.0
+    total = float(np.var(good, axis=0, ddof=1).mean())
+    share = min(within / total, 1.0) if total > 0.0 else 0.0
+    chaotic = np.abs(apart) > SAME * np.abs(good).mean(axis=1)
+    return within**0.5, share, float(chaotic.mean())
+
+
+def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
+    """Write chaos.nc.
+
+    Parameters
+    ----------
+    run : StudyRun
+    choices : sequence of Choice
+    found : dict of arrays, shape (n,)
+        Of `simulate`.
+    """
+    coords = {"design": np.array([choice.name for choice in choices])}
+    data = {
+        "chaos_deviation": found["deviation"],
+        "chaos_share": found["share"],
+        "chaotic": found["chaotic"],
+        "pairs": np.full(len(choices), PAIRS),
+    }
+    content = dataset.dataset("chaos", coords, data, objective=run.scene.objective)
+    run.write(content, "chaos.nc")
