@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar import planar_mechanism, slider_crank_mechanism
+from hpcclear.dynamics.planar.tables import planar_mechanism, slider_crank_mechanism
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Parameters
 

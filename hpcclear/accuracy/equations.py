@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
-from hpcclear.dynamics.layout import TURN
+from hpcclear.dynamics.layout import MAX_JOINTS, TURN
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
 from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.problem import Problem
@@ -23,7 +23,7 @@ def latch(contacts, seen, floor):
     for j in range(2):
         if contacts[j] == 0.0 and seen[j, OPEN] > 0.0:
             contacts[j] = 1.0
-            contacts[2 + j] = 1.0 / max(seen[j, RATE], floor)
+            contacts[MAX_JOINTS + j] = 1.0 / max(seen[j, RATE], floor)
             changed = True
         elif contacts[j] == 1.0 and seen[j, OPEN] < 0.0:
             contacts[j] = 0.0

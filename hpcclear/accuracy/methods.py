@@ -15,7 +15,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import views
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.layout import TURN
+from hpcclear.dynamics.layout import MAX_JOINTS, TURN
 from hpcclear.dynamics.linkage import geometry
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.problem import Problem, problem_of
@@ -236,7 +236,7 @@ def solve_turn(
             if here.latched:
                 here.contacts[j] = float(side[j] > 0.0)
                 rate = here.joints(t, y)[j, RATE]
-                here.contacts[2 + j] = 1.0 / max(rate, one.problem.impact_floor)
+                here.contacts[MAX_JOINTS + j] = 1.0 / max(rate, one.problem.impact_floor)
     return (np.nan,) * 4, count
 
 

@@ -8,7 +8,10 @@ from enum import IntEnum
 import numpy as np
 
 JOINTS = ("crank_rod", "rod_slider")
-"""Joint labels in every dataset: O12 and O23 of the paper."""
+"""Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
+
+MAX_JOINTS = 8
+"""Joints that a record has room for; datasets hold those that the scene has."""
 
 
 class Status(IntEnum):
@@ -121,9 +124,17 @@ OUTCOME = np.dtype(
             "objective_uncertainty",
             np.float64,
         ),  # m, scatter over kicked copies; NaN unless asked for
-        ("mean_gap", np.float64, 2),  # m, time mean of | |e| - c | at each joint
-        ("peak_contact_force", np.float64, 2),  # N, at each joint over the averaged revolutions
-        ("mean_contact_force", np.float64, 2),  # N; NaN unless the study's objective asks for it,
+        ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
+        (
+            "peak_contact_force",
+            np.float64,
+            MAX_JOINTS,
+        ),  # N, at each joint over the averaged revolutions
+        (
+            "mean_contact_force",
+            np.float64,
+            MAX_JOINTS,
+        ),  # N; NaN unless the study's objective asks for it,
         ("peak_crank_moment", np.float64),  # N m, likewise
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
@@ -135,7 +146,7 @@ OUTCOME = np.dtype(
         ("steady_rtol", np.float64),  # the tightest tolerance used
         ("steady_revolutions", np.float64),  # of all copies, spin-up included
         ("regime", np.int8),
-        ("latched", np.int8, 2),
+        ("latched", np.int8, MAX_JOINTS),
         ("rhs_evaluations", np.int64),
         ("status", np.int8),
         ("flags", np.int8),

@@ -5,6 +5,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.linkage import baumgarte, geometry
 from hpcclear.dynamics.parameters import topology
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.response import contacts_on, elastic_energy
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
 
@@ -21,8 +23,8 @@ def energies(
         Kernel parameters, of one sample or a row for each state.
     q, v : ndarray, shape (n, m)
         The kernel's coordinates and velocities in any formulation.
-    active : ndarray, shape (m, 2)
-        Contact flags of both joints.
+    active : ndarray, shape (m, MAX_JOINTS)
+        Contact flags of the joints.
     turn_time : ndarray, shape (m,), optional
         s, since the start of the revolution: tells the crank angle where it is no coordinate.
 
@@ -31,6 +33,8 @@ def energies(
     tuple of ndarray, shape (m,)
         J.
     """
+    if scene.is_planar:
+        return _of_linkage(scene, par, q, v, active, turn_time)
     first, second, free = topology(scene)
     p = Parameters(par)
     nine = scene.numerics.formulation == "baumgarte"
@@ -51,6 +55,18 @@ def energies(
             on = active[:, k] if latched else 1.0
             total = total + 0.4 * p.stiffness[..., k] * on * gap**2.5
     return kinetic, total
+
+
+def _of_linkage(
+    scene: Scene, par: Array, q: Array, v: Array, active: Array, time: Array | float
+) -> tuple[Array, Array]:
+    """`energies` of a linkage."""
+    linkage = linkage_of(scene)
+    kinetic, potential, eccentricity = linkage.energies(par, q, v, time, scene.effects.gravity)
+    p, count = Parameters(par), len(eccentricity)
+    gaps = np.hypot(eccentricity[:, 0], eccentricity[:, 1]).T - p.clearance[..., :count]
+    on = contacts_on(scene, active, count)
+    return kinetic, kinetic + potential + elastic_energy(p.stiffness[..., :count], gaps, on)
 
 
 def of_starts(scene: Scene, par: Array, start: Start, n: int) -> Array:

@@ -9,6 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
@@ -104,8 +105,9 @@ class Evaluator:
 
     def submit(self, index: Integers, points: Array) -> None:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
-        par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
-        start = start_states(self.scene, par)
+        made = Points(self._columns.names, points, self._columns.paths)
+        par = parameters(self.scene, made)
+        start = start_states(self.scene, par, made)
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
             par, start, labels = with_copies(par, start, labels)
@@ -150,7 +152,8 @@ def with_copies(par: Array, start: Start, labels: Integers) -> tuple[Array, Star
     par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))
     Parameters(par).strictness = np.tile(strict**2, len(labels))
     # Signs alternate over the coordinates, so that the kick is no motion of the mechanism as a whole.
-    pattern = np.where(np.arange(start.moving.shape[-1]) % 2 == 0, 1.0, -1.0)
+    signs = np.where(np.arange(at.MAX_COORDINATES) % 2 == 0, 1.0, -1.0)
+    pattern = np.concatenate([signs, -signs])  # of coordinates, then of velocities
     start.moving *= 1.0 + KICK * np.tile(kicks, len(labels))[:, None] * pattern
     copies = (labels[:, None] + np.arange(count)).ravel()
     return par, start, copies
@@ -208,6 +211,7 @@ def outcome_records(
 def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
     """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
     p = Parameters(par)
-    ratio = p.journal_radius / p.bearing_radius
+    # places without a joint have neither radii nor penetration
+    ratio = p.journal_radius / np.maximum(p.bearing_radius, 1e-300)
     beyond: Booleans = outcome.deepest > HERTZ_RANGE * ratio * p.clearance
-    return beyond[:, 0] | beyond[:, 1]
+    return beyond.any(axis=1)

@@ -13,7 +13,6 @@ from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import make_stepper
 from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.memory import LANES
-from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.stepping.settings import COUNTERS, FINISHED, NEXT_SLOT, RECORDED, SLOTS
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -64,10 +63,10 @@ class Lanes:
             self._memory = lobatto.new_memory()
         at_once = self._memory is not None  # evaluations of one lane, eight side by side
         effects = problem.effects._replace(sliding=1 if at_once else None)
-        self._motion = motion_of(effects, width).address
-        self._bank = motion_of(effects, LANES).address if at_once else 0
+        self._motion = problem.motion(effects, width).address
+        self._bank = problem.motion(effects, LANES).address if at_once else 0
         self._rules = at.rules_of(effects)
-        joints, recorded = (effects.crank_rod, effects.rod_slider), record is not None
+        joints, recorded = at.open_of(effects), record is not None
         self._step = (
             make_collocation_stepper(n, joints, recorded=recorded)
             if problem.collocation
@@ -76,7 +75,7 @@ class Lanes:
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
         self._accept_queue(
-            np.empty((0, Parameters.size)), np.empty((0, Start.size)), np.empty(0, np.int64)
+            np.empty((0, problem.parameter_rows)), np.empty((0, Start.size)), np.empty(0, np.int64)
         )
 
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:

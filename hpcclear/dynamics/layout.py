@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.outcome import MAX_JOINTS
+
 TURN = 6.283185307179586  # rad
 
-MAX_COORDINATES = 9  # Baumgarte: three bodies in the plane
+MAX_COORDINATES = 24
 COORDINATES = np.arange(MAX_COORDINATES)
 """For loops written out over them: as numbers they would have every function compiled anew for each of them."""
 
@@ -20,6 +22,7 @@ class Effects(NamedTuple):
 
     crank_rod: Any = None  # clearance at O12
     rod_slider: Any = None  # clearance at O23
+    joints: Any = None  # of a linkage other than the slider-crank: how many have clearance
     fixed: Any = None  # fixed damping factor (Hunt-Crossley)
     latched: Any = None  # damping by restitution, impact speed latched
     coulomb: Any = None
@@ -35,6 +38,27 @@ class Effects(NamedTuple):
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
     sliding: Any = None  # sliding speeds, for the implicit method
+    swinging: Any = None  # the drive that gives the period does not turn round
+
+
+class Open(NamedTuple):
+    """Which places of joints hold one with clearance (1), and which none (None)."""
+
+    joint_0: Any = None
+    joint_1: Any = None
+    joint_2: Any = None
+    joint_3: Any = None
+    joint_4: Any = None
+    joint_5: Any = None
+    joint_6: Any = None
+    joint_7: Any = None
+
+
+def open_of(effects: Effects) -> Open:
+    """Those of a set of effects: O12 has the first place and O23 the second; other linkages fill them from the first on."""
+    if effects.joints is not None:
+        return Open(*[1] * effects.joints)
+    return Open(effects.crank_rod, effects.rod_slider)
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
@@ -67,8 +91,8 @@ class Effects(NamedTuple):
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
 ) = range(27)
-JOINT_12 = 27
-JOINT_23 = 37
+JOINT_ROWS = 10
+JOINT_BLOCKS = 27  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,
@@ -80,17 +104,22 @@ JOINT_23 = 37
     INVERSE_RAMP,
     DEAD_SPEED,
 ) = range(8)
-PARAMETERS = 47
+JOINT_12 = JOINT_BLOCKS
+JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
+OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
+"""First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
+PARAMETERS = OWN + 192
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
+# three of each joint: gap, normal force, rate of the gap
 (GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
-(DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(6, 10)
-(FRICTION_12, FRICTION_23, DRIVE_MOMENT) = range(
-    10, 13
-)  # for time series (the last, for responses)
-(SLIDING_12, SLIDING_23) = range(13, 15)  # for the implicit method only
-(SLIDER_ACCELERATION, SLIDER_SQUARE) = range(15, 17)  # and its square; for responses only
-RATES = 17
+(DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
+FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
+DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
+SLIDINGS = DRIVE_MOMENT + 1  # of each joint, for the implicit method only
+FOLLOWED_ACCELERATION = SLIDINGS + MAX_JOINTS  # of the slider; for responses only
+FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
+RATES = FOLLOWED_SQUARE + 1
 
 
 class Integrated(NamedTuple):
@@ -103,29 +132,33 @@ class Integrated(NamedTuple):
     clearance: int | None = None
 
 
-INTEGRATED = (
-    Integrated(GAP_12, "crank_rod", JOINT_12 + CLEARANCE),
-    Integrated(GAP_23, "rod_slider", JOINT_23 + CLEARANCE),
+_PLACES = range(MAX_JOINTS)
+GAPS = tuple(
+    Integrated(3 * k, f"joint_{k}", JOINT_BLOCKS + JOINT_ROWS * k + CLEARANCE) for k in _PLACES
+)
+_FORCES = tuple(Integrated(3 * k + 1, "responses") for k in _PLACES)
+MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
     Integrated(ABS_DRIVE_POWER, "ledger"),
     Integrated(DISSIPATION, "ledger"),
     Integrated(LOAD_POWER, "ledger"),
-    Integrated(FORCE_12, "responses"),
-    Integrated(FORCE_23, "responses"),
-    Integrated(SLIDER_ACCELERATION, "responses"),
-    Integrated(SLIDER_SQUARE, "responses"),
+    *_FORCES,
+    Integrated(FOLLOWED_ACCELERATION, "responses"),
+    Integrated(FOLLOWED_SQUARE, "responses"),
 )
+INTEGRATED = (*GAPS, *MEASURES)
 """All that is integrated. The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
 
-GAPS = tuple(one for one in INTEGRATED if one.clearance is not None)
-MEASURES = tuple(one for one in INTEGRATED if one.clearance is None)
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
-    asked = (one.rate for one in MEASURES if getattr(effects, one.asked_by) is not None)
-    return np.array(list(asked), np.int64)
+    closed = {
+        force.rate for force, flag in zip(_FORCES, open_of(effects), strict=True) if flag is None
+    }
+    asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
+    return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
 
 
 def place(rate: int) -> int:
@@ -154,17 +187,7 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     ERROR,  # mean square of the scaled error
     LOG_ERROR,  # log2 of the last accepted one
     ACCEPT,  # 1 or 0
-    ACTIVE_12,  # contact latched (1) or flight (0)
-    ACTIVE_23,
-    INVERSE_IMPACT_12,  # 1 / d'_0
-    INVERSE_IMPACT_23,
-    PEAK_12,
-    PEAK_23,
     PEAK_MOMENT,  # of the drive, its size
-    DEEPEST_12,  # largest penetration over clearance
-    DEEPEST_23,
-    ENDED_12,  # contacts ended in this revolution
-    ENDED_23,
     AVERAGING,  # 1 once the transient is over
     ATTEMPTS,  # steps tried, accepted or not
     EVALUATIONS,
@@ -180,10 +203,17 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-    TORQUE_VALUE,  # of a tabulated drive torque at the stage
-    LOAD_VALUE,  # of a tabulated slider load
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 35)
-WORK = INTEGRAL + RATES + 35
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 23)
+MAX_CURVES = 8
+CURVES = CALM + 1  # values of tabulated curves at the stage
+TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
+# of each joint
+ACTIVE = CURVES + MAX_CURVES  # contact latched (1) or flight (0)
+INVERSE_IMPACT = ACTIVE + MAX_JOINTS  # 1 / d'_0
+PEAK = INVERSE_IMPACT + MAX_JOINTS
+DEEPEST = PEAK + MAX_JOINTS  # largest penetration
+ENDED = DEEPEST + MAX_JOINTS  # contacts ended in this revolution
+WORK = ENDED + MAX_JOINTS
 
 BANK = WORK + PARAMETERS
 """Rows of what a motion reads and writes: those of `work`, then the parameters."""
@@ -191,7 +221,7 @@ BANK = WORK + PARAMETERS
 # ---- tabulated curves, one behind the other -----------------------------------------------------
 CELLS = 2048  # cubic cells over one turn, 4 coefficients each
 TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
-TABLES = 8 * CELLS
+TABLES = 4 * MAX_CURVES * CELLS  # at most
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 (
@@ -201,14 +231,15 @@ TABLES = 8 * CELLS
     MEAN_F,  # Welford mean of the revolution's objective
     M2_F,
     COUNT_F,
-    LATCHED_12,
-    LATCHED_23,
     ELAPSED,  # s, whole revolutions so far
     LAST_F,  # the objective of the revolution before
     LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
     FIRST_F,
-) = range(12)
-AVERAGED = 12  # integrals over the averaged revolutions, in the order of INTEGRATED
+) = range(10)
+LATCHED = 10  # of each joint
+AVERAGED = (
+    LATCHED + MAX_JOINTS
+)  # integrals over the averaged revolutions, in the order of INTEGRATED
 TOTAL = AVERAGED + len(INTEGRATED)  # integrals over all revolutions, likewise
 BOOK = TOTAL + len(INTEGRATED)
 
@@ -217,32 +248,30 @@ BOOK = TOTAL + len(INTEGRATED)
     OUT_STATUS,
     OUT_OBJECTIVE,
     OUT_SPREAD,
-    OUT_PEAK_12,
-    OUT_PEAK_23,
-    OUT_LATCHED_12,
-    OUT_LATCHED_23,
-    OUT_DEEPEST_12,
-    OUT_DEEPEST_23,
     OUT_EVALUATIONS,
     OUT_REVOLUTIONS,
     OUT_TIME,
-    OUT_ACTIVE_12,
-    OUT_ACTIVE_23,
-    OUT_INVERSE_IMPACT_12,
-    OUT_INVERSE_IMPACT_23,
     OUT_ATTEMPTS,
     OUT_STIFF_STEPS,
     OUT_MOMENT,
     OUT_ACCELERATION,
-) = range(20)
-OUT_MEAN = 20  # time means over the averaged revolutions, in the order of INTEGRATED
+) = range(10)
+# of each joint
+OUT_PEAK = 10
+OUT_LATCHED = OUT_PEAK + MAX_JOINTS
+OUT_DEEPEST = OUT_LATCHED + MAX_JOINTS
+OUT_ACTIVE = OUT_DEEPEST + MAX_JOINTS
+OUT_INVERSE_IMPACT = OUT_ACTIVE + MAX_JOINTS
+OUT_MEAN = (
+    OUT_INVERSE_IMPACT + MAX_JOINTS
+)  # time means over the averaged revolutions, in the order of INTEGRATED
 OUT_TOTAL = OUT_MEAN + len(INTEGRATED)  # integrals over all revolutions, likewise
 OUT_STATE = OUT_TOTAL + len(INTEGRATED)
 OUT = OUT_STATE + 2 * MAX_COORDINATES
 
 # ---- one sample to come ---------------------------------------------------------------------------
 START_CONTACTS = 2 * MAX_COORDINATES  # after coordinates and velocities: active flags, then 1/d'_0
-START = START_CONTACTS + 4
+START = START_CONTACTS + 2 * MAX_JOINTS
 
 
 # ---- what the steppers hand on as one -------------------------------------------------------------
@@ -260,16 +289,18 @@ class Joint(NamedTuple):
     peak: int
     deepest: int
     ended: int
+    latched: int  # of the books
+    flag: str  # of `Open`
 
 
-O12 = Joint(
-    JOINT_12, GAP_12, FORCE_12, RATE_12, FRICTION_12, SLIDING_12,
-    ACTIVE_12, INVERSE_IMPACT_12, PEAK_12, DEEPEST_12, ENDED_12,
+JOINTS = tuple(
+    Joint(
+        JOINT_BLOCKS + JOINT_ROWS * k, 3 * k, 3 * k + 1, 3 * k + 2, FRICTIONS + k, SLIDINGS + k,
+        ACTIVE + k, INVERSE_IMPACT + k, PEAK + k, DEEPEST + k, ENDED + k, LATCHED + k, f"joint_{k}",
+    )
+    for k in _PLACES
 )  # fmt: skip
-O23 = Joint(
-    JOINT_23, GAP_23, FORCE_23, RATE_23, FRICTION_23, SLIDING_23,
-    ACTIVE_23, INVERSE_IMPACT_23, PEAK_23, DEEPEST_23, ENDED_23,
-)  # fmt: skip
+O12, O23 = JOINTS[:2]
 
 
 class Block(NamedTuple):
@@ -317,14 +348,14 @@ class Rules(NamedTuple):
 def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
-    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, e.torque or e.baumgarte)
-    return Rules(*(int(flag is not None) for flag in (*flags, e.responses)))
+    turning = e.torque or (None if e.swinging else e.baumgarte)
+    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses)
+    return Rules(*(int(flag is not None) for flag in flags))
 
 
 class Stepped(NamedTuple):
-    """What the functions of a stepper read: which joints are open (None or 1, known when it is compiled), rules, measures."""
+    """What the functions of a stepper read: which joints are open (known when it is compiled), rules, measures."""
 
-    crank_rod: Any
-    rod_slider: Any
+    open: Any
     rules: Rules
     measures: Any

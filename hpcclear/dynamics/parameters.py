@@ -7,6 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.physics import contact
+from hpcclear.dynamics.planar.problem import parameters_of
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -38,7 +39,15 @@ def topology(scene: Scene) -> tuple[bool, bool, bool]:
 def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
-    p = np.ones((get.size, at.PARAMETERS))
+    if scene.is_planar:
+        p = parameters_of(scene, get, points)
+        for k, joint in enumerate(scene.clearance_joints()):
+            key = scene.joint_key(joint)
+            block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+            _joint_parameters(scene, get, key, f"{key}.materials", p[:, block:])
+        return p
+    p = np.ones((get.size, at.OWN))
+    p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
     body = {
         name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
     }
@@ -66,7 +75,8 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     _outside_parameters(scene, get, p)
     for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
         if joint in scene.clearance_joints():
-            _joint_parameters(scene, get, joint, p[:, base:])
+            key = scene.joint_key(joint)
+            _joint_parameters(scene, get, key, key, p[:, base:])
     return p
 
 
@@ -81,13 +91,12 @@ def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
         p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")
 
 
-def _joint_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
-    """Fill one joint's block of parameters (a view, first column its first entry)."""
-    key = f"joints.{joint}"
+def _joint_parameters(scene: Scene, get: Numbers, key: str, materials: str, p: Array) -> None:
+    """Fill one joint's block of parameters (a view, first column its first entry) from the tables at these paths."""
     clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
     h_bearing, h_journal = (
         contact.reduced_compliance(
-            get(f"{key}.{part}.youngs_modulus"), get(f"{key}.{part}.poisson_ratio")
+            get(f"{materials}.{part}.youngs_modulus"), get(f"{materials}.{part}.poisson_ratio")
         )
         for part in ("bearing", "journal")
     )

@@ -8,13 +8,20 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
+from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.parts import Harmonic, TorqueDrive
+from hpcclear.dynamics.linkage.rhs import compiled_motion, motion_of
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.physics import contact
+from hpcclear.dynamics.planar import problem as planar
+from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.views import Parameters, Settings
 from hpcclear.scene import Scene
 from hpcclear.scene.fields import Curve
+from hpcclear.scene.planar import turns_of
 
 LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""
@@ -59,6 +66,14 @@ class Problem:
         When lanes take implicit steps, a key of `IMPLICIT_USE`.
     collocation : bool
         Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes.
+    cycle : float
+        By how much the driven body turns in a revolution, rad.
+    parameter_rows : int
+        Parameters of a sample.
+    linkage : Linkage, optional
+        Whose motion it is; without one, a slider-crank's by its effects.
+    curves : tuple of numpy.ndarray
+        Cubic cells of a linkage's tables.
 
     Raises
     ------
@@ -81,6 +96,10 @@ class Problem:
     load_table: Array | None = None
     implicit: str = "never"
     collocation: bool = False
+    cycle: float = at.TURN
+    parameter_rows: int = at.OWN
+    linkage: Linkage | None = None
+    curves: tuple[Array, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.coordinates
@@ -106,41 +125,59 @@ class Problem:
         s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
+        s.cycle, s.parameter_rows, s.chosen = self.cycle, self.parameter_rows, 1.0
         s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
         return s
 
+    def motion(self, effects: at.Effects, width: int) -> Any:
+        """The compiled motion of so many lanes with these effects (`rhs.motion_of`)."""
+        if self.linkage is None:
+            return motion_of(effects, width)
+        return compiled_motion(self.linkage.module(effects), effects, width)
+
     @property
     def tables(self) -> Array:
-        """The tabulated curves as the kernel reads them, (TABLES,); one that is absent is never looked up."""
-        tables = np.zeros(at.TABLES)
-        for first, table in (
-            (at.TORQUE_TABLE, self.torque_table),
-            (at.LOAD_TABLE, self.load_table),
-        ):
-            if table is not None:
-                tables[first : first + len(table)] = table
-        return tables
+        """The tabulated curves as the kernel reads them, one behind the other; one that is absent is never looked up."""
+        curves = self.curves if self.linkage is not None else (self.torque_table, self.load_table)
+        tables = np.zeros((len(curves), 4 * at.CELLS))
+        for row, curve in zip(tables, curves, strict=True):
+            if curve is not None:
+                row[:] = curve
+        return tables.ravel()
 
 
 def coordinate_count(scene: Scene) -> int:
     """Coordinates that are integrated; 0 leaves closed-form kinematics."""
+    if scene.is_planar:
+        return (
+            0 if planar.is_prescribed(scene) else len(planar.linkage_of(scene).forest.coordinates)
+        )
     if scene.numerics.formulation == "baumgarte":
-        return at.MAX_COORDINATES
+        return 9  # three bodies in the plane
     first, second, free = topology(scene)
     return {0: 0, 1: 2, 2: 4}[first + second] + free
 
 
 def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
-    first, second, free = topology(scene)
     e = scene.effects
-    contact_law = e.contact.law if e.contact is not None and (first or second) else None
-    friction_law = e.friction.law if first or second else None
+    count = len(scene.clearance_joints())
+    swings = False
+    if scene.is_planar:
+        first = second = False
+        main = planar.linkage_of(scene).mechanism.period
+        free, swings = isinstance(main, TorqueDrive), isinstance(main, Harmonic)
+    else:
+        first, second, free = topology(scene)
+    contact_law = e.contact.law if e.contact is not None and count else None
+    friction_law = e.friction.law if count else None
     torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
     load_is_table = isinstance(e.slider_load, tuple)
     return at.Effects(
         crank_rod=_flag(first),
         rod_slider=_flag(second),
+        joints=count if scene.is_planar else None,
+        swinging=_flag(swings),
         fixed=_flag(contact_law == "hunt-crossley"),
         latched=_flag(contact_law in contact.LATCHED_LAWS),
         coulomb=_flag(friction_law == "coulomb"),
@@ -173,6 +210,8 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the crank pin moves
     slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
     """
+    if scene.is_planar:
+        return planar.absolute_tolerances(scene)
     first, second, free = topology(scene)
     a = scene.numerics.absolute_tolerance
     if scene.numerics.formulation == "baumgarte":
@@ -187,20 +226,22 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     coordinates = [a if length else 10.0 * a for length in lengths]
     drive = scene.drive
     speed = drive.initial_speed if drive.kind == "torque" else drive.speed
-    rate = 1e3 * min(1.0, scene.mechanism.crank.length * abs(speed) / 25.0)
+    rate = 1e3 * min(1.0, scene.slider_crank.crank.length * abs(speed) / 25.0)
     velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
     return (*coordinates, *velocities)
 
 
-def periodic_cells(curve: tuple[tuple[float, float], ...], cells: int = at.CELLS) -> Array:
-    """A tabulated curve over one turn as cubic cells on a uniform grid, 4 coefficients each (flat).
+def periodic_cells(
+    curve: tuple[tuple[float, float], ...], cells: int = at.CELLS, turns: int = 1
+) -> Array:
+    """A tabulated curve over one turn, or several, as cubic cells on a uniform grid, 4 coefficients each (flat).
 
     Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
     no overshoot, and smooth enough not to stop the integrator at each of them.
     """
     from scipy.interpolate import PchipInterpolator
 
-    angles = np.array([a for a, _ in curve])
+    angles = np.array([a for a, _ in curve]) / turns
     values = np.array([v for _, v in curve])
     if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
         angles, values = angles[:-1], values[:-1]
@@ -238,9 +279,10 @@ def implicit_method(scene: Scene) -> str:
     par = Parameters(parameters(scene)[0])
     friction = scene.effects.friction.law
     contact_law = getattr(scene.effects.contact, "law", "hertz")
-    is_open = np.array(topology(scene)[:2])
-    ramp = par.friction * par.inverse_ramp if friction != "none" else np.zeros(2)
-    damping = par.damping if contact_law != "hertz" else np.zeros(2)
+    is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
+    none = np.zeros(at.MAX_JOINTS)
+    ramp = par.friction * par.inverse_ramp if friction != "none" else none
+    damping = par.damping if contact_law != "hertz" else none
     stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
     return "stiff" if (stiff & is_open).any() else "never"
 
@@ -258,16 +300,19 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         If it is named and cannot be had.
     """
     minimal = scene.numerics.formulation == "minimal"
+    minimal = minimal and coordinate_count(scene) <= MOST_COORDINATES
     if scene.numerics.method == "lobatto":
         if not minimal:
             raise InputError(
                 "numerics.method",
                 "lobatto",
-                "works in minimal coordinates only",
+                f"works in minimal coordinates only, and with {MOST_COORDINATES} of them at most",
                 'set numerics.formulation = "minimal" or another method',
             )
         return True
     curves = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
+    if scene.is_planar:
+        curves = tuple(curves_of(planar.tables_of(scene)).values())
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
     return single and automatic and smooth and scene.numerics.rtol <= TIGHT
@@ -279,6 +324,11 @@ def problem_of(
     """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
+    linkage, turns, curves = None, 1, ()
+    if scene.is_planar:
+        linkage, tables = planar.linkage_of(scene), planar.tables_of(scene)
+        turns = turns_of(tables)
+        curves = tuple(periodic_cells(curve, turns=turns) for curve in curves_of(tables).values())
     averaged: Any = scene.numerics.averaged_revolutions
     auto = averaged == "auto"
     return Problem(
@@ -297,6 +347,10 @@ def problem_of(
         load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
+        cycle=turns * at.TURN,
+        parameter_rows=at.OWN if linkage is None else linkage.parameter_rows,
+        linkage=linkage,
+        curves=curves,
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import outcome_records
@@ -17,8 +18,11 @@ from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.response import Seen
+from hpcclear.dynamics.planar.response import labels as planar_labels
+from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.problem import (
     Problem,
     coordinate_count,
@@ -45,7 +49,7 @@ class Steps:
     time: Array
     turn_time: Array  # since the start of the revolution
     revolution: Array
-    contacts: Array  # (s, 4): active flags and 1/d'_0, valid until the next step
+    contacts: Array  # (s, 2 MAX_JOINTS): active flags, then 1/d'_0, valid until the next step
     works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
     q: Array  # (s, n)
     v: Array
@@ -70,12 +74,11 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
     rows = np.concatenate(chunks)
     labels, out, finished = lanes.collect()
     s = rec.STATE
-    contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
     steps = Steps(
         rows[:, rec.TIME],
         rows[:, rec.TURN_TIME],
         rows[:, rec.REVOLUTION],
-        rows[:, contacts],
+        rows[:, rec.CONTACTS : rec.DRIVE_WORK],
         rows[:, rec.DRIVE_WORK : rec.STATE],
         rows[:, s : s + n],
         rows[:, s + n : s + 2 * n],
@@ -88,7 +91,7 @@ def _first_row(problem: Problem, par: Array, start: Start, n: int) -> Array:
     """The start as a row of the record."""
     row = np.zeros((1, rec.columns(n)))
     states = start.state(n)[None]
-    contacts = [rec.ACTIVE_12, rec.ACTIVE_23, rec.INVERSE_12, rec.INVERSE_23]
+    contacts = slice(rec.CONTACTS, rec.DRIVE_WORK)
     row[0, contacts] = start.contacts
     row[:, rec.STATE : rec.STATE + 2 * n] = states
     accelerations, _ = _observed(problem, par, states, row[:, contacts], np.zeros(1))
@@ -104,22 +107,28 @@ def _observed(
     out = np.zeros((len(times), n + Rates.size))
     states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
     observe(
-        motion_of(problem.effects, 1).address, par, problem.tables, states, contacts, times, out
+        problem.motion(problem.effects, 1).address,
+        par,
+        problem.tables,
+        states,
+        contacts,
+        times,
+        out,
     )
     return out[:, :n], Rates(out[:, n:])
 
 
 def _between(
-    steps: Steps, times: Array, free: bool
+    steps: Steps, times: Array, cycle: float
 ) -> tuple[Array, Array, Array, NDArray[np.intp], Array]:
     """States, contacts, step index and time within the step at given times.
 
     Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
-    accurate as the integrator; a free crank's angle restarts every turn and is unwrapped first.
+    accurate as the integrator; a free crank's angle restarts every `cycle` and is unwrapped first.
     """
     q = steps.q.copy()
-    if free:
-        q[:, -1] += TURN * steps.revolution
+    if cycle:
+        q[:, -1] += cycle * steps.revolution
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
     h = (steps.time[k + 1] - steps.time[k])[:, None]
     s = (times - steps.time[k])[:, None] / h
@@ -195,16 +204,19 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
     elif named.numerics.uncertainty and coordinate_count(scene):
         record["objective_uncertainty"] = evaluate_records(scene, _ITSELF)["objective_uncertainty"]
     record = asked(record, objective)
+    labels = scene.joint_labels
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(scene.effects.slider_load, data["crank_angle"])
     return dataset.response_dataset(
         times,
-        {**data, **{name: record[name][0] for name in names}},
+        {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene, single=True)},
         objective,
+        labels,
+        planar_labels(linkage_of(scene).mechanism) if scene.is_planar else None,
     )
 
 
@@ -261,20 +273,24 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
 
 def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
-    first, second, free = topology(scene)
-    nine = scene.numerics.formulation == "baumgarte"
-    turning = free or nine  # the crank angle is the last coordinate
     steps, record, par = integrate(scene, copy)
     times = instants(scene, steps)
-    q, v, contacts, k, s = _between(steps, times, turning)
-    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
     problem = problem_of(scene, ledger=True, series=True)
-    states = np.hstack([_in_turn(q, steps.revolution[k], turning), v])
+    turning = bool(at.rules_of(problem.effects).turning)  # the crank angle is the last coordinate
+    q, v, contacts, k, s = _between(steps, times, problem.cycle if turning else 0.0)
+    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
+    in_turn = _in_turn(q, steps.revolution[k], problem.cycle if turning else 0.0)
+    states = np.hstack([in_turn, v])
     accelerations, rates = _observed(problem, par, states, contacts, turn_time)
     ends = np.hstack([steps.q, steps.v])
     at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)[1]
     n = problem.coordinates
     works = _works_between(steps, at_steps.powers, k, s)
+    if scene.is_planar:
+        seen = Seen(in_turn, v, turn_time, steps.revolution[k], contacts, rates, works)
+        return times, planar_series(scene, par, seen), record
+    first, second, free = topology(scene)
+    nine = scene.numerics.formulation == "baumgarte"
     phi, omega = TURN * times / Parameters(par).period, np.full_like(times, Parameters(par).speed)
     data = {}
     if nine:
@@ -298,11 +314,11 @@ def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Recor
     )
 
 
-def _in_turn(q: Array, revolution: Array, turning: bool) -> Array:
+def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
     """Coordinates with the crank angle, if it is one, counted from the start of its revolution, as the kernel does."""
-    if turning:
+    if cycle:
         q = q.copy()
-        q[:, -1] -= TURN * revolution
+        q[:, -1] -= cycle * revolution
     return q
 
 
@@ -317,8 +333,8 @@ def _series(
 ) -> dict[str, Array]:
     """Every time series of the response."""
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
-    gaps = np.where(open_, rates.gap, 0.0)
-    stiffness = np.where(open_, Parameters(par).stiffness, 0.0)
+    gaps = np.where(open_, rates.gap[:, :2], 0.0)
+    stiffness = np.where(open_, Parameters(par).stiffness[:2], 0.0)
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
     elastic = geometry.elastic_energy(gaps, active, stiffness)
@@ -335,8 +351,8 @@ def _series(
         "eccentricity_x": m.eccentricity_x,
         "eccentricity_y": m.eccentricity_y,
         "penetration": np.maximum(gaps, 0.0) * active,
-        "contact_force": rates.force,
-        "friction_force": rates.friction,
+        "contact_force": rates.force[:, :2],
+        "friction_force": rates.friction[:, :2],
         "crank_moment": rates.drive_moment,
         "kinetic_energy": kinetic,
         "elastic_energy": elastic,

@@ -4,16 +4,20 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import MAX_JOINTS
 from hpcclear.dynamics.views import Start
 
 
 def objective(gaps: Array) -> Array:
-    """f (eq. 13), m, from mean gaps of both joints, m: shape (..., 2) to (...)."""
-    return np.hypot(gaps[..., 0], gaps[..., 1])
+    """f (eq. 13), m, from mean gaps of all joints, m: shape (..., joints) to (...)."""
+    total: Array = np.hypot(gaps[..., 0], gaps[..., 1])
+    for k in range(2, gaps.shape[-1]):
+        total = np.hypot(total, gaps[..., k])  # by 0 it stays what it is, to the last bit
+    return total
 
 
 def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int) -> Array:
-    """Mean gaps of every revolution, shape (revolutions, samples, 2 joints), m; NaN from a failure on.
+    """Mean gaps of every revolution, shape (revolutions, samples, MAX_JOINTS), m; NaN from a failure on.
 
     Parameters
     ----------
@@ -24,7 +28,7 @@ def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int
     revolutions : int
     """
     count = len(par)
-    gaps = np.full((revolutions, count, 2), np.nan)
+    gaps = np.full((revolutions, count, MAX_JOINTS), np.nan)
     alive = np.arange(count)
     for revolution in range(revolutions):
         outcome = lanes.run(par[alive], start)

@@ -4,15 +4,24 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.parameters import topology
+from hpcclear.dynamics.planar.problem import start_states_of
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
 
 
-def start_states(scene: Scene, par: Array) -> Start:
-    """Start of each sample, of parameters (samples, PARAMETERS).
+def start_states(scene: Scene, par: Array, points: Points | None = None) -> Start:
+    """Start of each sample, of parameters (samples, PARAMETERS) and the points they were made from.
 
     Journals are centred, or where ``start_eccentricity`` puts them.
+
+    Raises
+    ------
+    InputError
+        If a linkage cannot be put together.
     """
+    if scene.is_planar:
+        return start_states_of(scene, par, points)
     p = Parameters(par)
     q, v = _minimal(scene, p)
     first, second, free = topology(scene)

@@ -1,7 +1,7 @@
 """The kernel's rows of numbers by name: starts, outcomes, settings, parameters, rates; elsewhere nobody counts columns.
 
 A view holds rows, shape (..., columns), and reads and writes what it names in place: ``outcome.objective`` has shape (...),
-``outcome.mean_gap`` shape (..., 2 joints).
+``outcome.mean_gap`` shape (..., MAX_JOINTS); places without a joint hold 0.
 """
 
 from collections.abc import Sequence
@@ -28,13 +28,16 @@ class Column:
         view.rows[..., self.column] = values
 
 
-def _both(first: int, second: int) -> Column:
-    return Column((first, second))
+def _of_joints(first: int, step: int = 1) -> Column:
+    return Column(slice(first, first + step * at.MAX_JOINTS, step))
 
 
-def _mean(*rates: int) -> Column:
-    places = [at.OUT_MEAN + at.place(rate) for rate in rates]
-    return Column(places if len(places) > 1 else places[0])
+def _mean(rate: int) -> Column:
+    return Column(at.OUT_MEAN + at.place(rate))
+
+
+def _entry(entry: int) -> Column:
+    return _of_joints(at.JOINT_BLOCKS + entry, at.JOINT_ROWS)
 
 
 def _total(rate: int) -> Column:
@@ -53,10 +56,15 @@ class View:
     size: int
 
     def __init__(self, rows: Array) -> None:
-        if rows.shape[-1] != self.size:
+        if not self.fits(rows.shape[-1]):
             name = type(self).__name__
             raise ValueError(f"a row of {name} holds {self.size} numbers, not {rows.shape[-1]}")
         self.rows = rows
+
+    @classmethod
+    def fits(cls, size: int) -> bool:
+        """Whether a row may have that length."""
+        return size == cls.size
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -71,9 +79,9 @@ class Start(View):
 
     size = at.START
 
-    contacts = Column(slice(at.START_CONTACTS, at.START))  # active flags, then 1/d'_0: (..., 4)
-    active = Column(slice(at.START_CONTACTS, at.START_CONTACTS + 2))
-    inverse_impact = Column(slice(at.START_CONTACTS + 2, at.START))
+    contacts = Column(slice(at.START_CONTACTS, at.START))  # active flags, then 1/d'_0
+    active = _of_joints(at.START_CONTACTS)
+    inverse_impact = _of_joints(at.START_CONTACTS + at.MAX_JOINTS)
     moving = Column(slice(0, at.START_CONTACTS))  # all places of coordinates and velocities
 
     @classmethod
@@ -105,10 +113,10 @@ class Outcome(View):
     status = Column(at.OUT_STATUS)
     objective = Column(at.OUT_OBJECTIVE)  # m
     spread = Column(at.OUT_SPREAD)  # m, between averaged revolutions
-    mean_gap = _mean(at.GAP_12, at.GAP_23)  # m, of both joints
-    peak_force = _both(at.OUT_PEAK_12, at.OUT_PEAK_23)  # N
-    latched = _both(at.OUT_LATCHED_12, at.OUT_LATCHED_23)
-    deepest = _both(at.OUT_DEEPEST_12, at.OUT_DEEPEST_23)  # m
+    mean_gap = _of_joints(at.OUT_MEAN)  # m
+    peak_force = _of_joints(at.OUT_PEAK)  # N
+    latched = _of_joints(at.OUT_LATCHED)
+    deepest = _of_joints(at.OUT_DEEPEST)  # m
     evaluations = Column(at.OUT_EVALUATIONS)
     revolutions = Column(at.OUT_REVOLUTIONS)
     time = Column(at.OUT_TIME)  # s
@@ -116,11 +124,11 @@ class Outcome(View):
     absolute_drive_work = _total(at.ABS_DRIVE_POWER)
     dissipated = _total(at.DISSIPATION)
     load_work = _total(at.LOAD_POWER)
-    active = _both(at.OUT_ACTIVE_12, at.OUT_ACTIVE_23)
-    contacts = Column(slice(at.OUT_ACTIVE_12, at.OUT_INVERSE_IMPACT_23 + 1))  # as of a start
+    active = _of_joints(at.OUT_ACTIVE)
+    contacts = Column(slice(at.OUT_ACTIVE, at.OUT_INVERSE_IMPACT + at.MAX_JOINTS))  # as of a start
     attempts = Column(at.OUT_ATTEMPTS)
     stiff_steps = Column(at.OUT_STIFF_STEPS)
-    mean_force = _mean(at.FORCE_12, at.FORCE_23)  # N
+    mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_12))  # N
     peak_moment = Column(at.OUT_MOMENT)  # N m
     acceleration_deviation = Column(at.OUT_ACCELERATION)  # m/s^2
     moving = Column(slice(at.OUT_STATE, at.OUT))  # all places of coordinates and velocities
@@ -160,15 +168,23 @@ class Settings(View):
     exponent = Column(settings.EXPONENT)  # of the step-size control
     beta = Column(settings.BETA)
     implicit = Column(settings.IMPLICIT)
+    cycle = Column(settings.CYCLE)  # rad
+    parameter_rows = Column(settings.PARAMETER_ROWS)
+    chosen = _of_joints(settings.CHOSEN)
     atol = Column(slice(settings.ATOL, settings.SETTINGS))  # all places
     atol_coordinates = Column(slice(settings.ATOL, settings.ATOL + at.MAX_COORDINATES))
     atol_velocities = Column(slice(settings.ATOL + at.MAX_COORDINATES, settings.SETTINGS))
 
 
 class Parameters(View):
-    """Parameters of samples, SI."""
+    """Parameters of samples, SI; those of a linkage other than the slider-crank have rows of its own behind these."""
 
-    size = at.PARAMETERS
+    size = at.OWN
+
+    @classmethod
+    def fits(cls, size: int) -> bool:
+        """Whether a row may have that length."""
+        return cls.size <= size <= at.PARAMETERS
 
     speed = Column(at.SPEED)
     period = Column(at.PERIOD)
@@ -187,14 +203,14 @@ class Parameters(View):
     rod_inertia = Column(at.ROD_INERTIA)
     slider_mass = Column(at.SLIDER_MASS)
     gravity = Column(at.GRAVITY)
-    # of both joints, shape (..., 2)
-    clearance = _both(at.JOINT_12 + at.CLEARANCE, at.JOINT_23 + at.CLEARANCE)
-    stiffness = _both(at.JOINT_12 + at.CONTACT_STIFFNESS, at.JOINT_23 + at.CONTACT_STIFFNESS)
-    damping = _both(at.JOINT_12 + at.DAMPING, at.JOINT_23 + at.DAMPING)
-    bearing_radius = _both(at.JOINT_12 + at.BEARING_RADIUS, at.JOINT_23 + at.BEARING_RADIUS)
-    journal_radius = _both(at.JOINT_12 + at.JOURNAL_RADIUS, at.JOINT_23 + at.JOURNAL_RADIUS)
-    friction = _both(at.JOINT_12 + at.FRICTION, at.JOINT_23 + at.FRICTION)
-    inverse_ramp = _both(at.JOINT_12 + at.INVERSE_RAMP, at.JOINT_23 + at.INVERSE_RAMP)
+    # of all joints, shape (..., MAX_JOINTS)
+    clearance = _entry(at.CLEARANCE)
+    stiffness = _entry(at.CONTACT_STIFFNESS)
+    damping = _entry(at.DAMPING)
+    bearing_radius = _entry(at.BEARING_RADIUS)
+    journal_radius = _entry(at.JOURNAL_RADIUS)
+    friction = _entry(at.FRICTION)
+    inverse_ramp = _entry(at.INVERSE_RAMP)
 
 
 class Rates(View):
@@ -202,8 +218,8 @@ class Rates(View):
 
     size = at.RATES
 
-    gap = _both(at.GAP_12, at.GAP_23)  # m
-    force = _both(at.FORCE_12, at.FORCE_23)  # N, normal
-    friction = _both(at.FRICTION_12, at.FRICTION_23)  # N
+    gap = _of_joints(at.GAP_12, 3)  # m
+    force = _of_joints(at.FORCE_12, 3)  # N, normal
+    friction = _of_joints(at.FRICTIONS)  # N
     drive_moment = Column(at.DRIVE_MOMENT)  # N m
     powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load

@@ -89,4 +89,5 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
         | recorded(scene, records),
         scene.objective,
         designs.words,
+        scene.joint_labels,
     )

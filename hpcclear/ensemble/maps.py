@@ -146,7 +146,13 @@ def run_map(
             with saving(checkpoint.flush):
                 content = session.write(
                     dataset.samples_dataset(
-                        points.names, points.values, units, records, attributes, words=points.words
+                        points.names,
+                        points.values,
+                        units,
+                        records,
+                        attributes,
+                        words=points.words,
+                        joints=session.joints,
                     )
                 )
         session.close()

@@ -96,5 +96,6 @@ def _simulate(scene: Scene, points: Points, session: Session) -> xr.Dataset:
                 attributes,
                 scene.objective,
                 points.words,
+                session.joints,
             )
         )

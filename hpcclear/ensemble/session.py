@@ -17,6 +17,7 @@ from typing import Self
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.outcome import JOINTS
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.results import dataset, files
@@ -161,6 +162,7 @@ class Session:
         self.key = dict(key)
         self.ranks = ranks
         self.options = options
+        self.joints: tuple[str, ...] = JOINTS
         self.tell = tell
         self.attributes: dict[str, str] = {}
         self._checkpoint: Checkpoint | None = None
@@ -201,7 +203,8 @@ class Session:
         return len(there) == len(names)
 
     def describe(self, scene: Scene) -> None:
-        """Set `attributes`: what made the files of this run."""
+        """Set `attributes`, what made the files of this run, and the labels of its joints."""
+        self.joints = scene.joint_labels
         self.attributes = {
             **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             **key_attribute(self.key),
@@ -219,6 +222,7 @@ class Session:
                 names=names,
                 units=units,
                 attributes=self.attributes,
+                joints=self.joints,
             )
         self.tell_problems()
         return self._checkpoint

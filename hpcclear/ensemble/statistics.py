@@ -1,7 +1,7 @@
 """Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -142,7 +142,9 @@ class _Streaming:
         return self._session.write(self._dataset())
 
     def _dataset(self) -> xr.Dataset:
-        return statistics_dataset(self._sums, self._session.attributes, self._objective)
+        return statistics_dataset(
+            self._sums, self._session.attributes, self._objective, self._session.joints
+        )
 
     def _keep_raw(self, number: int, records: np.ndarray) -> None:
         """Write a block of samples, if they are wanted."""
@@ -157,6 +159,7 @@ class _Streaming:
                 self._session.attributes,
                 self._objective,
                 page.words,
+                self._session.joints,
             )
             dataset.write(content, self._raw / f"samples-{number:08d}.nc")
 
@@ -222,12 +225,13 @@ def statistics_dataset(
     sums: Accumulator,
     attributes: dict[str, str] | None = None,
     objective: Objective = MEAN_GAP,
+    joints: Sequence[str] = JOINTS,
 ) -> xr.Dataset:
     """A complete accumulator as a dataset of kind ``statistics``."""
     summary, edges = sums.result(), sums.edges
     assert edges is not None  # it is complete
     coords = {
-        "joint": np.array(JOINTS),
+        "joint": np.array(joints, dtype=str),
         "bin": np.arange(sums.bins + 2),
         "edge": np.arange(sums.bins + 1),
         "outcome": np.array([int(status) for status in Status]),
@@ -238,14 +242,14 @@ def statistics_dataset(
         "samples_by_flag": summary.flags,
     }
     for name in dict(ROWS):
-        data |= _of_quantity(name, summary, edges)
+        data |= _of_quantity(name, summary, edges, len(joints))
     return dataset.dataset("statistics", coords, data, attributes, objective=objective)
 
 
-def _of_quantity(name: str, summary: Summary, edges: Array) -> dict[str, np.ndarray]:
+def _of_quantity(name: str, summary: Summary, edges: Array, joints: int) -> dict[str, np.ndarray]:
     """Variables of one quantity; scalars lose the axis of joints."""
     rows = [k for k, (quantity, _) in enumerate(ROWS) if quantity == name]
-    chosen = rows if len(rows) > 1 else rows[0]
+    chosen = rows[:joints] if len(rows) > 1 else rows[0]
     known = summary.count > 0
     return {
         f"{name}_count": summary.count[chosen],

@@ -20,7 +20,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.results import dataset, files, netcdf
 
 INTERVAL = 5.0
@@ -143,6 +143,8 @@ class Checkpoint:
         Units of those that are not the paper's.
     attributes : mapping, optional
         Global attributes of the part files (`hpcclear.results.dataset.provenance`).
+    joints : sequence of str
+        Labels of the joints that records tell of.
     clock : callable
         Seconds since any instant.
 
@@ -170,6 +172,7 @@ class Checkpoint:
         names: Sequence[str] = (),
         units: Mapping[str, str] | None = None,
         attributes: Mapping[str, object] | None = None,
+        joints: Sequence[str] = JOINTS,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.directory = directory
@@ -177,6 +180,7 @@ class Checkpoint:
         self.interval = interval
         self.names = tuple(names)
         self.units = dict(units or {})
+        self.joints = tuple(joints)
         self.attributes = {**(attributes or {}), **key_attribute(key)}
         self.seconds = 0.0
         self.problems: list[str] = []
@@ -235,7 +239,9 @@ class Checkpoint:
 
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
         records, values = _join([records], [values])
-        content = dataset.samples_dataset(self.names, values, self.units, records, self.attributes)
+        content = dataset.samples_dataset(
+            self.names, values, self.units, records, self.attributes, joints=self.joints
+        )
         path = self.directory / f"part-{level:02d}-{self._number:06d}.nc"
         dataset.write(content, path)
         self._parts.append(_Part(level, path, records, values))

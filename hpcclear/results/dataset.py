@@ -24,6 +24,9 @@ from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kin
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
+LINKAGE_DIMS = {"body", "point"}
+"""Coordinates that only a linkage's files have."""
+
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
 _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
@@ -78,7 +81,8 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    if set(coords) != set(table.coords) and (whole or not set(coords) < set(table.coords)):
+    least = set(table.coords) - LINKAGE_DIMS if whole else set()
+    if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
     missing = table.required - set(data)
     if whole and missing:
@@ -167,6 +171,7 @@ def samples_dataset(
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     words: Mapping[str, str] | None = None,
+    joints: Sequence[str] = JOINTS,
 ) -> xr.Dataset:
     """Outcome records and the designs they belong to, by growing sample number.
 
@@ -186,6 +191,8 @@ def samples_dataset(
         What ``objective`` is in the records.
     words : mapping of str to str, optional
         Long names of the design variables.
+    joints : sequence of str
+        Labels of the scene's joints with clearance: as many places of the records are kept.
 
     Returns
     -------
@@ -214,9 +221,15 @@ def samples_dataset(
     if records["regime"].any():  # no period anywhere is an answer as well
         asked |= {*STEADY, "regime"}
     left_out = {"sample", *ON_REQUEST, *JUDGED} - asked
-    data |= {name: records[name] for name in OUTCOME.names or () if name not in left_out}
-    coords = {"sample": records["sample"], "joint": np.array(JOINTS)}
+    kept = [name for name in OUTCOME.names or () if name not in left_out]
+    data |= {name: at_joints(records[name], joints) for name in kept}
+    coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     return dataset("samples", coords, data, attributes, units, objective, words)
+
+
+def at_joints(values: np.ndarray, joints: Sequence[str]) -> np.ndarray:
+    """Values of records at the joints there are, shape (n, joints); of a quantity without joints as they are."""
+    return values[:, : len(joints)] if values.ndim > 1 else values
 
 
 def records(samples: xr.Dataset) -> np.ndarray:
@@ -225,7 +238,11 @@ def records(samples: xr.Dataset) -> np.ndarray:
     for name in OUTCOME.names or ():
         absent = name in (*ON_REQUEST, *JUDGED) and name not in samples
         nothing = np.nan if OUTCOME[name].base.kind == "f" else 0
-        found[name] = nothing if absent else samples[name].to_numpy()
+        if absent:
+            found[name] = nothing
+        else:
+            values = samples[name].to_numpy()
+            at_joints(found[name], samples["joint"].to_numpy())[:] = values
     return found
 
 
@@ -243,9 +260,15 @@ def response_dataset(
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
+    joints: Sequence[str] = JOINTS,
+    linkage: Mapping[str, Sequence[str]] | None = None,
 ) -> xr.Dataset:
-    """One response: series of shape (t,) or (t, 2), scalars, values of shape (2,) at the joints."""
-    coords = {"time": time, "joint": np.array(JOINTS)}
+    """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
+
+    `linkage`: labels along the dimensions ``body`` and ``point``, of series that have these.
+    """
+    coords = {"time": time, "joint": np.array(joints, dtype=str)}
+    coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
     return dataset("response", coords, data, attributes, objective=objective)
 
 
@@ -370,7 +393,7 @@ def _fault(content: xr.Dataset, kind: str | None) -> str | None:
     if kind is not None and found != kind:
         return f"it holds {found}, not {kind}"
     table = KINDS[found]
-    missing = (table.required | set(table.coords)) - set(content.variables)
+    missing = (table.required | (set(table.coords) - LINKAGE_DIMS)) - set(content.variables)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
     for key, variable in content.variables.items():

@@ -1,9 +1,11 @@
 """A scene in words: the effects that are on, what deserves a look, and how two scenes differ."""
 
 from collections.abc import Iterator
+from typing import Any
 
-from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
+from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import flatten
+from hpcclear.scene.planar import Planar
 from hpcclear.scene.plausibility import implausible
 from hpcclear.scene.tables import SceneTables
 
@@ -18,12 +20,10 @@ def slender_inertia(mass: float, length: float) -> float:
 
 def effects_on(scene: SceneTables) -> Iterator[str]:
     """What is on, in words."""
-    for name, label in NAMES.items():
-        joint = getattr(scene.joints, name)
-        if isinstance(joint, ClearanceJoint):
-            small = joint.clearance < 1e-4
-            size = f"{joint.clearance * 1e6:g} um" if small else f"{joint.clearance * 1e3:g} mm"
-            yield f"clearance {size} in joint {name} ({label})"
+    for name in scene.clearance_joints():
+        clearance = scene.number(f"{scene.joint_key(name)}.clearance")
+        size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
+        yield f"clearance {size} in joint {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"
@@ -31,6 +31,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         yield f"friction {effects.friction.law}, coefficient {effects.friction.coefficient:g}"
     if isinstance(scene.drive, TorqueDrive):
         yield "torque-driven crank"
+    if isinstance(scene.mechanism, Planar):
+        for row in (*scene.mechanism.drives, *scene.mechanism.loads):
+            yield f"{row.kind} {row.name}"
     if effects.gravity != 0:
         yield f"gravity {effects.gravity:g} m/s2"
     if effects.slider_load is not None:
@@ -51,7 +54,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
 def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     yield from implausible(scene)
-    for name in ("crank", "rod"):
+    for name in () if scene.is_planar else ("crank", "rod"):
         link = getattr(scene.mechanism, name)
         least = slender_inertia(link.mass, link.length)
         if link.inertia < least * (1 - 1e-12):
@@ -65,10 +68,12 @@ def warnings(scene: SceneTables) -> Iterator[str]:
                 f"which are at 0 and {link.length:g} m"
             )
     for name in scene.clearance_joints():
-        joint = getattr(scene.joints, name)
-        if sum(part**2 for part in joint.start_eccentricity) > joint.clearance**2 * (1 + 1e-12):
+        joint: Any = scene.clearance_joint(name)
+        start = joint.start_eccentricity
+        parts = start if isinstance(start, tuple) else (start.x, start.y)
+        if sum(part**2 for part in parts) > joint.clearance**2 * (1 + 1e-12):
             yield (
-                f"joints.{name}.start_eccentricity lies outside the clearance, "
+                f"{scene.joint_key(name)}.start_eccentricity lies outside the clearance, "
                 "so the run starts in contact"
             )
     for variable in scene.study.variables if scene.study is not None else ():

@@ -208,9 +208,13 @@ a monotone cubic between: no higher than the higher of two rows, no lower than t
 
 @dataclass(frozen=True)
 class CurveOf(Converted):
-    """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit."""
+    """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit.
+
+    `cycles`: a revolution may take several turns; how long a table may be is then checked where that is known.
+    """
 
     unit: str
+    cycles: bool = False
 
     def convert(self, value: Any) -> Curve:
         """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
@@ -228,16 +232,8 @@ class CurveOf(Converted):
                 "the crank angles must rise from row to row",
                 "Sort the rows by angle, each angle once",
             )
-        span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi
-        if span > turn * (1 + 1e-12):
-            raise invalid(
-                "the table is longer than one turn", "Give one turn (2 pi rad, 360 deg); it repeats"
-            )
-        if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
-            raise invalid(
-                "the curve repeats every turn, but its last value differs from its first",
-                "Make both equal, or leave the last row out",
-            )
+        if not self.cycles:
+            check_period(pairs)
         return pairs
 
     def __get_pydantic_json_schema__(
@@ -250,6 +246,24 @@ class CurveOf(Converted):
             "anyOf": [*entry["anyOf"], table],
             "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
         }
+
+
+def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:
+    """An error for validators unless a table repeats within so many turns; raises PydanticCustomError."""
+    span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
+    length = "one turn" if turns == 1 else f"{turns} turns"
+    if span > turn * (1 + 1e-12):
+        raise invalid(
+            f"the table is longer than {length}",
+            f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats",
+            key=key,
+        )
+    if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
+        raise invalid(
+            f"the curve repeats every {'turn' if turns == 1 else length}, but its last value differs from its first",
+            "Make both equal, or leave the last row out",
+            key=key,
+        )
 
 
 @dataclass(frozen=True)

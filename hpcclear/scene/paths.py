@@ -9,8 +9,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import CurveOf, Quantity
+from hpcclear.scene.fields import CurveOf, NamedRows, Quantity
 from hpcclear.scene.mechanism import Drive, Joints, Mechanism
+from hpcclear.scene.planar import Planar
 
 PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
 """The tables whose numbers describe the mechanism and what acts on it."""
@@ -36,6 +37,10 @@ def _quantity(field: FieldInfo) -> Quantity | None:
     return None
 
 
+def _named(field: FieldInfo) -> bool:
+    return any(isinstance(part, NamedRows) for part in field.metadata)
+
+
 def _entries(annotation: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
     for model in _parts(annotation):
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
@@ -45,15 +50,42 @@ def _entries(annotation: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
             if quantity is not None:
                 yield path, quantity
             else:
-                yield from _entries(field.annotation, path)
+                yield from _entries(field.annotation, f"{path}.*" if _named(field) else path)
+
+
+class Quantities(dict[str, Quantity]):
+    """By path; the rows of a linkage have names of their own, so theirs are kept by "mechanism.bodies.*.mass"."""
+
+    def _general(self, path: object) -> str:
+        parts: list[str] = []
+        for part in str(path).split("."):
+            parts.append("*" if parts and parts[-1] in _NAMED else part)
+        return ".".join(parts)
+
+    def __contains__(self, path: object) -> bool:
+        return dict.__contains__(self, path) or dict.__contains__(self, self._general(path))
+
+    def __missing__(self, path: str) -> Quantity:
+        general = self._general(path)
+        if general == path:
+            raise KeyError(path)
+        return dict.__getitem__(self, general)
+
+    def get(self, path: str, default: Any = None) -> Any:
+        """The quantity at a path, or `default`."""
+        return self[path] if path in self else default  # noqa: SIM401 - get() is this
+
+
+_NAMED = ("bodies", "joints", "drives", "loads", "points")
 
 
 @lru_cache(maxsize=1)
 def quantities() -> Mapping[str, Quantity]:
     """Every path of a physical number that some scene may have, with its unit and bounds."""
-    return {
-        path: quantity for top, model in PHYSICAL.items() for path, quantity in _entries(model, top)
-    }
+    tables = [*PHYSICAL.items(), ("mechanism", Planar)]
+    return Quantities(
+        (path, quantity) for top, model in tables for path, quantity in _entries(model, top)
+    )
 
 
 _WORDS = {

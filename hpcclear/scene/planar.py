@@ -1,7 +1,4 @@
-"""Tables of a planar linkage as a file would hold them: bodies, ground, joints, drives, loads.
-
-Only read, not yet part of a scene: `load_scene` knows the slider-crank alone. `dynamics/planar.py` makes the mechanism.
-"""
+"""Tables of a planar linkage: bodies, ground, joints, drives, loads. `dynamics/planar.py` makes the mechanism of them."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -9,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.fields import (
-    Converted,
+    Count,
     Curve,
     CurveOf,
     Length,
@@ -19,35 +16,60 @@ from hpcclear.scene.fields import (
     Quantity,
     Speed,
     Table,
+    check_period,
     invalid,
     nearest,
 )
 from hpcclear.scene.mechanism import Material, check_journal
 
-Pair = tuple[Length, Length]
 Angle = Annotated[float, Quantity("rad")]
 Rows = NamedRows()
 
 
-class Points(Converted):
-    """``{name = [x, y], ...}`` in m, kept in file order as pairs of name and place, because a dict would not be frozen."""
+class PairTable(Table):
+    """Two components along x and y; ``[x, y]`` in the file is the same."""
 
-    def convert(self, value: Any) -> tuple[tuple[str, tuple[float, float]], ...]:
-        """The points; raises PydanticCustomError."""
-        if isinstance(value, tuple):
-            return value
-        if not isinstance(value, Mapping):
-            raise invalid("named points are expected here", "Write { name = [x, y] }")
-        length = Quantity("m")
-        found = []
-        for name, place in value.items():
-            if not isinstance(place, (list, tuple)) or len(place) != 2:
-                raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
-            found.append((str(name), (length.convert(place[0]), length.convert(place[1]))))
-        return tuple(found)
+    @model_validator(mode="before")
+    @classmethod
+    def _from_pair(cls, data: Any) -> Any:
+        if not isinstance(data, (list, tuple)):
+            return data
+        if len(data) != 2:
+            raise invalid("a pair [x, y] is expected here", "Write [x, y]")
+        return {"x": data[0], "y": data[1]}
 
 
-NamedPoints = Annotated[tuple[tuple[str, tuple[float, float]], ...], Points()]
+class Place(PairTable):
+    """A place or an offset, m."""
+
+    x: Length
+    y: Length
+
+
+class NamedPlace(Place):
+    """A point of a body, in its own axes, m."""
+
+    name: str
+
+
+class PlaceRows(NamedRows):
+    """``{name = [x, y]}`` as named rows."""
+
+    def rows(self, value: Any) -> Any:
+        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; raises PydanticCustomError."""
+        if isinstance(value, Mapping):
+            for name, place in value.items():
+                if isinstance(place, (list, tuple)) and len(place) != 2:
+                    raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
+            value = {
+                name: {"x": place[0], "y": place[1]} if isinstance(place, (list, tuple)) else place
+                for name, place in value.items()
+            }
+        return super().rows(value)
+
+
+NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]
+NOWHERE = Place(x=0.0, y=0.0)
 
 
 class PlanarBody(Table):
@@ -58,18 +80,49 @@ class PlanarBody(Table):
     """kg."""
     inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """About its mass centre, kg m2; of no consequence where it cannot turn."""
-    center: Pair = (0.0, 0.0)
+    length: Annotated[float, Quantity("m", above=0)] | None = None
+    """Of a bar: it has the points a, at its origin, and b, so far along its x axis, m."""
+    mass_center: Length | None = None
+    """Of a bar: distance of its mass centre from a towards b, m; its middle unless said otherwise."""
+    center: Place = NOWHERE
     """Mass centre in the body's own axes, m."""
-    points: NamedPoints = ()
+    points: NamedPlaces = ()
     """Where joints and loads act, in the body's own axes, m."""
     start_angle: Angle = 0.0
-    """Rough angle at the start, rad: assembly starts from it."""
+    """Rough angle at the start, rad: assembly starts from it. Of a driven body, its angle at the start."""
+
+    @model_validator(mode="after")
+    def _bar_or_points(self) -> "PlanarBody":
+        if self.length is None:
+            if self.mass_center is not None:
+                raise invalid(
+                    "is measured along a bar, and this body has no length",
+                    "Give its length, or write center = [x, y]",
+                    key="mass_center",
+                    value=self.mass_center,
+                )
+            return self
+        if (self.center.x, self.center.y) != (0.0, 0.0):
+            raise invalid(
+                "a bar's mass centre is given by mass_center",
+                "Write mass_center, or leave length out and give points",
+                key="center",
+                value=[self.center.x, self.center.y],
+            )
+        for point in self.points:
+            if point.name in ("a", "b"):
+                raise invalid(
+                    "is a point that a bar has anyway",
+                    "Give it another name",
+                    key=f"points.{point.name}",
+                )
+        return self
 
 
 class Ground(Table):
     """What stands still."""
 
-    points: NamedPoints = (("o", (0.0, 0.0)),)
+    points: NamedPlaces = (NamedPlace(name="o", x=0.0, y=0.0),)
     """m."""
 
 
@@ -103,7 +156,7 @@ class PlanarClearance(Table):
     bearing_radius: PositiveLength
     """R_B, m."""
     materials: Materials
-    start_eccentricity: Pair = (0.0, 0.0)
+    start_eccentricity: Place = NOWHERE
     """Journal centre minus bearing centre at the start, m."""
 
     @model_validator(mode="after")
@@ -158,6 +211,8 @@ class PlanarSpeed(Table):
     speed: Annotated[float, Quantity("rad/s")]
     period: bool = False
     """Whether its turn is the revolution."""
+    turns: Annotated[int, Count(least=1, most=64)] = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
 
 
 class PlanarHarmonic(Table):
@@ -179,23 +234,46 @@ class PlanarTorque(Table):
     name: str
     kind: Literal["torque"]
     body: str
-    torque: Annotated[Curve, CurveOf("N*m")]
-    """N m, constant or over a turn of the body."""
-    initial_speed: Annotated[float, Quantity("rad/s")]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    """N m, constant or over a revolution of the body that gives the period."""
+    initial_speed: Annotated[float, Quantity("rad/s", above=0, why="the body has to start turning")]
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     period: bool = False
+    turns: Annotated[int, Count(least=1, most=64)] = 1
 
 
 PlanarDrive = Annotated[PlanarSpeed | PlanarHarmonic | PlanarTorque, Field(discriminator="kind")]
 
 
+class Components(PairTable):
+    """A force by its components, N."""
+
+    x: Annotated[float, Quantity("N")]
+    y: Annotated[float, Quantity("N")]
+
+
 class ForceLoad(Table):
-    """A force at a point, along the ground's axes."""
+    """A force at a point: by its components along the ground's axes, or by size and direction."""
 
     name: str
     kind: Literal["force"]
     place: str
-    force: tuple[Annotated[float, Quantity("N")], Annotated[float, Quantity("N")]]
+    force: Components | None = None
+    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    """N along `direction`, constant or against the angle of the body that gives the period."""
+    direction: Angle = 0.0
+    """From the ground's x axis, rad."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> "ForceLoad":
+        if (self.force is None) == (self.size is None):
+            raise invalid(
+                "is given twice, or not at all",
+                "Write force = [x, y], or size and direction",
+                key="force",
+                value=None if self.force is None else [self.force.x, self.force.y],
+            )
+        return self
 
 
 class TorqueLoad(Table):
@@ -204,7 +282,8 @@ class TorqueLoad(Table):
     name: str
     kind: Literal["torque"]
     body: str
-    torque: Annotated[float, Quantity("N*m")]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    """N m, constant or against the angle of the body that gives the period."""
 
 
 class SpringLoad(Table):
@@ -231,6 +310,17 @@ class Planar(Table):
     joints: Annotated[tuple[PlanarJoint, ...], Rows]
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
     loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
+
+    @model_validator(mode="after")
+    def _curves_repeat(self) -> "Planar":
+        turns = turns_of(self) if self.drives else 1
+        for table in ("drives", "loads"):
+            for row in getattr(self, table):
+                for entry in ("torque", "size"):
+                    curve = getattr(row, entry, None)
+                    if isinstance(curve, tuple):
+                        check_period(curve, turns, f"{table}.{row.name}.{entry}")
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -260,3 +350,9 @@ def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
             value=row["like"],
         )
     return {**model, **{key: value for key, value in row.items() if key != "like"}}
+
+
+def turns_of(planar: Planar) -> int:
+    """Turns of the driven body in a revolution."""
+    main = next((drive for drive in planar.drives if drive.period), planar.drives[0])
+    return getattr(main, "turns", 1)

@@ -6,7 +6,7 @@ Limits lie well beyond what is built, so that a warning is worth reading; each s
 import math
 from collections.abc import Iterator
 
-from hpcclear.scene.mechanism import ClearanceJoint, TorqueDrive
+from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.tables import SceneTables
 
 FASTEST = 30.0
@@ -25,8 +25,9 @@ STEEL = 7850.0
 
 def implausible(scene: SceneTables) -> Iterator[str]:
     """A sentence for each number that is likely a slip of units."""
-    yield from _drive(scene)
-    yield from _bodies(scene)
+    if not scene.is_planar:
+        yield from _drive(scene)
+        yield from _bodies(scene)
     yield from _joints(scene)
     effects = scene.effects
     if effects.gravity > 100.0:
@@ -43,7 +44,7 @@ def _drive(scene: SceneTables) -> Iterator[str]:
     key = "initial_speed" if isinstance(drive, TorqueDrive) else "speed"
     speed = float(getattr(drive, key))
     turns = speed / (2.0 * math.pi)
-    mean = 4.0 * scene.mechanism.crank.length * turns
+    mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:
         yield (
             f"drive.{key} = {speed:.6g} rad/s is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; engines "
@@ -52,7 +53,7 @@ def _drive(scene: SceneTables) -> Iterator[str]:
 
 
 def _bodies(scene: SceneTables) -> Iterator[str]:
-    mechanism = scene.mechanism
+    mechanism = scene.slider_crank
     heaviest = 5.0 * STEEL * mechanism.rod.length**3
     for name in ("crank", "rod"):
         link = getattr(mechanism, name)
@@ -74,18 +75,18 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
 
 def _joints(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
-        joint = getattr(scene.joints, name)
-        assert isinstance(joint, ClearanceJoint)
+        joint, key = scene.clearance_joint(name), scene.joint_key(name)
+        materials = getattr(joint, "materials", joint)
         for part in ("bearing", "journal"):
-            modulus = getattr(joint, part).youngs_modulus
+            modulus = getattr(materials, part).youngs_modulus
             if not SOFTEST <= modulus <= STIFFEST:
                 what = "softer than rubber" if modulus < SOFTEST else "stiffer than diamond"
                 yield (
-                    f"joints.{name}.{part}.youngs_modulus = {modulus:g} Pa is {what}; "
+                    f"{key}.{part}.youngs_modulus = {modulus:g} Pa is {what}; "
                     'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'
                 )
         if joint.clearance > WIDEST * joint.bearing_radius:
             yield (
-                f"joints.{name}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
+                f"{key}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
                 "bearing's radius; write the radial play, half of the difference of the diameters"
             )

@@ -83,9 +83,12 @@ def check_points(
             bounds = quantities()[path].bounds()
             reason = f"must be finite and {bounds}" if bounds else "must be finite"
             _refuse(~quantities()[path].holds(column), column, name, reason, label)
-    pairs = [("mechanism.crank.length", "mechanism.rod.length", "the rod no longer than the crank")]
+    pairs = []
+    if not scene.is_planar:
+        reason = "the rod no longer than the crank"
+        pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
     for joint in scene.clearance_joints():
-        key, reason = f"joints.{joint}", "the clearance as large as the bearing"
+        key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
         pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
     for small, large, reason in pairs:
         lower, upper = (

@@ -47,7 +47,8 @@ class Scene(SceneTables):
         """Each bound of each variable, widened by its random half-width, must still make a
         mechanism."""
         assert self.study is not None
-        content = {name: plain(getattr(self, name)) for name in (*PHYSICAL, "numerics")}
+        names = (*PHYSICAL, "numerics")
+        content = {name: plain(table) for name in names if (table := getattr(self, name))}
         reach = {row.name: 0.0 if row.absolute else row.reach for row in self.study.random}
         spans = {
             variable.name: ("variables", variable.paths, variable.range)

@@ -3,9 +3,9 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
-from pydantic import PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective
@@ -15,6 +15,7 @@ from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.planar import Planar, PlanarClearance
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import SHORT_NAMES
 
@@ -22,10 +23,11 @@ from hpcclear.scene.variables import SHORT_NAMES
 class SceneTables(Table):
     """The tables of a scene file, each valid and fitting the others; SI numbers, frozen."""
 
-    format_version: Literal[1] = 1
-    mechanism: Mechanism
-    drive: Drive
-    joints: Joints
+    format_version: Literal[1, 2] = 1
+    mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
+    # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
+    drive: Drive = cast(Any, None)
+    joints: Joints = cast(Any, None)
     effects: Effects = Effects()
     numerics: Numerics = Numerics()
     output: Output = Output()
@@ -48,27 +50,57 @@ class SceneTables(Table):
 
     @model_validator(mode="before")
     @classmethod
+    def _kind_of_mechanism(cls, data: Any) -> Any:
+        """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
+        mechanism = data.get("mechanism") if isinstance(data, Mapping) else None
+        if not isinstance(mechanism, Mapping):
+            return data
+        kind = mechanism.get("kind", "slider-crank")
+        for table in ("drive", "joints"):
+            if kind == "planar" and table in data:
+                own = "drives" if table == "drive" else table
+                raise invalid(
+                    "belongs to a slider-crank", f"Write [mechanism.{own}.NAME]", key=table
+                )
+        return {**data, "mechanism": {"kind": kind, **mechanism}}
+
+    @model_validator(mode="before")
+    @classmethod
     def _clearance_of_open_joints(cls, data: Any) -> Any:
         """Without a path of its own, C drives the clearances there are."""
         try:
+            if data["mechanism"].get("kind") == "planar":
+                rows = data["mechanism"]["joints"]
+                ideal = [name for name, row in rows.items() if _kind_of(rows, row) != "clearance"]
+                open_joints = [name for name in rows if name not in ideal]
+                paths = [f"mechanism.joints.{name}.clearance" for name in open_joints]
+                return _with_paths_of_clearance(data, paths) if paths else data
             ideal = [
                 name
                 for name in ("crank_rod", "rod_slider")
                 if data["joints"][name]["kind"] == "ideal"
             ]
-            tables = {
-                key: data["study"][key] for key in ("variables", "random") if key in data["study"]
-            }
-        except (KeyError, TypeError):
+        except (AttributeError, KeyError, TypeError):
             return data  # the models below say what is wrong with it
         if len(ideal) != 1:
             return data
         paths = [path for path in SHORT_NAMES["C"] if f".{ideal[0]}." not in path]
-        for key, table in tables.items():
-            row = table.get("C") if isinstance(table, Mapping) else None
-            if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
-                data = replace(data, f"study.{key}.C", {**row, "paths": paths})
-        return data
+        return _with_paths_of_clearance(data, paths)
+
+    @model_validator(mode="after")
+    def _tables_fit_mechanism(self) -> Self:
+        for table in ("drive", "joints"):
+            if not self.is_planar and getattr(self, table) is None:
+                raise invalid("is missing", "Add it", key=table, value=None)
+        for entry in ("slider_load", "guide_friction"):
+            value = getattr(self.effects, entry)
+            if self.is_planar and value is not None:
+                raise invalid(
+                    "belongs to a slider-crank",
+                    "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
+                    key=f"effects.{entry}",
+                )
+        return self
 
     @model_validator(mode="after")
     def _effects_fit_joints(self) -> Self:
@@ -77,13 +109,13 @@ class SceneTables(Table):
             raise invalid(
                 "a clearance joint needs a contact law",
                 'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
-                "or make both joints ideal",
+                "or make the joints ideal",
                 key="effects.contact",
                 value=None,
             )
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
-                "friction acts in joints with clearance, and both joints are ideal",
+                f"friction acts in joints with clearance, and {'all' if self.is_planar else 'both'} joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
                 key="effects.friction.law",
                 value=self.effects.friction.law,
@@ -118,12 +150,45 @@ class SceneTables(Table):
         return self.numerics.responses or self.objective.name.replace("-", "_") in RESPONSES
 
     def clearance_joints(self) -> tuple[str, ...]:
-        """Labels of the joints with clearance, O12 before O23."""
+        """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""
+        if isinstance(self.mechanism, Planar):
+            return tuple(
+                joint.name for joint in self.mechanism.joints if isinstance(joint, PlanarClearance)
+            )
         return tuple(
             name
             for name in ("crank_rod", "rod_slider")
             if isinstance(getattr(self.joints, name), ClearanceJoint)
         )
+
+    @property
+    def joint_labels(self) -> tuple[str, ...]:
+        """Labels along the dimension ``joint`` of this scene's datasets: both of a slider-crank, whether open or not."""
+        return self.clearance_joints() if self.is_planar else ("crank_rod", "rod_slider")
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the mechanism is given by bodies and joints, and not as a slider-crank."""
+        return isinstance(self.mechanism, Planar)
+
+    def joint_key(self, label: str) -> str:
+        """Dotted path of a joint's table."""
+        return f"mechanism.joints.{label}" if self.is_planar else f"joints.{label}"
+
+    def clearance_joint(self, label: str) -> ClearanceJoint | PlanarClearance:
+        """The table of a joint with clearance."""
+        if isinstance(self.mechanism, Planar):
+            found = next(joint for joint in self.mechanism.joints if joint.name == label)
+        else:
+            found = getattr(self.joints, label)
+        assert isinstance(found, (ClearanceJoint, PlanarClearance))
+        return found
+
+    @property
+    def slider_crank(self) -> Mechanism:
+        """The mechanism of a scene that has a slider-crank."""
+        assert isinstance(self.mechanism, Mechanism)
+        return self.mechanism
 
     @property
     def hash(self) -> str:
@@ -139,7 +204,7 @@ class SceneTables(Table):
         in."""
         content: dict[str, Any] = plain(self)
         # A name's own paths are left out, so that C follows when a joint is made ideal.
-        open_paths = [f"joints.{name}.clearance" for name in self.clearance_joints()]
+        open_paths = [f"{self.joint_key(name)}.clearance" for name in self.clearance_joints()]
         for table in ("variables", "random"):
             for name, row in content.get("study", {}).get(table, {}).items():
                 paths = SHORT_NAMES.get(name, ())
@@ -174,7 +239,7 @@ class SceneTables(Table):
 
     def _numbers(self) -> Mapping[str, float]:
         if self._known_numbers is None:  # a scene never changes, and a swarm asks often
-            tables = {name: plain(getattr(self, name)) for name in PHYSICAL}
+            tables = {name: plain(getattr(self, name)) or {} for name in PHYSICAL}
             known = quantities()
             self._known_numbers = {
                 path: value
@@ -182,6 +247,22 @@ class SceneTables(Table):
                 if path in known and isinstance(value, float)
             }
         return self._known_numbers
+
+
+def _kind_of(rows: Mapping[str, Any], row: Any) -> str:
+    """Kind of a joint of a linkage, which may be ``like`` another."""
+    return str(row.get("kind") or rows[row["like"]]["kind"])
+
+
+def _with_paths_of_clearance(data: Any, paths: list[str]) -> Any:
+    """The content with these paths for every C of the study that names none."""
+    study = data.get("study")
+    for key in ("variables", "random"):
+        table = study.get(key) if isinstance(study, Mapping) else None
+        row = table.get("C") if isinstance(table, Mapping) else None
+        if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
+            data = replace(data, f"study.{key}.C", {**row, "paths": paths})
+    return data
 
 
 def plain(value: Any) -> Any:

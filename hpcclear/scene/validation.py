@@ -14,9 +14,10 @@ from hpcclear.scene.paths import quantities
 Valid = TypeVar("Valid", bound=Table)
 
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
-_TAGGED = (("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
+_TAGGED = (("mechanism",), ("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
 _TAGGED_ROWS = ("joints", "drives", "loads")  # of a planar linkage
 _KINDS = {
+    "mechanism": '"slider-crank" or "planar"',
     "drive": '"constant-speed" or "torque"',
     "joints.crank_rod": '"clearance" or "ideal"',
     "joints.rod_slider": '"clearance" or "ideal"',
@@ -98,6 +99,8 @@ def _translated(error: ErrorDetails, content: Mapping[str, Any], more: int) -> I
 
 def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ...]:
     """A location without the tag that pydantic adds below a table whose kind decides its fields."""
+    if location[:2] == ("mechanism", "planar"):
+        return "mechanism", *_untagged(location[2:], kind)
     in_rows = len(location) > 2 and location[0] in _TAGGED_ROWS and isinstance(location[1], int)
     if in_rows and not kind.startswith("union_tag"):
         return location[:2] + location[3:]
@@ -146,6 +149,7 @@ def _explained(error: ErrorDetails, found: Any, path: str) -> tuple[str, str]:
             ) else (f"Write {expected}")
         case "union_tag_not_found":
             table = path.removesuffix(".kind")
+            table = table.removeprefix("mechanism.")
             kinds = _KINDS.get(table) or _KINDS[table.partition(".")[0]]
             return "is missing", f"Add kind = {kinds}"
         case "bool_type":

@@ -169,6 +169,7 @@ def _write_samples(run: StudyRun) -> None:
         records[before],
         objective=run.scene.objective,
         words=run.words,
+        joints=run.scene.joint_labels,
     )
     run.write(content, "samples.nc")
 

@@ -1,12 +1,13 @@
 """Contacts that begin or end inside a step of collocation: found between its nodes, and the step cut to end there."""
 
 from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.stepping.events import impact_fraction, root
 from hpcclear.dynamics.stepping.settings import GAP_TOLERANCE
-from hpcclear.dynamics.stepping.stops import cut_or_latch, latch_at_start
+from hpcclear.dynamics.stepping.stops import cut, latch, latch_at_start
 
 
 @scalar_function
@@ -66,9 +67,19 @@ def contact_change(flag, latched, work, m, joint, settings):
 
 
 @lane_function
+@unrolled
 def stop_at_contacts(effects, work, m, settings):
     """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
-    first = contact_change(effects.crank_rod, effects.rules.latched, work, m, at.O12, settings)
-    second = contact_change(effects.rod_slider, effects.rules.latched, work, m, at.O23, settings)
-    if cut_or_latch(0, 1, work, settings, first, second):
+    first = 2.0
+    for joint in written_out(at.JOINTS):
+        flag = getattr(effects.open, joint.flag)
+        first = min(first, contact_change(flag, effects.rules.latched, work, m, joint, settings))
+    if first < 1.0:
+        cut(0, 1, work, first)
+    elif first == 1.0:
+        for joint in written_out(at.JOINTS):
+            flag = getattr(effects.open, joint.flag)
+            if contact_change(flag, effects.rules.latched, work, m, joint, settings) == 1.0:
+                latch(0, 1, work, settings, joint)
+    if first <= 1.0:
         m[lob.KINK] = lob.KINK_AT_END

@@ -19,11 +19,10 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
-from hpcclear.dynamics.explicit.stepper import Joints
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, RTOL
+from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, PARAMETER_ROWS, RTOL
 from hpcclear.dynamics.stepping.stops import integrate_gap, turn_of_free_crank, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
@@ -38,9 +37,9 @@ BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they 
 
 
 @lane_function
-def replicate(par, m):
+def replicate(par, m, settings):
     """Give every stage the sample's parameters."""
-    for r in range(at.PARAMETERS):
+    for r in range(int(settings[PARAMETER_ROWS])):
         for i in range(STAGES):
             m[(lob.PAR + r) * STAGES + i] = par[r]
     for s in range(lob.SCALARS * STAGES, lob.MEMORY):
@@ -54,7 +53,7 @@ def replicate(par, m):
 @lane_function
 def begin_contacts(work, m):
     """Contact states of the step, for every stage."""
-    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+    for row in range(at.ACTIVE, at.ACTIVE + 2 * at.MAX_JOINTS):  # and the impact speeds
         for i in range(STAGES):
             m[row * STAGES + i] = work[row]
 
@@ -151,7 +150,7 @@ def error_of(effects, work, m, rtol, n):
         low += m[lob.WEIGHT * STAGES + k] * before
     row = lob.GAP_COEFFICIENT
     for gap in written_out(at.GAPS):
-        flag = getattr(effects, gap.asked_by)
+        flag = getattr(effects.open, gap.asked_by)
         last, before = gap_tail(flag, work, m, gap.rate, gap.clearance, row, rtol)
         high += last
         low += before
@@ -173,7 +172,7 @@ def quadrature(flag, work, m, rate):
 def quadratures(effects, work, m):
     """Integrals of all that is integrated over the step, over h."""
     for gap in written_out(at.GAPS):
-        quadrature(getattr(effects, gap.asked_by), work, m, gap.rate)
+        quadrature(getattr(effects.open, gap.asked_by), work, m, gap.rate)
     for r in range(len(effects.measures)):
         quadrature(1, work, m, effects.measures[r])
 
@@ -261,6 +260,7 @@ def try_step(effects, motion, block, m, tables, settings, n):
 
 
 @lane_function
+@unrolled
 def judge_end(effects, work, stages, m, settings, n):
     """What an accepted step shows of contacts, turns and integrals; it may yet be cut. Returns OK or why the lane ends."""
     status = OK
@@ -273,10 +273,9 @@ def judge_end(effects, work, stages, m, settings, n):
         if work[at.ACCEPT] == 1.0:
             status = turn_of_free_crank(effects.rules.free, 0, 1, work, settings, n - 1)
         if work[at.ACCEPT] == 1.0:
-            integrate_gap(0, 1, work, at.O12)
-            integrate_gap(0, 1, work, at.O23)
-            peaks_inside(effects.crank_rod, work, m, at.O12)
-            peaks_inside(effects.rod_slider, work, m, at.O23)
+            for joint in written_out(at.JOINTS):
+                integrate_gap(getattr(effects.open, joint.flag), 0, 1, work, joint)
+                peaks_inside(getattr(effects.open, joint.flag), work, m, joint)
     return status
 
 
@@ -284,13 +283,13 @@ def judge_end(effects, work, stages, m, settings, n):
 def next_sample(n, block, queue, settings, m):
     """Take the next sample of the queue, if there is one."""
     load(0, 1, n, block, queue, settings)
-    replicate(block.par, m)
+    replicate(block.par, m, settings)
 
 
 @lane_function
-def advance(crank_rod, rod_slider, n, motion, bank, rules, block, queue, method, record, m, budget):
+def advance(joints, n, motion, bank, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample. The motion of one lane is not asked for."""
-    effects = at.Stepped(crank_rod, rod_slider, rules, method.measures)
+    effects = at.Stepped(joints, rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book
     if work[at.RUNNING] == 0.0:
@@ -308,18 +307,18 @@ def advance(crank_rod, rod_slider, n, motion, bank, rules, block, queue, method,
             full = no_room(record, counters)
             after_step(work, m)
             if ended > 0.0:
-                wrap_crank(effects.rules.turning, 0, 1, work, n - 1)
+                wrap_crank(effects.rules.turning, 0, 1, work, n - 1, settings)
                 status = end_revolution(0, 1, work, book, settings)
                 goes_on = status == UNFINISHED
         if not goes_on:
-            finish(0, 1, n, status, block, queue)
+            finish(0, 1, n, status, block, queue, settings)
             next_sample(n, block, queue, settings, m)
     return work[at.RUNNING] > 0.0
 
 
 @cache
 def make_collocation_stepper(
-    n: int, joints: Joints, *, recorded: bool = False
+    n: int, joints: at.Open, *, recorded: bool = False
 ) -> Callable[..., Any]:
     """Return the compiled stepper of one response with n coordinates.
 
@@ -333,7 +332,7 @@ def make_collocation_stepper(
     """
     if not 1 <= n <= lob.MOST_COORDINATES:
         raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"crank_rod": joints[0], "rod_slider": joints[1], "n": n}
+    known: dict[str, Any] = {"joints": joints, "n": n}
     if not recorded:
         known["record"] = None
     text = one_text(advance, "collocation", **known)

@@ -111,7 +111,7 @@ def gap_errors(effects, step, i, W):
     """Squares of the scaled errors of all gaps' integrals, added."""
     total = 0.0
     for gap in written_out(at.GAPS):
-        total += gap_error(getattr(effects, gap.asked_by), step, gap.rate, gap.clearance, i, W)
+        total += gap_error(getattr(effects.open, gap.asked_by), step, gap.rate, gap.clearance, i, W)
     return total
 
 

@@ -30,7 +30,7 @@ from hpcclear.dynamics.stepping.control import (
 )
 from hpcclear.dynamics.stepping.record import record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.settings import ATOL, GAP_TOLERANCE, RTOL
+from hpcclear.dynamics.stepping.settings import ATOL, CYCLE, GAP_TOLERANCE, RTOL
 from hpcclear.dynamics.stepping.stops import (
     impacts,
     integrate_gap,
@@ -38,8 +38,6 @@ from hpcclear.dynamics.stepping.stops import (
     turn_of_free_crank,
     wrap_crank,
 )
-
-Joints = tuple[int | None, int | None]
 
 
 @lane_function
@@ -100,7 +98,7 @@ def weigh_rates(effects, work, first, row, b, e, W):
     """
     for i in range(W):
         for gap in written_out(at.GAPS):
-            weigh_gap(getattr(effects, gap.asked_by), work, gap.rate, first, row, b, e, i, W)
+            weigh_gap(getattr(effects.open, gap.asked_by), work, gap.rate, first, row, b, e, i, W)
     for r in range(len(effects.measures)):
         rate = measure(effects, r)
         for i in range(W):
@@ -148,18 +146,25 @@ def take_explicit_steps(effects, motion, step, tables, memory, W):
 
 
 @lane_event
+@unrolled
+def integrate_gaps(effects, i, W, work):
+    """Integrals of the gaps of open joints that change sign in a special lane's step."""
+    for joint in written_out(at.JOINTS):
+        integrate_gap(getattr(effects.open, joint.flag), i, W, work, joint)
+
+
+@lane_event
 def end_of_step(effects, i, W, n, block, settings):
     """What the end of a special lane's step shows: it may be cut. Returns OK or why the lane ends."""
     work = block.work
     status = failure(i, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + i] == 1.0:
-        impacts(effects.rules.latched, i, W, work, settings)
+        impacts(effects, i, W, work, settings)
         if work[at.ACCEPT * W + i] == 1.0:
-            stop_at_kinks(i, W, work, settings)
+            stop_at_kinks(effects, i, W, work, settings)
         if work[at.ACCEPT * W + i] == 1.0:
             status = turn_of_free_crank(effects.rules.free, i, W, work, settings, n - 1)
-        integrate_gap(i, W, work, at.O12)
-        integrate_gap(i, W, work, at.O23)
+        integrate_gaps(effects, i, W, work)
     return status
 
 
@@ -167,7 +172,7 @@ def end_of_step(effects, i, W, n, block, settings):
 def change_sample(i, W, n, status, block, queue, settings):
     """Write down a lane's sample, if its status is one, and give it the next. Returns whether there is one."""
     if status != UNFINISHED:
-        finish(i, W, n, status, block, queue)
+        finish(i, W, n, status, block, queue, settings)
     load(i, W, n, block, queue, settings)
     return block.work[at.RUNNING * W + i]
 
@@ -175,7 +180,7 @@ def change_sample(i, W, n, status, block, queue, settings):
 @lane_event
 def close_revolution(effects, i, W, n, block, settings):
     """What the end of a lane's revolution brings. Returns UNFINISHED or why the lane ends."""
-    wrap_crank(effects.rules.turning, i, W, block.work, n - 1)
+    wrap_crank(effects.rules.turning, i, W, block.work, n - 1, settings)
     return end_revolution(i, W, block.work, block.book, settings)
 
 
@@ -197,7 +202,7 @@ def judge_steps(effects, n, block, queue, settings, W):
     change = 0.0
     special = judge_step(work, settings, W)
     special += flag_gaps(
-        effects, work, n - 1, settings[GAP_TOLERANCE], W,
+        effects, work, n - 1, settings[GAP_TOLERANCE], settings[CYCLE], W,
     )  # fmt: skip
     if special > 0.0:
         for i in range(W):
@@ -239,12 +244,10 @@ def borrowed_all(block, queue, method):
 
 
 @lane_function
-def advance(
-    crank_rod, rod_slider, n, W, motion, bank, rules, block, queue, method, record, memory, budget
-):
+def advance(joints, n, W, motion, bank, rules, block, queue, method, record, memory, budget):
     """Take at most `budget` block steps. Returns whether lanes are running."""
     block, queue, method = borrowed_all(block, queue, method)
-    effects = at.Stepped(crank_rod, rod_slider, rules, method.measures)
+    effects = at.Stepped(joints, rules, method.measures)
     settings, tables, work = method.settings, method.tables, block.work
     atol = settings[ATOL : ATOL + 2 * at.MAX_COORDINATES]
     step = Step(work, block.stages, block.par, method.weights, n, settings[RTOL], atol)
@@ -269,9 +272,9 @@ def advance(
 
 @cache
 def make_stepper(
-    W: int, n: int, joints: Joints, *, recorded: bool = False, implicit: bool = False
+    W: int, n: int, joints: at.Open, *, recorded: bool = False, implicit: bool = False
 ) -> Callable[..., Any]:
-    """Return the compiled stepper for W lanes of n coordinates, with the joints O12 and O23 open (1) or not (None).
+    """Return the compiled stepper for W lanes of n coordinates, with these joints open.
 
     Its arguments: the addresses of the motion of W lanes and of eight (`rhs.motion_of`), `layout.Rules`, `layout.Block`,
     `layout.Queue`, `layout.Method`, if `recorded` an array for the steps of lane 0, if `implicit` the memory of the implicit
@@ -285,7 +288,7 @@ def make_stepper(
     """
     if not 1 <= n <= at.MAX_COORDINATES:
         raise ValueError(f"the stepper holds 1 to {at.MAX_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"crank_rod": joints[0], "rod_slider": joints[1], "n": n, "W": W}
+    known: dict[str, Any] = {"joints": joints, "n": n, "W": W}
     if not recorded:
         known["record"] = None
     if not implicit:

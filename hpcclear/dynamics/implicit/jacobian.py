@@ -14,6 +14,8 @@ from hpcclear.dynamics.linkage.rhs import run_motion
 
 _RELATIVE = 1.5e-8  # square root of the round-off
 SECOND_OFFSET = mem.SECOND * LANES
+FIRSTS = range(0, mem.COLUMNS, LANES)
+"""First of each group of columns of the Jacobian."""
 
 
 @scalar_function
@@ -109,11 +111,11 @@ def columns(motion, n, m, tables, first):
 
 
 @scalar_function
+@unrolled
 def difference_jacobian(motion, n, m, tables):
     """Partial derivatives of the accelerations at the state of the middle stage, into mem.JACOBIAN.
 
     mem.BASE holds the accelerations there.
     """
-    columns(motion, n, m, tables, 0)
-    columns(motion, n, m, tables, LANES)
-    columns(motion, n, m, tables, 2 * LANES)
+    for first in written_out(FIRSTS):
+        columns(motion, n, m, tables, first)

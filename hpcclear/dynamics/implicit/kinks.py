@@ -6,6 +6,7 @@ solution. Each kink is the zero of a smooth function: damping factor, sliding sp
 """
 
 from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.memory import END, LANES
@@ -25,8 +26,6 @@ GAP_UNIT = 0.1
 
 LEAST_CUT = 0.02
 """A step is cut to this fraction at least: a kink that is nearer is stepped over."""
-
-_BOTH = 2 * mem.KINKS_A_JOINT
 
 
 @lane_function
@@ -94,12 +93,15 @@ def kinks_of_joint(flag, effects, latched, m, joint, row, i):
 
 
 @scalar_function
+@unrolled
 def kink_functions(effects, m):
-    """Kink functions of both joints at the states of the first bank, as evaluated."""
-    second = mem.KINKS + mem.KINKS_A_JOINT
+    """Kink functions of all open joints at the states of the first bank, as evaluated."""
     for i in range(LANES):
-        kinks_of_joint(effects.crank_rod, effects, effects.rules.latched, m, at.O12, mem.KINKS, i)
-        kinks_of_joint(effects.rod_slider, effects, effects.rules.latched, m, at.O23, second, i)
+        row = mem.KINKS
+        for joint in written_out(at.JOINTS):
+            flag = getattr(effects.open, joint.flag)
+            kinks_of_joint(flag, effects, effects.rules.latched, m, joint, row, i)
+            row += mem.KINKS_A_JOINT
 
 
 @scalar_function
@@ -108,7 +110,7 @@ def kinks_of_start(effects, m):
     gone, since the start kept before."""
     kink_functions(effects, m)
     changed = False
-    for f in range(_BOTH):
+    for f in range(mem.ALL_KINKS):
         before = m[mem.START_KINKS + f]
         now = m[(mem.KINKS + f) * LANES + END]
         m[mem.START_KINKS + f] = now
@@ -125,7 +127,7 @@ def kink_fraction(effects, m, beyond):
     """
     kink_functions(effects, m)
     first = 2.0
-    for f in range(_BOTH):
+    for f in range(mem.ALL_KINKS):
         start = m[mem.START_KINKS + f]
         row = (mem.KINKS + f) * LANES
         if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:

@@ -347,7 +347,7 @@ def gap_errors(effects, m, work, lane, W):
     total = 0.0
     for gap in written_out(at.GAPS):
         total += gap_error(
-            getattr(effects, gap.asked_by), m, work, gap.rate, gap.clearance, lane, W
+            getattr(effects.open, gap.asked_by), m, work, gap.rate, gap.clearance, lane, W
         )
     return total
 
@@ -367,7 +367,7 @@ def mean_of_step(flag, m, work, rate, lane, W):
 def means_of_step(effects, m, work, lane, W):
     """Means of all that is integrated over the step."""
     for gap in written_out(at.GAPS):
-        mean_of_step(getattr(effects, gap.asked_by), m, work, gap.rate, lane, W)
+        mean_of_step(getattr(effects.open, gap.asked_by), m, work, gap.rate, lane, W)
     for r in range(len(effects.measures)):
         mean_of_step(1, m, work, effects.measures[r], lane, W)
 

@@ -33,7 +33,7 @@ from hpcclear.dynamics.implicit.radau import (
     refilter_error,
     start_of_step,
 )
-from hpcclear.dynamics.stepping.settings import ATOL, RTOL
+from hpcclear.dynamics.stepping.settings import ATOL, PARAMETER_ROWS, RTOL
 
 CHEAP_CONTRACTION = 0.002
 """While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
@@ -88,13 +88,14 @@ def fit_to_ramp(m, settings):
     and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
     ramp's end would hide its slope.
     """
-    first = m[(mem.PAR + at.JOINT_12 + at.INVERSE_RAMP) * LANES]
-    second = m[(mem.PAR + at.JOINT_23 + at.INVERSE_RAMP) * LANES]
-    slope = max(
-        m[(mem.PAR + at.JOINT_12 + at.FRICTION) * LANES] * first,
-        m[(mem.PAR + at.JOINT_23 + at.FRICTION) * LANES] * second,
-    )
-    ramp = 1.0 / max(first, second, 1e-300)
+    steepest = 1e-300
+    slope = 0.0
+    for k in range(at.MAX_JOINTS):
+        block = mem.PAR + at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        inverse = m[(block + at.INVERSE_RAMP) * LANES]
+        steepest = max(steepest, inverse)
+        slope = max(slope, m[(block + at.FRICTION) * LANES] * inverse)
+    ramp = 1.0 / steepest
     speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
     within = ERROR_IN_RAMP * ramp / (1.0 + speed)
     strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
@@ -105,7 +106,7 @@ def fit_to_ramp(m, settings):
 @scalar_function
 def take_over(n, lane, W, par, m, settings):
     """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
-    for k in range(at.PARAMETERS):
+    for k in range(int(settings[PARAMETER_ROWS])):
         fill(m, mem.PAR + k, par[k * W + lane])
         fill(m, mem.SECOND + mem.PAR + k, par[k * W + lane])
     for k in range(n):
@@ -133,7 +134,7 @@ def fetch(effects, motion, n, lane, W, block, m, tables):
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
     m[mem.STEP] = work[at.STEP * W + lane]
-    for row in (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23):
+    for row in range(at.ACTIVE, at.ACTIVE + 2 * at.MAX_JOINTS):  # and the impact speeds
         fill(m, row, work[row * W + lane])
         fill(m, mem.SECOND + row, work[row * W + lane])
     for k in range(n):

@@ -68,6 +68,8 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
 
 def _curves(motion: Motion) -> list[tuple[int, int]]:
     """Rows of tabulated values, and where their tables begin."""
+    if motion.curves:
+        return [(row, 4 * at.CELLS * (row - at.CURVES)) for row in motion.curves.values()]
     mechanism = motion.forest.mechanism
     tabulated = [
         load for load in mechanism.loads if isinstance(load, (Force, Torque)) and load.table
@@ -82,14 +84,18 @@ def _turned(motion: Motion) -> str:
     """Angle of the body whose turn is the revolution."""
     forest = motion.forest
     drive = forest.mechanism.period
-    k = forest.index("angle", forest.frames[drive.body])
+    frame = forest.frames[drive.body]
+    k = forest.index("angle", frame)
     if k is not None:
-        return f"work[{at.QS + k} * W + i]"
-    assert isinstance(drive, ConstantSpeed)
-    speed = motion.parameters[f"{drive.name}_speed"]
-    start = forest.mechanism.body(drive.body).start_angle
-    turned = f"par[{speed} * W + i] * work[{at.STAGE_TIME} * W + i]"
-    return turned if start == 0.0 else f"{start!r} + {turned}"
+        turned = f"work[{at.QS + k} * W + i]"
+    else:
+        rate = "speed" if isinstance(drive, ConstantSpeed) else "rate"
+        speed = motion.parameters[f"{drive.name}_{rate}"]
+        turned = f"par[{speed} * W + i] * work[{at.STAGE_TIME} * W + i]"
+        start = motion.parameters.get(f"{frame}_start")
+        turned = turned if start is None else f"par[{start} * W + i] + {turned}"
+    turns = getattr(drive, "turns", 1)
+    return turned if turns == 1 else f"({turned}) * {1.0 / turns!r}"
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

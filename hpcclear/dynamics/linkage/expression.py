@@ -99,7 +99,7 @@ class Writer:
     Parameters
     ----------
     rows : mapping of parameter name to row
-        Parameters with a row of their own; others get the rows from `free` on.
+        Parameters with a row of their own, derived ones by their texts; others get the rows from `free` on.
     free : int
         First row of `par` that nobody has.
     hoist : bool
@@ -219,5 +219,7 @@ class Writer:
             name = f"fixed_{len(self.derived) + 1}"
             self._derived_names[text] = name
             self.derived[name] = text
+            if text in self.rows:
+                self.rows[name] = self.rows[text]
         result = named(self._derived_names[text], fixed=True)
         return -result if term.negative else result

@@ -53,6 +53,7 @@ class Rows:
     time: int = at.STAGE_TIME
     torque_value: int = at.TORQUE_VALUE
     load_value: int = at.LOAD_VALUE
+    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
     holds: int | None = None  # first of the multipliers, where they are asked for
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
@@ -75,6 +76,8 @@ class Motion:
         Names that `numbers.values` gives a number to.
     constraints : tuple of str
         Names of the multipliers.
+    curves : mapping
+        Rows of tabulated values, by drive or load.
     """
 
     source: str
@@ -83,6 +86,7 @@ class Motion:
     derived: dict[str, str]
     inputs: tuple[str, ...]
     constraints: tuple[str, ...]
+    curves: Mapping[str, int] = field(default_factory=dict)
 
 
 def generate(
@@ -120,9 +124,6 @@ class _Generator:
         self.load_power = ZERO
 
     def motion(self) -> Motion:
-        self.writer.when_needed(
-            ("turned_load",), f"turned_load = work[{self.rows.load_value} * W + i]"
-        )
         for k, joint in enumerate(self.mechanism.clearances):
             self._contact(k, joint)
         for load in self.mechanism.loads:
@@ -140,6 +141,7 @@ class _Generator:
             {name: text for name, text in self.writer.derived.items() if name in names},
             tuple(self.writer.inputs),
             tuple(row.name for row in self.constraints),
+            self.rows.curves,
         )
 
     def _described(self) -> str:
@@ -180,7 +182,7 @@ class _Generator:
         if isinstance(load, Spring):
             self._spring(load)
             return
-        turned = named("turned_load") if load.table else ONE
+        turned = self._turned(load.name, self.rows.load_value) if load.table else ONE
         if isinstance(load, Torque):
             moment = write.let(load.name, write.parameter(f"{load.name}_torque") * turned)
             self.balance.twists.append(Twist(load.body, moment))
@@ -194,6 +196,13 @@ class _Generator:
             for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
                 power = power + part * speed
         self.load_power = self.load_power + power
+
+    def _turned(self, name: str, row: int) -> Term:
+        """What the curve of a drive or load says at the stage; `row`: where it does not have one of its own."""
+        turned = f"turned_{name}"
+        row = self.rows.curves.get(name, row)
+        self.writer.when_needed((turned,), f"{turned} = work[{row} * W + i]")
+        return named(turned)
 
     def _force(self, load: Force, axis: str, value: float) -> Term:
         return self.writer.parameter(f"{load.name}_force_{axis}") if value else ZERO
@@ -216,9 +225,9 @@ class _Generator:
         write = self.writer
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
-            name = f"turned_{drive.name}"
-            write.when_needed((name,), f"{name} = work[{self.rows.torque_value} * W + i]")
-            torque = write.let(drive.name, torque * named(name))
+            torque = write.let(
+                drive.name, torque * self._turned(drive.name, self.rows.torque_value)
+            )
         return Column("angle", self.forest.frames[drive.body]), torque
 
     # ---- accelerations --------------------------------------------------------------------------
@@ -321,8 +330,8 @@ class _Generator:
             self._rate(at.LOAD_POWER, self.load_power)
         if on.responses and on.follow:
             k = self.number[Column("slide", on.follow)]
-            self._rate(at.SLIDER_ACCELERATION, found[k])
-            self._rate(at.SLIDER_SQUARE, found[k] * found[k])
+            self._rate(at.FOLLOWED_ACCELERATION, found[k])
+            self._rate(at.FOLLOWED_SQUARE, found[k] * found[k])
 
     def _drives(self) -> list[Drive]:
         main = self.mechanism.period

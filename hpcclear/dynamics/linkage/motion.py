@@ -184,8 +184,8 @@ def store_power(effects, work, drive, loss, load_power, acceleration, i, W):
     store_rate(effects.ledger, work, at.DISSIPATION, loss, i, W)
     store_rate(effects.ledger, work, at.LOAD_POWER, load_power, i, W)
     store_rate(effects.responses, work, at.DRIVE_MOMENT, moment, i, W)
-    store_rate(effects.responses, work, at.SLIDER_ACCELERATION, acceleration, i, W)
-    store_rate(effects.responses, work, at.SLIDER_SQUARE, acceleration * acceleration, i, W)
+    store_rate(effects.responses, work, at.FOLLOWED_ACCELERATION, acceleration, i, W)
+    store_rate(effects.responses, work, at.FOLLOWED_SQUARE, acceleration * acceleration, i, W)
 
 
 @lane_function

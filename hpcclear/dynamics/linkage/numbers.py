@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -33,7 +35,7 @@ def values(
     for joint in mechanism.joints:
         if isinstance(joint, Slide):
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
-            found |= {f"{joint.name}_cos": math.cos(angle), f"{joint.name}_sin": math.sin(angle)}
+            found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
             if joint.friction is not None:
                 found[f"{joint.name}_coefficient"] = joint.friction.coefficient
                 found[f"{joint.name}_inverse_ramp"] = 1.0 / joint.friction.ramp_speed
@@ -46,8 +48,7 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
     for body in mechanism.bodies:
         drive = mechanism.drive_of(body.name)
         inertia = body.inertia + (drive.inertia if isinstance(drive, TorqueDrive) else 0.0)
-        if inertia == 0.0:
-            inertia = 1.0  # it does not turn
+        inertia = np.where(np.asarray(inertia) == 0.0, 1.0, inertia)[()]  # of what does not turn
         places = {**body.points, CENTER: body.center}
         for a, (ax, ay) in places.items():
             for b, (bx, by) in places.items():
@@ -58,8 +59,8 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             f"{body.name}_inverse_mass": 1.0 / body.mass,
             f"{body.name}_inertia": inertia,
             f"{body.name}_inverse_inertia": 1.0 / inertia,
-            f"{body.name}_offset_cos": math.cos(angle),
-            f"{body.name}_offset_sin": math.sin(angle),
+            f"{body.name}_offset_cos": np.cos(angle),
+            f"{body.name}_offset_sin": np.sin(angle),
         }
         if trees.on_ground(body.name):
             own = body.points[split(trees.hangs[body.name].own)[1]]

@@ -16,7 +16,7 @@ def observe(
     """Fill `out` (instants, n + RATES) with accelerations and rates.
 
     `motion`: address of a motion of one lane (`rhs.motion_of`); `states` (instants, 2 n): coordinates, then velocities;
-    `contacts` (instants, 4): active flags and 1/d'_0 of both joints; `times` (instants,): since the start of the revolution;
+    `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times` (instants,): since the start of the revolution;
     `tables`: as `Problem.tables`.
     """
     _observe(motion, new_lane(par), tables, states, contacts, times, out)
@@ -46,10 +46,8 @@ def put_state(work, contacts, time, state, n):
     for k in range(n):
         work[at.QS + k] = state[k]
         work[at.VS + k] = state[n + k]
-    work[at.ACTIVE_12] = contacts[0]
-    work[at.ACTIVE_23] = contacts[1]
-    work[at.INVERSE_IMPACT_12] = contacts[2]
-    work[at.INVERSE_IMPACT_23] = contacts[3]
+    for k in range(2 * at.MAX_JOINTS):
+        work[at.ACTIVE + k] = contacts[k]
     work[at.STAGE_TIME] = time
 
 

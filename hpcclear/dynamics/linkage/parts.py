@@ -105,12 +105,13 @@ class ConstantSpeed:
     body: str
     speed: float
     period: bool = False
+    turns: int = 1
     prescribed: ClassVar[bool] = True
 
     @property
     def seconds(self) -> float:
-        """One turn, s."""
-        return 2 * math.pi / abs(self.speed)
+        """One revolution of as many turns, s."""
+        return 2 * math.pi * self.turns / abs(self.speed)
 
 
 @dataclass(frozen=True)
@@ -143,12 +144,13 @@ class TorqueDrive:
     inertia: float = 0.0
     table: bool = False
     period: bool = False
+    turns: int = 1
     prescribed: ClassVar[bool] = False
 
     @property
     def seconds(self) -> float:
-        """One turn at the initial speed, s."""
-        return 2 * math.pi / abs(self.initial_speed)
+        """One revolution of as many turns at the initial speed, s."""
+        return 2 * math.pi * self.turns / abs(self.initial_speed)
 
 
 Drive = ConstantSpeed | Harmonic | TorqueDrive

@@ -101,7 +101,13 @@ def motion_of(effects: at.Effects, W: int) -> Any:
     compiled with `FASTMATH` and without branches on a lane's numbers.
     The object is kept for as long as the process lives: a stepper may hold its address.
     """
-    text = one_text(written_by(effects).motion, f"motion_{W}", effects=effects, W=W)
+    return compiled_motion(written_by(effects), effects, W)
+
+
+@cache
+def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
+    """The compiled ``motion`` of a module, as `motion_of` has it."""
+    text = one_text(module.motion, f"motion_{W}", effects=effects, W=W)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 

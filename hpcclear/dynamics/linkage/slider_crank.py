@@ -96,5 +96,5 @@ def motion_of(effects: at.Effects) -> Motion:
         responses=bool(effects.responses),
         follow="slider",
     )
-    rows = Rows(parameters=PARAMETERS, free=at.PARAMETERS)
+    rows = Rows(parameters=PARAMETERS, free=at.OWN)
     return generate(mechanism_of(effects), on, rows, cartesian=bool(effects.baumgarte), hoist=False)

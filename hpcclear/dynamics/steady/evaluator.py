@@ -11,6 +11,7 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
 from hpcclear.dynamics.steady.effort import Mean, Sample, Stretch
@@ -125,8 +126,9 @@ class SteadyEvaluator:
 
     def submit(self, index: Integers, points: Array) -> None:
         """Queue designs: indices (m,), values (m, d) in the columns' order, SI."""
-        par = parameters(self.scene, Points(self._columns.names, points, self._columns.paths))
-        start = start_states(self.scene, par)
+        made = Points(self._columns.names, points, self._columns.paths)
+        par = parameters(self.scene, made)
+        start = start_states(self.scene, par, made)
         numbers = np.asarray(index, np.int64).tolist()
         for k, sample in enumerate(numbers):
             design = Sample(
@@ -214,10 +216,8 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool) -> Records:
         record["peak_crank_moment"] = each["peak_crank_moment"].max()
     record["sample"] = sample
     record["mean_gap"] = mean.gaps
-    record["objective"] = np.hypot(*mean.gaps)
-    record["objective_spread"] = np.std(
-        np.hypot(*np.moveaxis(mean.outcomes.mean_gap, -1, 0)), ddof=1
-    )
+    record["objective"] = objective(mean.gaps)
+    record["objective_spread"] = np.std(objective(mean.outcomes.mean_gap), ddof=1)
     record["objective_limit"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period

@@ -118,8 +118,8 @@ def student(values: Array) -> tuple[float, float, float]:
 
 def projected(gaps: Array) -> Array:
     """Mean gaps, shape (..., 2), as numbers, shape (...), whose mean is the objective of the mean gaps, to first order."""
-    mean = gaps.reshape(-1, 2).mean(axis=0)
-    return gaps @ (mean / np.hypot(*mean))
+    mean = gaps.reshape(-1, gaps.shape[-1]).mean(axis=0)
+    return gaps @ (mean / objective(mean))
 
 
 def spin_up(series: Array) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans, Records
 from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.dynamics.revolutions import objective
 from hpcclear.scene import Scene
 
 NAMED = 8
@@ -34,7 +35,7 @@ def why_missed(record: Any, target: float | None) -> str:
 
 def in_a_line(record: Any, seconds: float | None = None) -> str:
     """f of one record, or of a dataset of it, with its limits: "3.36 +- 0.03 um (chaotic, 6200 revolutions, 1.9 s)"."""
-    f = float(np.hypot(*np.asarray(record["mean_gap"]))) * 1e6
+    f = float(objective(np.asarray(record["mean_gap"]))) * 1e6
     limit = float(record["objective_limit"]) * 1e6
     regime, period = Regime(int(record["regime"])), float(record["period"])
     told = [regime.name.lower()]

@@ -8,6 +8,7 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
@@ -93,17 +94,17 @@ def gap_flag(latched, work, joint, i, W, tolerance):
 
 
 @lane_function
-def flag_gaps(effects, work, last, tolerance, W):
+@unrolled
+def flag_gaps(effects, work, last, tolerance, cycle, W):
     """Mark accepted lanes that need the scalar code before the step is committed."""
     special = 0.0
     latched, free = 1.0 * effects.rules.latched, 1.0 * effects.rules.free
     for i in range(W):
         flag = 0.0
-        if effects.crank_rod is not None:
-            flag = max(flag, gap_flag(latched, work, at.O12, i, W, tolerance))
-        if effects.rod_slider is not None:
-            flag = max(flag, gap_flag(latched, work, at.O23, i, W, tolerance))
-        turned = 1.0 if work[(at.QS + last) * W + i] > at.TURN - 1e-6 else 0.0
+        for joint in written_out(at.JOINTS):
+            if getattr(effects.open, joint.flag) is not None:
+                flag = max(flag, gap_flag(latched, work, joint, i, W, tolerance))
+        turned = 1.0 if work[(at.QS + last) * W + i] > cycle - 1e-6 else 0.0
         stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
         flag = max(flag, free * max(turned, stalled))
         flag = flag * work[at.ACCEPT * W + i] * work[at.RUNNING * W + i]
@@ -155,7 +156,7 @@ def commit_joint(flag, latched, work, joint, i, W):
 @lane_function
 def measure(effects, r):
     """Rate r of those that are measured: not below 0, which spares the compiler a question for every lane."""
-    return effects.measures[r] & 31
+    return effects.measures[r] & 63
 
 
 @lane_function
@@ -182,14 +183,15 @@ def commit_peak(work, i, W):
 
 
 @lane_function
+@unrolled
 def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     commit_measures(effects, work, W)
     ended = 0.0
     latched = 1.0 * effects.rules.latched
     for i in range(W):
-        commit_joint(effects.crank_rod, latched, work, at.O12, i, W)
-        commit_joint(effects.rod_slider, latched, work, at.O23, i, W)
+        for joint in written_out(at.JOINTS):
+            commit_joint(getattr(effects.open, joint.flag), latched, work, joint, i, W)
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
         for k in range(n):

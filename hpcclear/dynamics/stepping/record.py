@@ -6,8 +6,10 @@ from hpcclear.dynamics.collocation.lobatto import MATRIX, STAGES, row_of, weight
 from hpcclear.dynamics.stepping.settings import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
-(TIME, TURN_TIME, REVOLUTION, ACTIVE_12, ACTIVE_23, INVERSE_12, INVERSE_23) = range(7)
-(DRIVE_WORK, ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, STATE) = range(7, 12)
+(TIME, TURN_TIME, REVOLUTION, CONTACTS) = range(4)
+JOINTS = at.MAX_JOINTS
+DRIVE_WORK = CONTACTS + 2 * JOINTS
+(ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, STATE) = range(DRIVE_WORK + 1, DRIVE_WORK + 5)
 
 
 def columns(n: int) -> int:
@@ -24,10 +26,9 @@ def record_step(record, counters, work, stages, book, n, W):
             record[row, TIME] = book[at.ELAPSED * W] + work[at.TIME * W]
             record[row, TURN_TIME] = work[at.TIME * W]
             record[row, REVOLUTION] = book[at.REVOLUTION * W]
-            record[row, ACTIVE_12] = work[at.ACTIVE_12 * W]
-            record[row, ACTIVE_23] = work[at.ACTIVE_23 * W]
-            record[row, INVERSE_12] = work[at.INVERSE_IMPACT_12 * W]
-            record[row, INVERSE_23] = work[at.INVERSE_IMPACT_23 * W]
+            for k in range(JOINTS):
+                record[row, CONTACTS + k] = work[(at.ACTIVE + k) * W]
+                record[row, CONTACTS + JOINTS + k] = work[(at.INVERSE_IMPACT + k) * W]
             for r in range(4):
                 done = book[(at.TOTAL + at.WORKS + r) * W]
                 record[row, DRIVE_WORK + r] = done + work[(at.INTEGRAL + at.DRIVE_POWER + r) * W]
@@ -51,10 +52,9 @@ def record_nodes(record, counters, work, m, book, n):
             record[row, TIME] = book[at.ELAPSED] + turn_time
             record[row, TURN_TIME] = turn_time
             record[row, REVOLUTION] = book[at.REVOLUTION]
-            record[row, ACTIVE_12] = m[at.ACTIVE_12 * STAGES]
-            record[row, ACTIVE_23] = m[at.ACTIVE_23 * STAGES]
-            record[row, INVERSE_12] = m[at.INVERSE_IMPACT_12 * STAGES]
-            record[row, INVERSE_23] = m[at.INVERSE_IMPACT_23 * STAGES]
+            for k in range(JOINTS):
+                record[row, CONTACTS + k] = m[(at.ACTIVE + k) * STAGES]
+                record[row, CONTACTS + JOINTS + k] = m[(at.INVERSE_IMPACT + k) * STAGES]
             for r in range(4):
                 power = at.DRIVE_POWER + r
                 rates = row_of(m, at.RATE_NOW + power)

@@ -8,10 +8,12 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import (
     AVERAGED,
     AVERAGED_CAP,
+    CHOSEN,
     FINISHED,
     MAX_STEPS,
     NEXT_SLOT,
     OBJECTIVE_TOLERANCE,
+    PARAMETER_ROWS,
     SLOTS,
     SMALLEST_STEP,
     TRANSIENT,
@@ -24,37 +26,10 @@ NOT_FINITE = int(Status.NOT_FINITE)
 AVERAGE_CAP = int(Status.AVERAGE_CAP)
 UNFINISHED = -1
 
-CONTACTS = (at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23)
-"""Rows of the contact states, in the order of a start and of an outcome."""
-
-AS_IT_STANDS = (
-    (at.OUT_PEAK_12, at.PEAK_12),
-    (at.OUT_PEAK_23, at.PEAK_23),
-    (at.OUT_DEEPEST_12, at.DEEPEST_12),
-    (at.OUT_DEEPEST_23, at.DEEPEST_23),
-    (at.OUT_EVALUATIONS, at.EVALUATIONS),
-    (at.OUT_ACTIVE_12, at.ACTIVE_12),
-    (at.OUT_ACTIVE_23, at.ACTIVE_23),
-    (at.OUT_INVERSE_IMPACT_12, at.INVERSE_IMPACT_12),
-    (at.OUT_INVERSE_IMPACT_23, at.INVERSE_IMPACT_23),
-    (at.OUT_ATTEMPTS, at.ATTEMPTS),
-    (at.OUT_STIFF_STEPS, at.STIFF_STEPS),
-)
-"""Columns of an outcome and the rows of `work` that they are copied from."""
-
-AS_BOOKED = (
-    (at.OUT_LATCHED_12, at.LATCHED_12),
-    (at.OUT_LATCHED_23, at.LATCHED_23),
-    (at.OUT_REVOLUTIONS, at.REVOLUTION),
-    (at.OUT_TIME, at.ELAPSED),
-)
-"""Likewise, from the books."""
-
+JOINTS = at.MAX_JOINTS
 RATES = len(at.INTEGRATED)
-GAP_12 = at.place(at.GAP_12)
-GAP_23 = at.place(at.GAP_23)
-ACCELERATION = at.place(at.SLIDER_ACCELERATION)
-SQUARE = at.place(at.SLIDER_SQUARE)
+ACCELERATION = at.place(at.FOLLOWED_ACCELERATION)
+SQUARE = at.place(at.FOLLOWED_SQUARE)
 
 
 @lane_event
@@ -71,13 +46,14 @@ def load(lane, W, n, block, queue, settings):
     if slot >= queue.counters[SLOTS]:
         return  # the step stays 0: a resting lane repeats its last state
     queue.counters[NEXT_SLOT] = slot + 1
-    for k in range(at.PARAMETERS):
+    for k in range(int(settings[PARAMETER_ROWS])):
         block.par[k * W + lane] = queue.par[slot, k]
     for k in range(n):
         work[(at.Q + k) * W + lane] = queue.start[slot, k]
         work[(at.V + k) * W + lane] = queue.start[slot, at.MAX_COORDINATES + k]
-    for k in range(len(CONTACTS)):
-        work[CONTACTS[k] * W + lane] = queue.start[slot, at.START_CONTACTS + k]
+    for k in range(JOINTS):
+        work[(at.ACTIVE + k) * W + lane] = queue.start[slot, at.START_CONTACTS + k]
+        work[(at.INVERSE_IMPACT + k) * W + lane] = queue.start[slot, at.START_CONTACTS + JOINTS + k]
     work[at.NEXT_STEP * W + lane] = block.par[at.FIRST_STEP * W + lane]
     work[at.FRESH * W + lane] = 1.0
     work[at.RUNNING * W + lane] = 1.0
@@ -86,21 +62,28 @@ def load(lane, W, n, block, queue, settings):
 
 
 @lane_event
-def finish(lane, W, n, status, block, queue):
+def finish(lane, W, n, status, block, queue, settings):
     """Write down a sample that ended, whatever its status, and free the lane."""
     work, book, out = block.work, block.book, queue.out
     slot = int(book[at.SAMPLE * W + lane])
     out[slot, at.OUT_STATUS] = status
-    for column, row in AS_IT_STANDS:
-        out[slot, column] = work[row * W + lane]
-    for column, row in AS_BOOKED:
-        out[slot, column] = book[row * W + lane]
+    out[slot, at.OUT_EVALUATIONS] = work[at.EVALUATIONS * W + lane]
+    out[slot, at.OUT_ATTEMPTS] = work[at.ATTEMPTS * W + lane]
+    out[slot, at.OUT_STIFF_STEPS] = work[at.STIFF_STEPS * W + lane]
+    out[slot, at.OUT_REVOLUTIONS] = book[at.REVOLUTION * W + lane]
+    out[slot, at.OUT_TIME] = book[at.ELAPSED * W + lane]
+    for k in range(JOINTS):
+        out[slot, at.OUT_PEAK + k] = work[(at.PEAK + k) * W + lane]
+        out[slot, at.OUT_DEEPEST + k] = work[(at.DEEPEST + k) * W + lane]
+        out[slot, at.OUT_ACTIVE + k] = work[(at.ACTIVE + k) * W + lane]
+        out[slot, at.OUT_INVERSE_IMPACT + k] = work[(at.INVERSE_IMPACT + k) * W + lane]
+        out[slot, at.OUT_LATCHED + k] = book[(at.LATCHED + k) * W + lane]
     for r in range(RATES):
         out[slot, at.OUT_TOTAL + r] = book[(at.TOTAL + r) * W + lane]
     count = book[at.COUNT_F * W + lane]
     spread = math.sqrt(book[at.M2_F * W + lane] / (count - 1.0)) if count > 1.0 else math.nan
     out[slot, at.OUT_SPREAD] = spread
-    finish_averages(lane, W, work, book, out, slot)
+    finish_averages(lane, W, work, book, out, slot, settings)
     for k in range(n):
         out[slot, at.OUT_STATE + k] = work[(at.Q + k) * W + lane]
         out[slot, at.OUT_STATE + at.MAX_COORDINATES + k] = work[(at.V + k) * W + lane]
@@ -110,15 +93,17 @@ def finish(lane, W, n, status, block, queue):
 
 
 @lane_event
-def finish_averages(lane, W, work, book, out, slot):
+def finish_averages(lane, W, work, book, out, slot, settings):
     """Means, peak and deviation over the averaged revolutions; those of rates that no effect asked for mean nothing."""
     time = book[at.TIME_SUM * W + lane]
     if time > 0.0:
         for r in range(RATES):
             out[slot, at.OUT_MEAN + r] = book[(at.AVERAGED + r) * W + lane] / time
-        first = out[slot, at.OUT_MEAN + GAP_12]
-        second = out[slot, at.OUT_MEAN + GAP_23]
-        out[slot, at.OUT_OBJECTIVE] = math.sqrt(first * first + second * second)
+        total = 0.0
+        for k in range(JOINTS):
+            gap = settings[CHOSEN + k] * out[slot, at.OUT_MEAN + k]
+            total += gap * gap
+        out[slot, at.OUT_OBJECTIVE] = math.sqrt(total)
         out[slot, at.OUT_MOMENT] = work[at.PEAK_MOMENT * W + lane]
         mean = out[slot, at.OUT_MEAN + ACCELERATION]
         square = out[slot, at.OUT_MEAN + SQUARE]
@@ -193,19 +178,21 @@ def book_objective(lane, W, book, f):
 
 
 @lane_event
-def book_averages(lane, W, work, book, time):
+def book_averages(lane, W, work, book, time, settings):
     """Add a revolution to the books of the averaged ones."""
     for r in range(RATES):
         integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
         book[(at.AVERAGED + r) * W + lane] += integral
     book[at.TIME_SUM * W + lane] += time
-    gap_12 = work[(at.INTEGRAL + at.GAP_12) * W + lane]
-    gap_23 = work[(at.INTEGRAL + at.GAP_23) * W + lane]
-    book_objective(lane, W, book, math.sqrt(gap_12 * gap_12 + gap_23 * gap_23) / time)
-    if work[at.ACTIVE_12 * W + lane] == 1.0 and work[at.ENDED_12 * W + lane] == 0.0:
-        book[at.LATCHED_12 * W + lane] = 1.0
-    if work[at.ACTIVE_23 * W + lane] == 1.0 and work[at.ENDED_23 * W + lane] == 0.0:
-        book[at.LATCHED_23 * W + lane] = 1.0
+    total = 0.0
+    for k in range(
+        JOINTS - 1, -1, -1
+    ):  # O12 last, which keeps the bits of f as they have always been
+        gap = settings[CHOSEN + k] * work[(at.INTEGRAL + 3 * k) * W + lane]
+        total += gap * gap
+        if work[(at.ACTIVE + k) * W + lane] == 1.0 and work[(at.ENDED + k) * W + lane] == 0.0:
+            book[(at.LATCHED + k) * W + lane] = 1.0
+    book_objective(lane, W, book, math.sqrt(total) / time)
 
 
 @lane_event
@@ -216,15 +203,15 @@ def end_revolution(lane, W, work, book, settings):
     revolution = book[at.REVOLUTION * W + lane] + 1.0
     book[at.REVOLUTION * W + lane] = revolution
     if work[at.AVERAGING * W + lane] == 1.0:
-        book_averages(lane, W, work, book, time)
+        book_averages(lane, W, work, book, time, settings)
     for r in range(RATES):
         integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
         book[(at.TOTAL + r) * W + lane] += integral
     for r in range(at.RATES):
         work[(at.INTEGRAL + r) * W + lane] = 0.0
     work[at.TIME * W + lane] = 0.0
-    work[at.ENDED_12 * W + lane] = 0.0
-    work[at.ENDED_23 * W + lane] = 0.0
+    for k in range(JOINTS):
+        work[(at.ENDED + k) * W + lane] = 0.0
     work[at.ENDING * W + lane] = 0.0
     work[at.AVERAGING * W + lane] = 1.0 if revolution >= settings[TRANSIENT] else 0.0
     return verdict(lane, W, book, settings)

@@ -16,8 +16,11 @@ from hpcclear.dynamics import layout as at
     EXPONENT,
     BETA,
     IMPLICIT,  # 0 never, 1 where the motion is stiff, 2 always
-    ATOL,  # first of 2 * MAX_COORDINATES
-) = range(14)
+    CYCLE,  # rad, by which the driven body turns in a revolution
+    PARAMETER_ROWS,  # how many parameters a sample has
+    CHOSEN,  # of each joint: 1 where its gap counts for the objective
+) = range(16)
+ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 
 # ---- counters shared by all lanes

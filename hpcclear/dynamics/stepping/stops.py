@@ -2,9 +2,10 @@
 
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.events import absolute_integral, impact_fraction, root
-from hpcclear.dynamics.stepping.settings import ANGLE_TOLERANCE, GAP_TOLERANCE, IMPACT_FLOOR
+from hpcclear.dynamics.stepping.settings import ANGLE_TOLERANCE, CYCLE, GAP_TOLERANCE, IMPACT_FLOOR
 
 OK = int(Status.OK)
 STALLED = int(Status.STALLED)
@@ -14,14 +15,16 @@ KINK_REACH = 1e-3
 
 
 @lane_event
-def meet_impact(lane, W, work, settings, joint):
+def meet_impact(flag, lane, W, work, settings, joint):
     """Where in this step a joint in flight strikes, as a fraction; 2 if it does not or if it strikes at the end.
 
     At the end of the step, or at its start, the contact is latched here.
     """
-    h = work[at.STEP * W + lane]
+    if flag is None:
+        return 2.0
     if work[joint.active * W + lane] == 1.0:
         return 2.0
+    h = work[at.STEP * W + lane]
     tolerance = settings[GAP_TOLERANCE]
     d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
     d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
@@ -59,35 +62,35 @@ def latch(lane, W, work, settings, joint):
 
 
 @lane_event
-def stop_at_impacts(lane, W, work, settings):
+@unrolled
+def stop_at_impacts(effects, lane, W, work, settings):
     """Shorten the step to the first impact inside it, or latch the contacts that begin at its end."""
-    first = meet_impact(lane, W, work, settings, at.O12)
-    second = meet_impact(lane, W, work, settings, at.O23)
-    cut_or_latch(lane, W, work, settings, first, second)
+    first = 2.0
+    for joint in written_out(at.JOINTS):
+        flag = getattr(effects.open, joint.flag)
+        first = min(first, meet_impact(flag, lane, W, work, settings, joint))
+    if first < 1.0:
+        cut(lane, W, work, first)
+    elif first == 1.0:
+        for joint in written_out(at.JOINTS):
+            flag = getattr(effects.open, joint.flag)
+            if meet_impact(flag, lane, W, work, settings, joint) == 1.0:
+                latch(lane, W, work, settings, joint)
 
 
 @lane_event
-def cut_or_latch(lane, W, work, settings, first, second):
-    """Cut the step to the smaller of two fractions below 1, or start the contacts whose fraction is 1, its end.
-
-    Returns whether it did either.
-    """
-    fraction = min(first, second)
-    if fraction < 1.0:
-        h = work[at.STEP * W + lane]
-        work[at.ACCEPT * W + lane] = 0.0
-        work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h
-        return True
-    if first == 1.0:
-        latch(lane, W, work, settings, at.O12)
-    if second == 1.0:
-        latch(lane, W, work, settings, at.O23)
-    return fraction == 1.0
+def cut(lane, W, work, fraction):
+    """Reject the step and ask for a part of it; all of it where an impact stands at its start."""
+    h = work[at.STEP * W + lane]
+    work[at.ACCEPT * W + lane] = 0.0
+    work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h
 
 
 @lane_event
-def before_kink(lane, W, work, settings, joint):
+def before_kink(flag, lane, W, work, settings, joint):
     """Fraction of this step at which a gap changes sign; 2 if it does not, or so near an end that it does no harm."""
+    if flag is None:
+        return 2.0
     d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
     d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
     if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[GAP_TOLERANCE]:
@@ -100,33 +103,35 @@ def before_kink(lane, W, work, settings, joint):
 
 
 @lane_event
-def stop_at_kinks(lane, W, work, settings):
+@unrolled
+def stop_at_kinks(effects, lane, W, work, settings):
     """Shorten an explicit step to the first instant at which a contact begins or ends.
 
     The force is K d^1.5 on one side and 0 on the other: across this kink the pair has neither its order nor an
     error estimate that can be trusted.
     """
     if work[at.STIFF * W + lane] == 0.0:
-        fraction = min(
-            before_kink(lane, W, work, settings, at.O12),
-            before_kink(lane, W, work, settings, at.O23),
-        )
+        fraction = 2.0
+        for joint in written_out(at.JOINTS):
+            flag = getattr(effects.open, joint.flag)
+            fraction = min(fraction, before_kink(flag, lane, W, work, settings, joint))
         if fraction < 1.0:
             work[at.ACCEPT * W + lane] = 0.0
             work[at.NEXT_STEP * W + lane] = fraction * work[at.STEP * W + lane]
 
 
 @lane_event
-def integrate_gap(lane, W, work, joint):
+def integrate_gap(flag, lane, W, work, joint):
     """Integral of |gap| over a step in which the gap changes sign."""
-    h = work[at.STEP * W + lane]
-    d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
-    d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
-    if d0 * d1 < 0.0:
-        m0 = h * work[(at.RATE_OLD + joint.rate) * W + lane]
-        m1 = h * work[(at.RATE_NOW + joint.rate) * W + lane]
-        mean = work[(at.RATE_SUM + joint.gap) * W + lane]
-        work[(at.RATE_SUM + joint.gap) * W + lane] = absolute_integral(mean, d0, m0, d1, m1)
+    if flag is not None:
+        h = work[at.STEP * W + lane]
+        d0 = work[(at.RATE_OLD + joint.gap) * W + lane]
+        d1 = work[(at.RATE_NOW + joint.gap) * W + lane]
+        if d0 * d1 < 0.0:
+            m0 = h * work[(at.RATE_OLD + joint.rate) * W + lane]
+            m1 = h * work[(at.RATE_NOW + joint.rate) * W + lane]
+            mean = work[(at.RATE_SUM + joint.gap) * W + lane]
+            work[(at.RATE_SUM + joint.gap) * W + lane] = absolute_integral(mean, d0, m0, d1, m1)
 
 
 @lane_event
@@ -134,12 +139,12 @@ def stop_free_crank(lane, W, work, settings, last):
     """End a step where a free crank has made its turn. Returns OK or STALLED."""
     if work[(at.VS + last) * W + lane] <= 0.0:
         return STALLED
-    beyond = work[(at.QS + last) * W + lane] - at.TURN
+    beyond = work[(at.QS + last) * W + lane] - settings[CYCLE]
     tolerance = settings[ANGLE_TOLERANCE]
     work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0
     if beyond > tolerance:
         h = work[at.STEP * W + lane]
-        before = work[(at.Q + last) * W + lane] - at.TURN
+        before = work[(at.Q + last) * W + lane] - settings[CYCLE]
         fraction = impact_fraction(
             before,
             h * work[(at.V + last) * W + lane],
@@ -162,14 +167,14 @@ def turn_of_free_crank(free, lane, W, work, settings, last):
 
 
 @lane_event
-def impacts(latched, lane, W, work, settings):
+def impacts(effects, lane, W, work, settings):
     """End the step at the first impact inside it, under laws that need the impact speed."""
-    if latched:
-        stop_at_impacts(lane, W, work, settings)
+    if effects.rules.latched:
+        stop_at_impacts(effects, lane, W, work, settings)
 
 
 @lane_event
-def wrap_crank(turning, lane, W, work, last):
+def wrap_crank(turning, lane, W, work, last, settings):
     """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
     if turning:
-        work[(at.Q + last) * W + lane] -= at.TURN
+        work[(at.Q + last) * W + lane] -= settings[CYCLE]

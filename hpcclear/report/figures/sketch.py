@@ -40,7 +40,7 @@ def sketch_figure(scene: Scene) -> "Figure":
 
 
 def _mechanism(axes: "Axes", scene: Scene) -> None:
-    crank, rod = scene.mechanism.crank, scene.mechanism.rod
+    crank, rod = scene.slider_crank.crank, scene.slider_crank.rod
     pin = crank.length * np.array([np.cos(ANGLE), np.sin(ANGLE)])
     slider = np.array([pin[0] + np.sqrt(rod.length**2 - pin[1] ** 2), 0.0])
     size = (
@@ -124,7 +124,7 @@ def _word(axes: "Axes", place: Any, text: str, colour: str, offset: tuple[int, i
 
 def _key(scene: Scene) -> list[str]:
     """A line for each body, joint and action."""
-    mechanism, effects = scene.mechanism, scene.effects
+    mechanism, effects = scene.slider_crank, scene.effects
     lines = ["\u03c6 from x to the crank, counter-clockwise; \u25cb mass centre"]
     for name in ("crank", "rod"):
         link = getattr(mechanism, name)

@@ -3,7 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.physics.contact import contact_stiffness, reduced_compliance
 from hpcclear.scene import Scene
@@ -11,6 +16,7 @@ from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
 from hpcclear.scene.planar import (
     ForceLoad,
     Planar,
+    PlanarBody,
     PlanarClearance,
     PlanarHarmonic,
     PlanarRevolute,
@@ -19,6 +25,7 @@ from hpcclear.scene.planar import (
     PlanarTorque,
     SpringLoad,
 )
+from hpcclear.scene.points import Points
 from hpcclear.scene.validation import validated
 
 
@@ -30,19 +37,56 @@ def planar_mechanism(content: Mapping[str, Any]) -> Mechanism:
     InputError
         If an entry is wrong, or they make no mechanism; it names the entry, the joint, the body or the drive.
     """
-    tables = validated(Planar, content)
-    return Mechanism(
-        tuple(
-            parts.Body(
-                body.name, body.mass, body.inertia, body.center, dict(body.points), body.start_angle
-            )
-            for body in tables.bodies
-        ),
-        tuple(_joint(joint) for joint in tables.joints),
-        tuple(_drive(drive) for drive in tables.drives),
-        dict(tables.ground.points),
-        tuple(_load(load) for load in tables.loads),
-    )
+    return Mechanism(**_tables(validated(Planar, content)))
+
+
+def mechanism_of(planar: Planar) -> Mechanism:
+    """The mechanism of a scene's tables; errors as `planar_mechanism`, below ``mechanism``."""
+    try:
+        return Mechanism(**_tables(planar))
+    except InputError as error:
+        raise InputError(
+            f"mechanism.{error.key}", error.value, error.reason, error.remedy
+        ) from None
+
+
+def with_columns(planar: Planar, structure: Mechanism, points: Points) -> Mechanism:
+    """The mechanisms of samples: numbers that columns of the points drive are arrays (m,)."""
+    tables: Any = planar
+    for k, paths in enumerate(points.paths):
+        for path in paths:
+            if path.startswith("mechanism."):
+                tables = _put(tables, path.split(".")[1:], points.values[:, k])
+    return with_numbers(structure, **_tables(tables))
+
+
+def _put(table: Any, keys: list[str], value: Array) -> Any:
+    """A copy of nested tables with another entry, unchecked; rows are found by their names."""
+    if not keys:
+        return value
+    head, *rest = keys
+    if isinstance(table, tuple):
+        return tuple(_put(row, rest, value) if row.name == head else row for row in table)
+    return table.model_copy(update={head: _put(getattr(table, head), rest, value)})
+
+
+def _tables(planar: Any) -> dict[str, Any]:
+    return {
+        "bodies": tuple(_body(body) for body in planar.bodies),
+        "joints": tuple(_joint(joint) for joint in planar.joints),
+        "drives": tuple(_drive(drive) for drive in planar.drives),
+        "ground": {point.name: (point.x, point.y) for point in planar.ground.points},
+        "loads": tuple(_load(load) for load in planar.loads),
+    }
+
+
+def _body(body: PlanarBody) -> parts.Body:
+    points = {point.name: (point.x, point.y) for point in body.points}
+    center = (body.center.x, body.center.y)
+    if body.length is not None:
+        points = {"a": (0.0, 0.0), "b": (body.length, 0.0), **points}
+        center = (0.5 * body.length if body.mass_center is None else body.mass_center, 0.0)
+    return parts.Body(body.name, body.mass, body.inertia, center, points, body.start_angle)
 
 
 def _stiffness(bearing: Material, journal: Material, radius: float, clearance: float) -> float:
@@ -56,11 +100,11 @@ def _joint(joint: Any) -> parts.Joint:
     if isinstance(joint, PlanarRevolute):
         return parts.Revolute(joint.name, joint.journal, joint.bearing)
     if isinstance(joint, PlanarClearance):
-        both = joint.materials
+        both, start = joint.materials, joint.start_eccentricity
         stiffness = _stiffness(both.bearing, both.journal, joint.bearing_radius, joint.clearance)
         return parts.Clearance(
             joint.name, joint.journal, joint.bearing, joint.clearance, joint.bearing_radius,
-            stiffness, joint.start_eccentricity,
+            stiffness, (start.x, start.y),
         )  # fmt: skip
     if isinstance(joint, PlanarSlide):
         rubs = joint.friction
@@ -71,33 +115,55 @@ def _joint(joint: Any) -> parts.Joint:
 
 def _drive(drive: Any) -> parts.Drive:
     if isinstance(drive, PlanarSpeed):
-        return parts.ConstantSpeed(drive.name, drive.body, drive.speed, drive.period)
+        return parts.ConstantSpeed(drive.name, drive.body, drive.speed, drive.period, drive.turns)
     if isinstance(drive, PlanarHarmonic):
         return parts.Harmonic(
             drive.name, drive.body, drive.amplitude, drive.frequency, drive.mean, drive.phase,
             drive.period,
         )  # fmt: skip
     assert isinstance(drive, PlanarTorque)
-    table = not isinstance(drive.torque, float)
+    table = isinstance(drive.torque, tuple)
     return parts.TorqueDrive(
-        drive.name, drive.body, 1.0 if table else float(drive.torque),  # type: ignore[arg-type]
-        drive.initial_speed, drive.flywheel_inertia, table, drive.period,
+        drive.name, drive.body, 1.0 if table else drive.torque,  # type: ignore[arg-type]
+        drive.initial_speed, drive.flywheel_inertia, table, drive.period, drive.turns,
     )  # fmt: skip
 
 
 def _load(load: Any) -> parts.Load:
     if isinstance(load, ForceLoad):
-        return parts.Force(load.name, load.place, load.force)
+        if load.force is not None:
+            return parts.Force(load.name, load.place, (load.force.x, load.force.y))
+        table = isinstance(load.size, tuple)
+        size: Any = 1.0 if table else load.size
+        # a quarter turn is one, to the last bit
+        cosine, sine = (
+            np.where(np.abs(part) < 1e-15, 0.0, part)[()]
+            for part in (np.cos(load.direction), np.sin(load.direction))
+        )
+        return parts.Force(load.name, load.place, (size * cosine, size * sine), table)
     if isinstance(load, SpringLoad):
         return parts.Spring(
             load.name, load.first, load.second, load.stiffness, load.length, load.damping
         )
-    return parts.Torque(load.name, load.body, load.torque)
+    table = isinstance(load.torque, tuple)
+    return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table)
+
+
+def curves_of(planar: Planar) -> dict[str, Any]:
+    """Tables of drives and loads, by name."""
+    found = {}
+    for row in (*planar.drives, *planar.loads):
+        curve = (
+            getattr(row, "torque", None) if hasattr(row, "torque") else getattr(row, "size", None)
+        )
+        if isinstance(curve, tuple):
+            found[row.name] = curve
+    return found
 
 
 def slider_crank_mechanism(scene: Scene) -> Mechanism:
     """A scene's slider-crank written out as bodies, joints, drive and loads; a table stands for a factor of 1."""
-    m, effects = scene.mechanism, scene.effects
+    m, effects = scene.slider_crank, scene.effects
     bodies = [
         parts.Body(
             name, link.mass, link.inertia, (link.mass_center, 0.0),

@@ -1,0 +1,151 @@
+"""A linkage as the kernel takes it: where its parameters stand, its texts in these rows, and their values."""
+
+import dataclasses
+from functools import cached_property
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.compiled import module_with
+from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.numbers import row_of, values
+from hpcclear.dynamics.linkage.parts import TorqueDrive
+from hpcclear.dynamics.linkage.poses import Poses
+from hpcclear.dynamics.linkage.trees import Forest, forest
+
+
+class Linkage:
+    """A mechanism's structure: what its texts hold and where. Numbers that are nought in it are nought in every sample.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    gravity : bool
+    friction : bool
+        In the joints with clearance.
+    cartesian : bool
+        Every body by itself, with multipliers and feedback.
+    follow : str
+        A guided body whose acceleration responses tell of; "" for none.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = ""
+    ) -> None:  # fmt: skip
+        self.mechanism = mechanism
+        self.cartesian = cartesian
+        self._on = On(friction=friction, gravity=gravity, follow=follow)
+        self._texts: dict[On, Motion] = {}
+        self._given: dict[str, int] = {}
+        self._free = at.OWN
+        for ledger in (False, True):
+            for series in (False, True):
+                for responses in (False, True):
+                    self._text(self._on._replace(ledger=ledger, series=series, responses=responses))
+        self.poses = Poses(self.forest, self._given, self._free)
+        self._take(self.poses.rows)
+        masses = [
+            f"{body.name}_{part}" for body in mechanism.bodies for part in ("mass", "inertia")
+        ]
+        for name in masses:
+            if name not in self._given:
+                self._take({name: self._free})
+        if self._free > at.PARAMETERS:
+            raise InputError(
+                "mechanism.bodies", len(mechanism.bodies),
+                f"need {self._free - at.OWN} parameters, and there is room for {at.PARAMETERS - at.OWN}",
+                "Take fewer bodies or points",
+            )  # fmt: skip
+
+    def _text(self, on: On) -> Motion:
+        """A text, in the rows that those before it have taken."""
+        if on not in self._texts:
+            rows = Rows(parameters=self._given, free=self._free, curves=self.curve_rows)
+            text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
+            self._texts[on] = text
+            self._take({text.derived.get(name, name): row for name, row in text.parameters.items()})
+        return self._texts[on]
+
+    def _take(self, rows: dict[str, int]) -> None:
+        self._given |= rows
+        self._free = max([self._free, *(row + 1 for row in rows.values())])
+
+    @cached_property
+    def forest(self) -> Forest:
+        """Its trees and coordinates."""
+        return forest(self.mechanism, self.cartesian)
+
+    @property
+    def parameter_rows(self) -> int:
+        """Parameters of a sample."""
+        return self._free
+
+    @cached_property
+    def curve_rows(self) -> dict[str, int]:
+        """Rows of tabulated values at the stage, by drive or load."""
+        tabled = [
+            one.name
+            for one in (*self.mechanism.drives, *self.mechanism.loads)
+            if getattr(one, "table", False)
+        ]
+        if len(tabled) > at.MAX_CURVES:
+            raise InputError(
+                "mechanism.loads", len(tabled), f"more than {at.MAX_CURVES} tabulated curves",
+                "Give some of them as constants",
+            )  # fmt: skip
+        return {name: at.CURVES + k for k, name in enumerate(tabled)}
+
+    def module(self, effects: at.Effects) -> ModuleType:
+        """The module of its motion with these effects."""
+        on = self._on._replace(
+            ledger=bool(effects.ledger), series=bool(effects.series), responses=bool(effects.responses)
+        )  # fmt: skip
+        return module_with(self._text(on), at.JOINTS[: len(self.mechanism.clearances)])
+
+    def fill(
+        self, par: Array, sample: Mechanism, gravity: Any, feedback: tuple[float, float]
+    ) -> None:
+        """Write the rows of its own into parameters (m, PARAMETERS), of a mechanism with numbers (m,) or single ones."""
+        base = values(sample, self.cartesian, gravity=gravity, feedback=feedback)
+        for text in self._texts.values():
+            for row, value in row_of(text, base).items():
+                par[:, row] = value
+        for name, row in self._given.items():
+            if name in base:
+                par[:, row] = base[name]
+
+    def energies(
+        self, par: Array, q: Array, v: Array, time: Array | float, gravity: Array | float
+    ) -> tuple[Array, Array, Array]:
+        """Kinetic and potential energy (m,), J, and eccentricities (joints, 2, m); arguments as of `Poses.at`."""
+        pose, eccentricity = self.poses.at(par, q, v, time)
+        bodies = self.mechanism.bodies
+        mass, inertia = (
+            np.array(
+                [
+                    np.broadcast_to(par.T[self._given[f"{b.name}_{part}"]], q.shape[-1])
+                    for b in bodies
+                ]
+            )
+            for part in ("mass", "inertia")
+        )
+        kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
+        return kinetic, gravity * (mass * pose.y).sum(axis=0), eccentricity
+
+    @property
+    def turning(self) -> bool:
+        """Whether the angle that gives the period is the last coordinate, and goes round."""
+        return isinstance(self.mechanism.period, TorqueDrive)
+
+
+def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+    """A mechanism with other numbers, arrays among them, which its checks are not made for."""
+    made = object.__new__(Mechanism)
+    for field in dataclasses.fields(Mechanism):
+        object.__setattr__(made, field.name, tables.get(field.name, getattr(mechanism, field.name)))
+    return made

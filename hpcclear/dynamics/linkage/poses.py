@@ -1,0 +1,160 @@
+"""Where all bodies of a linkage are, and how fast they move, from the coordinates that are integrated; and the way back."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics.linkage.assembly import Assembly
+from hpcclear.dynamics.linkage.expression import Term, Writer, named
+from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
+from hpcclear.dynamics.linkage.loops import WORDS
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import GROUND, Pair, Slide, split
+from hpcclear.dynamics.linkage.trees import Forest
+
+
+class Pose(NamedTuple):
+    """Positions (m) and velocities (m/s) of mass centres, angles (rad) and angular velocities (rad/s) of bodies."""
+
+    x: Array
+    y: Array
+    angle: Array
+    vx: Array
+    vy: Array
+    spin: Array
+
+
+class Poses:
+    """Poses of all bodies and eccentricities of the joints with clearance, as a text read with arrays.
+
+    Parameters
+    ----------
+    forest : Forest
+    rows : mapping of str to int
+        Rows of parameters that have one; `rows` of this object has those besides.
+    free : int
+        First row that nobody has.
+    """
+
+    def __init__(self, forest: Forest, rows: Mapping[str, int], free: int) -> None:
+        self.forest = forest
+        n = len(forest.coordinates)
+        writer = Writer(rows, free, hoist=False)
+        kin = Kinematics(forest, writer, 0, n, 2 * n)
+        lines: list[str] = []
+        for k, body in enumerate(forest.mechanism.bodies):
+            centre = kin.point(f"{body.name}.{CENTER}")
+            for r, term in enumerate((*kin.position(centre), *kin.velocity(centre))):
+                lines.append(f"out[{6 * k + r}] = {writer.text(term)}")
+            frame = forest.frames[body.name]
+            lines.append(f"out[{6 * k + 4}] = {writer.text(self._angle(kin, frame))}")
+            lines.append(f"out[{6 * k + 5}] = {writer.text(kin.spin(frame))}")
+        first = 6 * len(forest.mechanism.bodies)
+        for k, joint in enumerate(forest.mechanism.clearances):
+            journal, bearing = (kin.position(kin.point(place)) for place in joint.places)
+            for axis in (0, 1):
+                text = writer.text(journal[axis] - bearing[axis])
+                lines.append(f"out[{first + 2 * k + axis}] = {text}")
+        self.size = first + 2 * len(forest.mechanism.clearances)
+        names: dict[str, Any] = dict(WORDS)
+        body_text = "\n    ".join([*writer.lines, *lines, "pass"])
+        exec(f"def poses(work, par, out, i=0, W=1):\n    {body_text}", names)
+        self._evaluate = names["poses"]
+        self.rows = {name: row for name, row in writer.rows.items() if name in writer.read}
+
+    @staticmethod
+    def _angle(kin: Kinematics, frame: str) -> Term:
+        return Term("0") if frame == GROUND else _needed(kin, frame)
+
+    def at(self, par: Array, q: Array, v: Array, time: Array | float) -> tuple[Pose, Array]:
+        """Poses, each (bodies, m), and eccentricities (joints, 2, m).
+
+        Parameters
+        ----------
+        par : ndarray, shape (PARAMETERS,) or (m, PARAMETERS)
+        q, v : ndarray, shape (n, m)
+        time : float or ndarray, shape (m,)
+            s, since the start of the revolution.
+        """
+        n = len(self.forest.coordinates)
+        count = q.shape[-1] if n else np.size(time)
+        work = [*q[:n], *v[:n], np.broadcast_to(time, count)]
+        out = [np.zeros(count)] * self.size
+        self._evaluate(work, par.T, out)
+        rows = np.array([np.broadcast_to(one, count) for one in out])
+        bodies = self.forest.mechanism.bodies
+        x, y, vx, vy, angle, spin = (
+            rows[: 6 * len(bodies)].reshape(len(bodies), 6, count).swapaxes(0, 1)
+        )
+        offsets = np.array([self.forest.offsets[body.name] for body in bodies])
+        eccentricity = rows[6 * len(bodies) :].reshape(-1, 2, count)
+        return Pose(x, y, angle + offsets[:, None], vx, vy, spin), eccentricity
+
+
+def _needed(kin: Kinematics, frame: str) -> Term:
+    """Angle of a frame; of one that a drive prescribes, what it is made from is written down first."""
+    drive = kin.forest.prescribed.get(frame)
+    return named(f"angle_{frame}") if drive is None else kin.driven(drive, frame)[0]
+
+
+def coordinates(forest: Forest, assembly: Assembly) -> tuple[Array, Array]:
+    """Coordinates and velocities (n,) of a forest, of a linkage put together.
+
+    Journals stand where the assembly has them; a coordinate along a guide is read off the poses of both bodies.
+    """
+    q, v = np.zeros((2, len(forest.coordinates)))
+    for k, one in enumerate(forest.coordinates):
+        if one.kind == "slide":
+            q[k], v[k] = _along(forest, assembly, one.body)
+        elif (place := assembly.loops.forest.index(one.kind, one.body)) is not None:
+            q[k], v[k] = assembly.q[place], assembly.v[place]
+    return q, v
+
+
+def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[float, float]:
+    """How far a body has come along its guide, m, and how fast it moves."""
+    hang = forest.hangs[body]
+    assert isinstance(hang.joint, Slide)
+    own, own_speed, _, _ = placed(assembly, hang.own)
+    base, base_speed, _, _ = placed(assembly, hang.parent)
+    _, _, angle, spin = placed(assembly, hang.joint.point)
+    along = complex(math.cos(angle), math.sin(angle))
+    if hang.own != hang.joint.point:
+        along = -along
+    offset, rate = own - base, own_speed - base_speed
+    turned = 1j * along * spin
+    return (
+        (along.conjugate() * offset).real,
+        (along.conjugate() * rate).real + (turned.conjugate() * offset).real,
+    )
+
+
+def placed(assembly: Assembly, place: str) -> tuple[complex, complex, float, float]:
+    """Position and velocity of a place of an assembly, angle and angular velocity of its body."""
+    mechanism: Mechanism = assembly.loops.mechanism
+    name, point = split(place)
+    if name == GROUND:
+        return complex(*mechanism.ground[point]), 0j, 0.0, 0.0
+    body, forest = mechanism.body(name), assembly.loops.forest
+    hang = forest.hangs[name]
+    if hang.joint is not None:  # held on the ground
+        angle = forest.offsets[name]
+        turn = complex(math.cos(angle), math.sin(angle))
+        at_rest = placed(assembly, hang.parent)[0]
+        own = split(hang.own)[1]
+        return at_rest + turn * (_arm(body.points, point) - _arm(body.points, own)), 0j, angle, 0.0
+    x, y, angle_index = (forest.index(kind, name) for kind in ("x", "y", "angle"))
+    q, v = assembly.q, assembly.v
+    angle = 0.0 if angle_index is None else float(q[angle_index])
+    spin = 0.0 if angle_index is None else float(v[angle_index])
+    centre = complex(*body.center)
+    offset = 0j if point == CENTER else _arm(body.points, point) - centre
+    turned = offset * complex(math.cos(angle), math.sin(angle))
+    return complex(q[x], q[y]) + turned, complex(v[x], v[y]) + 1j * spin * turned, angle, spin
+
+
+def _arm(points: Mapping[str, Pair], name: str) -> complex:
+    return complex(*points[name])

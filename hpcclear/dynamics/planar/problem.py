@@ -1,0 +1,222 @@
+"""A scene's linkage as the kernel takes it: its texts and rows, parameters and starts of its samples."""
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble
+from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
+from hpcclear.dynamics.linkage.parts import Harmonic, TorqueDrive, split
+from hpcclear.dynamics.linkage.poses import coordinates
+from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
+from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import Planar, turns_of
+from hpcclear.scene.points import Points
+
+PLACEHOLDER = 1e-3
+"""Stands in the structure for a number that is nought in the scene and varied by its study: what is nought is not in a text."""
+
+NOT_GEOMETRY = ("mass", "inertia", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
+                "torque", "flywheel_inertia", "stiffness", "damping", "size", "direction",
+                "coefficient", "ramp_speed")  # fmt: skip
+"""Entries that no sample's start depends on."""
+
+
+def tables_of(scene: Scene) -> Planar:
+    """The tables of a scene that has a linkage."""
+    assert isinstance(scene.mechanism, Planar)
+    return scene.mechanism
+
+
+@lru_cache(maxsize=16)
+def linkage_of(scene: Scene) -> Linkage:
+    """The structure of a scene's linkage.
+
+    Raises
+    ------
+    InputError
+        If the tables make no mechanism, or its drives no period.
+    """
+    zeros = [path for path in _varied(scene) if scene.number(path) == 0.0]
+    shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
+    mechanism = mechanism_of(tables_of(shown))
+    check_drives(mechanism)
+    return Linkage(
+        mechanism,
+        gravity=scene.effects.gravity > 0.0,
+        friction=scene.effects.friction.law != "none",
+        cartesian=scene.numerics.formulation == "baumgarte",
+    )
+
+
+def check_drives(mechanism: Mechanism) -> None:
+    """InputError where the period is a free body's turn and another drive prescribes an angle by time."""
+    main = mechanism.period
+    if main.prescribed:
+        return
+    for drive in mechanism.drives:
+        if drive.prescribed:
+            raise InputError(
+                f"mechanism.drives.{drive.name}.period", False,
+                f"prescribes an angle by time, while {main.name!r}, whose speed is free, gives the period",
+                "Set period = true here",
+            )  # fmt: skip
+
+
+def _varied(scene: Scene) -> set[str]:
+    if scene.study is None:
+        return set()
+    rows = (*scene.study.variables, *scene.study.random)
+    return {path for row in rows for path in row.paths if path.startswith("mechanism.")}
+
+
+def is_prescribed(scene: Scene) -> bool:
+    """Whether nothing is left to integrate: no clearance, and the drives hold all that moves."""
+    mechanism = linkage_of(scene).mechanism
+    return not mechanism.clearances and freedom(mechanism) == 0
+
+
+def check_columns(scene: Scene, points: Points | None) -> None:
+    """InputError where a column drives a number that is nought in the scene and not of its study."""
+    if points is None:
+        return
+    known = _varied(scene)
+    for name, paths in zip(points.names, points.paths, strict=True):
+        for path in paths:
+            if path.startswith("mechanism.") and path not in known and scene.number(path) == 0.0:
+                raise InputError(
+                    name, 0.0, f"drives {path}, which is nought in this scene: nothing is there to be varied",
+                    "Give it a small value in the scene, or make it a variable of the study",
+                )  # fmt: skip
+
+
+def period_of(mechanism: Any) -> Any:
+    """Length of a revolution, s; of samples, (m,)."""
+    drive = mechanism.period
+    if isinstance(drive, Harmonic):
+        return 1.0 / drive.frequency
+    speed = drive.initial_speed if isinstance(drive, TorqueDrive) else drive.speed
+    return at.TURN * drive.turns / np.abs(speed)
+
+
+def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
+    """Kernel parameters of each sample but for those of the joints, shape (samples, PARAMETERS)."""
+    check_columns(scene, points)
+    linkage = linkage_of(scene)
+    sample = linkage.mechanism
+    if points is not None or _varied(scene):
+        sample = with_columns(
+            tables_of(scene), sample, Points((), np.empty((1, 0)), ()) if points is None else points
+        )
+    p = np.ones((get.size, linkage.parameter_rows))
+    p[:, at.JOINT_BLOCKS : at.OWN] = 0.0
+    period = period_of(sample)
+    p[:, at.PERIOD] = period
+    p[:, at.SPEED] = at.TURN * turns_of(tables_of(scene)) / period
+    p[:, at.FIRST_STEP] = 1e-3 * period / turns_of(tables_of(scene))
+    p[:, at.CRANK_LENGTH] = driven_length(linkage.mechanism)
+    n = scene.numerics
+    linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
+    for k, joint in enumerate(sample.clearances):
+        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        p[:, block + at.CONTACT_STIFFNESS] = joint.stiffness
+    return p
+
+
+def driven_length(mechanism: Mechanism) -> float:
+    """The largest distance between points of the body that gives the period, m: how fast the mechanism is goes by it."""
+    body = mechanism.body(mechanism.period.body)
+    places = [*body.points.values(), body.center]
+    return max((math.dist(a, b) for a in places for b in places), default=0.0) or 1.0
+
+
+def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
+    """Absolute tolerances of coordinates, then velocities, as `problem.absolute_tolerances` has them."""
+    linkage = linkage_of(scene)
+    a = scene.numerics.absolute_tolerance
+    angles = [one.kind == "angle" for one in linkage.forest.coordinates]
+    speed = at.TURN / float(period_of(linkage.mechanism)) * driven_length(linkage.mechanism)
+    rate = 1e3 * min(1.0, speed / 25.0)
+    return (
+        *(10.0 * a if angle else a for angle in angles),
+        *((50.0 if angle else 1.0) * rate * a for angle in angles),
+    )
+
+
+def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
+    """Start of each sample: put together with journals at their `start_eccentricity`, velocities of ideal joints.
+
+    Raises
+    ------
+    InputError
+        If a sample does not close.
+    """
+    linkage = linkage_of(scene)
+    forest = linkage.forest
+    n = len(forest.coordinates)
+    start = Start.at_rest(len(par))
+    if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
+        shared = put_together(mechanism_of(tables_of(scene)))
+        start.coordinates(n)[:], start.velocities(n)[:] = coordinates(forest, shared)
+    else:
+        for row in range(len(par)):
+            one = scene_of(scene, points, row)
+            made = put_together(mechanism_of(tables_of(one)))
+            start.coordinates(n)[row], start.velocities(n)[row] = coordinates(forest, made)
+    _start_contacts(scene, linkage, par, start)
+    return start
+
+
+def _moves_start(path: str) -> bool:
+    entry = path.split(".")[-1]
+    return path.startswith("mechanism.") and entry not in NOT_GEOMETRY
+
+
+def scene_of(scene: Scene, points: Points, row: int) -> Scene:
+    """The scene of one sample."""
+    changes = {
+        path: float(points.values[row, k]) for k, paths in enumerate(points.paths) for path in paths
+    }
+    return scene.with_(changes)
+
+
+def put_together(mechanism: Mechanism) -> Assembly:
+    """`assemble`, its errors below ``mechanism``."""
+    try:
+        return assemble(mechanism)
+    except InputError as error:
+        raise InputError(
+            f"mechanism.{error.key}", error.value, error.reason, error.remedy
+        ) from None
+
+
+def _start_contacts(scene: Scene, linkage: Linkage, par: Array, start: Start) -> None:
+    """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
+    law = scene.effects.contact
+    if law is None or not law.latched:
+        return
+    for k, joint in enumerate(linkage.mechanism.clearances):
+        table = next(row for row in tables_of(scene).joints if row.name == joint.name)
+        offset = table.start_eccentricity  # type: ignore[union-attr]
+        touching = np.hypot(offset.x, offset.y) >= Parameters(par).clearance[:, k]
+        start.active[:, k] = touching
+        start.inverse_impact[:, k] = touching / law.minimum_impact_speed
+
+
+def bodies_named(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of the bodies, in file order."""
+    return tuple(body.name for body in mechanism.bodies)
+
+
+def followed(mechanism: Mechanism) -> list[str]:
+    """Places worth following: points of bodies that no joint or load names."""
+    taken = {place for joint in mechanism.joints for place in joint.places}
+    every = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    return [place for place in every if place not in taken and split(place)[1] not in ("a", "b")]

@@ -1,0 +1,114 @@
+"""Time series of a linkage: drive, bodies, points, joints and energies, from the coordinates that were integrated."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.poses import Pose
+from hpcclear.dynamics.planar.problem import linkage_of, tables_of
+from hpcclear.dynamics.views import Parameters, Rates
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
+
+
+class Seen(NamedTuple):
+    """States at the instants of a response: coordinates and velocities (t, n), time in the revolution, its number, contacts
+    (t, 2 MAX_JOINTS), rates, works (t, 4)."""
+
+    q: Array
+    v: Array
+    turn_time: Array
+    revolution: Array
+    contacts: Array
+    rates: Rates
+    works: Array
+
+
+def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
+    """Every time series of the response; names as in the response dataset."""
+    linkage = linkage_of(scene)
+    mechanism = linkage.mechanism
+    pose, eccentricity = linkage.poses.at(par, seen.q.T, seen.v.T, seen.turn_time)
+    gravity = scene.effects.gravity
+    kinetic, potential, _ = linkage.energies(par, seen.q.T, seen.v.T, seen.turn_time, gravity)
+    count = len(mechanism.clearances)
+    active = contacts_on(scene, seen.contacts, count)
+    gaps = seen.rates.gap[:, :count]
+    elastic = elastic_energy(Parameters(par).stiffness[:count], gaps, active)
+    driving, _, dissipated, load = seen.works.T
+    total = kinetic + elastic + potential
+    angle, speed = _turned(scene, linkage, par, seen)
+    return {
+        "crank_angle": angle,
+        "crank_speed": speed,
+        **_bodies(scene, mechanism, pose),
+        "eccentricity_x": eccentricity[:, 0].T,
+        "eccentricity_y": eccentricity[:, 1].T,
+        "penetration": np.maximum(gaps, 0.0) * active,
+        "contact_force": seen.rates.force[:, :count],
+        "friction_force": seen.rates.friction[:, :count],
+        "crank_moment": seen.rates.drive_moment,
+        "kinetic_energy": kinetic,
+        "elastic_energy": elastic,
+        "potential_energy": potential,
+        "driving_work": driving,
+        "load_work": load,
+        "dissipated_energy": dissipated,
+        "energy_residual": total - total[0] - driving - load + dissipated,
+    }
+
+
+def contacts_on(scene: Scene, contacts: Array, count: int) -> Array:
+    """Whether a penetration of each joint counts, (t, joints): under latched laws only while in contact."""
+    latched = scene.effects.contact is not None and scene.effects.contact.latched
+    return contacts[:, :count] if latched else np.ones((len(contacts), count))
+
+
+def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
+    """Energy stored in the contacts, J, (t,)."""
+    stored: Array = (0.4 * stiffness * active * np.maximum(gaps, 0.0) ** 2.5).sum(axis=-1)
+    return stored
+
+
+def _turned(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> tuple[Array, Array]:
+    """Angle that the drive of the period has come to since the start, and its speed, rad and rad/s."""
+    named = Parameters(par)
+    cycle = at.TURN * turns_of(tables_of(scene))
+    if linkage.turning:
+        return seen.q[:, -1] + cycle * seen.revolution, seen.v[:, -1]
+    angle = cycle * (seen.revolution + seen.turn_time / named.period)
+    return angle, np.full(len(angle), named.speed)
+
+
+def _bodies(scene: Scene, mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
+    """Mass centres and angles of the bodies (t, body), and all their points (t, point)."""
+    found: dict[str, Any] = {
+        "body_x": pose.x.T,
+        "body_y": pose.y.T,
+        "body_angle": pose.angle.T,
+        "body_vx": pose.vx.T,
+        "body_vy": pose.vy.T,
+        "body_spin": pose.spin.T,
+    }
+    arms = []
+    for k, body in enumerate(mechanism.bodies):
+        cosine, sine = np.cos(pose.angle[k]), np.sin(pose.angle[k])
+        for x, y in body.points.values():
+            dx, dy = x - body.center[0], y - body.center[1]
+            arms.append((pose.x[k] + cosine * dx - sine * dy, pose.y[k] + sine * dx + cosine * dy))
+    found["point_x"], found["point_y"] = (np.array(part).T for part in zip(*arms, strict=True))
+    return found
+
+
+def labels(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Labels along the dimensions ``body`` and ``point``."""
+    return {
+        "body": tuple(body.name for body in mechanism.bodies),
+        "point": tuple(
+            f"{body.name}.{point}" for body in mechanism.bodies for point in body.points
+        ),
+    }
