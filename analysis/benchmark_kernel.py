@@ -100,7 +100,7 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
         work = np.zeros((at.BANK, width))
         work[at.WORK :] = np.repeat(setup.par[:1].T, width, 1)
         work[at.QS : at.QS + 4], work[at.VS : at.VS + 4] = q[:, None], v[:, None]
-        work[[at.ACTIVE_12, at.ACTIVE_23, at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23]] = 1.0
+        work[[at.ACTIVE, at.ACTIVE + 1, at.INVERSE_IMPACT, at.INVERSE_IMPACT + 1]] = 1.0
         motion = motion_of(setup.problem.effects, width).address
         arguments = (motion, work.ravel(), setup.problem.tables)
         repeat(*arguments, 1)

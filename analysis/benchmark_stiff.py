@@ -90,11 +90,11 @@ def impacts(given: Setup, row: int) -> list[tuple[float, Array]]:
     inverse = given.start[row].inverse_impact.copy()
     pieces = [(0.0, inverse)]
     for after in rows[1:]:
-        new = (after[rec.ACTIVE_12 : rec.ACTIVE_23 + 1] == 1.0) & (
-            after[rec.INVERSE_12 : rec.INVERSE_23 + 1] != pieces[-1][1]
+        new = (after[rec.CONTACTS : rec.CONTACTS + 2] == 1.0) & (
+            after[rec.CONTACTS + rec.JOINTS : rec.CONTACTS + rec.JOINTS + 2] != pieces[-1][1]
         )
         if new.any() and after[rec.REVOLUTION] == 0.0:
-            inverse = np.where(new, after[rec.INVERSE_12 : rec.INVERSE_23 + 1], pieces[-1][1])
+            inverse = np.where(new, after[rec.CONTACTS + rec.JOINTS : rec.CONTACTS + rec.JOINTS + 2], pieces[-1][1])
             pieces.append((float(after[rec.TURN_TIME]), inverse))
     return pieces
 

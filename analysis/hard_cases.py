@@ -89,7 +89,7 @@ def balance(
         par,
         rows[:, rec.STATE : rec.STATE + n].T,
         rows[:, rec.STATE + n : rec.STATE + 2 * n].T,
-        rows[:, [rec.ACTIVE_12, rec.ACTIVE_23]],
+        rows[:, rec.CONTACTS : rec.CONTACTS + 2],
         rows[:, rec.TURN_TIME],
     )
     works = rows[:, rec.DRIVE_WORK] + rows[:, rec.LOAD_WORK] - rows[:, rec.DISSIPATED]
@@ -112,7 +112,7 @@ def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     lanes.queue(par, start, np.zeros(1, np.int64))
     row = np.zeros((1, rec.columns(n)))
     row[:, rec.STATE : rec.STATE + 2 * n] = start.state(n)
-    row[:, rec.ACTIVE_12 : rec.ACTIVE_23 + 1] = start.active
+    row[:, rec.CONTACTS : rec.CONTACTS + rec.JOINTS] = start.active
     return lanes, par, row
 
 

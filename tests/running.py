@@ -82,7 +82,7 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
     s = rec.STATE
     return Run(
         lanes.collect()[1][0], par[0], start[0].state(n), rows[:, rec.TIME], rows[:, s : s + n],
-        rows[:, s + n : s + 2 * n], rows[:, [rec.ACTIVE_12, rec.ACTIVE_23]],
+        rows[:, s + n : s + 2 * n], rows[:, rec.CONTACTS : rec.CONTACTS + 2],
     )  # fmt: skip
 
 

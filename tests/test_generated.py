@@ -147,8 +147,8 @@ def slider_crank_lanes(effects, coordinates, rng, W):
     work = np.zeros((at.WORK, W))
     work[at.STAGE_TIME] = rng.uniform(0, 0.01, W)
     work[[at.TORQUE_VALUE, at.LOAD_VALUE]] = rng.normal(size=(2, W))
-    work[[at.ACTIVE_12, at.ACTIVE_23]] = rng.integers(0, 2, (2, W))
-    work[[at.INVERSE_IMPACT_12, at.INVERSE_IMPACT_23]] = rng.uniform(0.3, 3, (2, W))
+    work[[at.ACTIVE, at.ACTIVE + 1]] = rng.integers(0, 2, (2, W))
+    work[[at.INVERSE_IMPACT, at.INVERSE_IMPACT + 1]] = rng.uniform(0.3, 3, (2, W))
     phi = rng.uniform(0, 6, W) if effects.torque else par[at.SPEED] * work[at.STAGE_TIME]
     e12, e23 = 4e-4 * rng.normal(size=(2, 2, W))
     pin = CRANK * np.array([np.cos(phi), np.sin(phi)]) - (e12 if effects.crank_rod else 0.0)

@@ -69,7 +69,7 @@ def test_columns_are_the_derivatives(name: str):
 
     def accelerations(states: np.ndarray) -> np.ndarray:
         out = np.zeros((len(states), n + at.RATES))
-        contacts = rows[at.ACTIVE_12 : at.INVERSE_IMPACT_23 + 1, mem.MIDDLE]
+        contacts = rows[at.ACTIVE : at.ACTIVE + 2 * at.MAX_JOINTS, mem.MIDDLE]
         observe(
             motion, rows[mem.PAR : mem.SECOND, 0].copy(), tables, states,
             np.tile(contacts, (len(states), 1)),

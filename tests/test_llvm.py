@@ -61,7 +61,7 @@ MARKERS = {
         {par(at.JOINT_23 + at.CLEARANCE), par(at.JOINT_23 + at.CONTACT_STIFFNESS)},
     ),
     "fixed": (set(), {par(at.JOINT_12 + at.DAMPING)}),
-    "latched": (set(), {work(at.INVERSE_IMPACT_12), work(at.ACTIVE_23)}),
+    "latched": (set(), {work(at.INVERSE_IMPACT), work(at.ACTIVE + 1)}),
     "coulomb": (set(), {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)}),
     "ambrosio": (set(), {par(at.JOINT_12 + at.DEAD_SPEED), par(at.JOINT_23 + at.DEAD_SPEED)}),
     "torque": (set(), {par(at.TORQUE), par(at.CRANK_INERTIA)}),
@@ -72,7 +72,7 @@ MARKERS = {
     "guide": (set(), {par(at.GUIDE_COEFFICIENT), par(at.GUIDE_INVERSE_RAMP)}),
     "baumgarte": (set(), {par(at.BAUMGARTE_ALPHA2), par(at.BAUMGARTE_BETA2)}),
     "ledger": (set(), {work(at.RATE_NOW + at.DRIVE_POWER), work(at.RATE_NOW + at.DISSIPATION)}),
-    "series": (set(), {work(at.RATE_NOW + at.FRICTION_12), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
+    "series": (set(), {work(at.RATE_NOW + at.FRICTIONS), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
     "responses": (
         set(),
         {work(at.RATE_NOW + at.SLIDER_SQUARE), work(at.RATE_NOW + at.DRIVE_MOMENT)},

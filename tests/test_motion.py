@@ -183,8 +183,8 @@ def scale_of(reference):
 def check_rates(effects, mech, rates, v):
     """Gaps, forces and powers of the kernel against the dense model's."""
     for name, flag, gap, friction in (
-        ("o12", "crank_rod", at.GAP_12, at.FRICTION_12),
-        ("o23", "rod_slider", at.GAP_23, at.FRICTION_23),
+        ("o12", "crank_rod", at.GAP_12, at.FRICTIONS),
+        ("o23", "rod_slider", at.GAP_23, at.FRICTIONS + 1),
     ):
         if flag in effects:
             seen = mech.seen[name]

@@ -71,7 +71,7 @@ def plain(flag, gaps, x, n):
 
 
 @pytest.mark.parametrize("flag", [None, 1])
-@pytest.mark.parametrize("gaps", [at.Effects(), at.Effects(rod_slider=1)])
+@pytest.mark.parametrize("gaps", [at.Open(), at.Open(joint_1=1)])
 def test_the_text_does_what_the_calls_do(flag, gaps):
     x = np.random.default_rng(3).normal(size=6)
     text = njit(one_text(everything, "everything", flag=flag, gaps=gaps, n=5))

@@ -24,6 +24,7 @@ from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
 W = 4
+NONE_OPEN = at.Stepped(at.Open(), at.rules_of(at.Effects()), np.zeros(0, np.int64))
 
 
 @pytest.mark.parametrize("n", [4, 7, 8])
@@ -46,7 +47,7 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int):
     )
     work[at.STEP] = 1e-2
     before = work.copy()
-    both(at.Effects(), work.ravel(), stages.ravel(), par.ravel(), pair.packed(), atol.ravel())
+    both(NONE_OPEN, work.ravel(), stages.ravel(), par.ravel(), pair.packed(), atol.ravel())
     h = before[at.STEP]
     q, v, a = (before[row : row + n] for row in (at.Q, at.V, at.ACC))
     stages[s - 1] = a  # the latest, put away on the way
@@ -73,10 +74,10 @@ def test_groups_are_short():
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match="9 coordinates, not 10"):
-        make_stepper(4, 10, (1, 1))
+    with pytest.raises(ValueError, match="24 coordinates, not 25"):
+        make_stepper(4, 25, at.Open(1, 1))
     with pytest.raises(ValueError, match="5 coordinates, not 6"):
-        make_collocation_stepper(6, (1, 1))
+        make_collocation_stepper(6, at.Open(1, 1))
     problem = problem_of(scene_with())
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])
@@ -86,7 +87,7 @@ def test_what_does_not_fit_is_refused():
     three = np.eye(3)
     with pytest.raises(ValueError, match="pairs of 7 stages"):
         tab.Tableau("short", 2, 1, three, three[0], three[0], "none")
-    with pytest.raises(ValueError, match="a row of Start holds 22 numbers, not 21"):
+    with pytest.raises(ValueError, match="a row of Start holds 64 numbers, not 21"):
         Start(np.zeros((3, 21)))
 
 
@@ -117,11 +118,13 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS)
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
-    assert list(at.measures_of(at.Effects(responses=1))) == [
-        at.FORCE_12, at.FORCE_23, at.SLIDER_ACCELERATION, at.SLIDER_SQUARE
-    ]  # fmt: skip
+    responses = at.Effects(crank_rod=1, rod_slider=1, responses=1)
+    followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE]
+    assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
+    assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
+    assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [1, 4, 7]
     assert len(at.measures_of(at.Effects(crank_rod=1, latched=1))) == 0
 
 
@@ -150,8 +153,9 @@ def test_no_stepper_names_a_rate_of_its_own():
     names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
     rows = {one.rate for one in at.MEASURES}
     powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
-    own = powers | {"SLIDER_ACCELERATION", "SLIDER_SQUARE", "FORCE_12", "FORCE_23"}
-    assert {getattr(at, name) for name in own} == rows
+    own = powers | {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FORCE_12", "FORCE_23"}
+    forces = {joint.force for joint in at.JOINTS}
+    assert {getattr(at, name) for name in own} | forces == rows
     room = Path(hpcclear.dynamics.__file__).parent
     for folder in ("explicit", "implicit", "collocation"):
         for path in (room / folder).glob("*.py"):
@@ -180,7 +184,7 @@ def _sum(x, flags):
 
 
 def test_a_loop_written_out_does_what_the_loop_does():
-    flags = at.Effects(rod_slider=1)
+    flags = at.Open(joint_1=1)
     written = unrolled(_sum)
     assert written(5, flags) == _sum(5, flags)
     names = written.__code__.co_varnames

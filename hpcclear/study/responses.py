@@ -46,7 +46,7 @@ def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
         changes |= dict.fromkeys(run.study.variable(name).paths, value)
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
-            changes[f"joints.{joint}.clearance"] = settings.response_clearance
+            changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance
     return run.scene.with_(changes)
 
 
@@ -103,13 +103,9 @@ def _steady(scene: Scene, response: xr.Dataset, name: str) -> xr.Dataset:
 
 def _statistics(response: xr.Dataset, windows: int) -> Array:
     """Statistics of each stretch of a response, (windows, statistics, quantities)."""
-    series = np.column_stack(
-        [
-            response["contact_force"].to_numpy(),
-            response["crank_moment"].to_numpy(),
-            response["slider_acceleration"].to_numpy(),
-        ]
-    )
+    # a linkage may have other joints, and no slider
+    told = ("contact_force", "crank_moment", "slider_acceleration")
+    series = np.column_stack([response[name].to_numpy() for name in told if name in response])
     parts = np.array_split(series, windows)
     return np.array(
         [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]

@@ -36,8 +36,8 @@ class MadeUp:
         records["sample"] = index
         records["objective"] = points[:, 0] + 10.0 * points[:, -1]
         records["objective_spread"] = np.nan
-        records["mean_gap"] = points[:, :2]
-        records["peak_contact_force"] = 1e3 * points[:, 1:3]
+        records["mean_gap"][:, :2] = points[:, :2]
+        records["peak_contact_force"][:, :2] = 1e3 * points[:, 1:3]
         records["rhs_evaluations"] = 1000.0 + 1e3 * points[:, 0]
         broken = points[:, 0] > 0.4
         records["status"][broken] = Status.NOT_FINITE

@@ -12,13 +12,6 @@ from hpcclear.report.figures import labels, motion, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_QUANTITIES = (
-    ("contact_force", "crank_rod", "contact force 1\n(O12)"),
-    ("contact_force", "rod_slider", "contact force 2\n(O23)"),
-    ("crank_moment", "", "crank moment\n"),
-    ("slider_acceleration", "", "slider acceleration\n"),
-)
-
 
 @style.drawn
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
@@ -156,12 +149,13 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
             "responses", {}, "there is nothing to draw", "Give the response of each design"
         )
     columns = _columns(list(responses))
-    height = 24.0 + 33.0 * len(_QUANTITIES)
-    figure, axes = style.grid(len(_QUANTITIES), len(columns), height, sharex=True, sharey="row")
+    quantities = motion.quantities(next(iter(responses.values())))
+    height = 24.0 + 33.0 * len(quantities)
+    figure, axes = style.grid(len(quantities), len(columns), height, sharex=True, sharey="row")
     shown = {name: motion.latest(response, revolutions) for name, response in responses.items()}
     order = sorted(responses, key=lambda name: ("alpha" in name or "beta" in name, name))
     kinds = list(dict.fromkeys(_kind(name) for name in order))
-    for line, (name, joint, words) in zip(axes, _QUANTITIES, strict=True):
+    for line, (name, joint, words) in zip(axes, quantities, strict=True):
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
         unit = labels.scale(
             str(next(iter(series.values())).attrs["units"]),
@@ -177,7 +171,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
                     "label": _kind(design),
                 }
                 panel.plot(turn - turn[0], series[design].to_numpy() * unit.factor, **options)
-        line[0].set_ylabel(unit.label(words))
+        line[0].set_ylabel(unit.label(words.replace(" (", "\n(") if joint else f"{words}\n"))
     for panel, title in zip(axes[0], columns, strict=True):
         panel.set_title(title)
     for panel in axes[-1]:

@@ -5,6 +5,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.report.figures.style import JOINT_NAMES
 
 TURN = 2.0 * np.pi
 
@@ -64,8 +65,36 @@ def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
     return response.isel(time=np.flatnonzero(inside))
 
 
+def joints(response: xr.Dataset) -> dict[str, str]:
+    """What the joints of a response are called in figures, by label: O12 and O23 of a slider-crank."""
+    labels = [str(label) for label in response["joint"].to_numpy()]
+    return {label: JOINT_NAMES.get(label, label) for label in labels}
+
+
+def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
+    """What responses are compared by: variable, joint or "", words."""
+    named = enumerate(joints(response).items(), 1)
+    found = [("contact_force", label, f"contact force {k} ({name})") for k, (label, name) in named]
+    found.append(("crank_moment", "", "crank moment"))
+    if "slider_acceleration" in response:
+        found.append(("slider_acceleration", "", "slider acceleration"))
+    return found
+
+
+def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    """Where the output stands and how fast it moves: the slider, or angle and speed of a linkage's last body."""
+    if "slider_position" in response:
+        return response["slider_position"], response["slider_velocity"]
+    angle, spin = response["body_angle"].isel(body=-1), response["body_spin"].isel(body=-1)
+    name = str(angle["body"].item())
+    return (
+        angle.assign_attrs(long_name=f"angle of {name}"),
+        spin.assign_attrs(long_name=f"speed of {name}"),
+    )
+
+
 def clearances(response: xr.Dataset) -> Array:
-    """Radial clearance of each joint, m, shape (2,); NaN where there is none, or where it was never reached.
+    """Radial clearance of each joint, m, shape (joints,); NaN where there is none, or where it was never reached.
 
     Penetration is |e| - c, so contact tells the clearance.
     """
@@ -101,13 +130,13 @@ def objective_by_turn(response: xr.Dataset) -> Array:
     return np.sqrt(squares)
 
 
-def section(response: xr.Dataset, name: str, phase: float = 0.0) -> Array:
-    """A variable once a revolution, at the crank angle `phase` (rad): shape (revolutions,) or (revolutions, 2)."""
+def section(response: xr.Dataset, name: str | xr.DataArray, phase: float = 0.0) -> Array:
+    """A variable, by name or itself, once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
     angle = response["crank_angle"].to_numpy()
     first = np.ceil((angle[0] - phase) / TURN - 1e-6)
     last = np.floor((angle[-1] - phase) / TURN + 1e-6)
     at = phase + TURN * np.arange(first, last + 1)
-    values = response[name].to_numpy()
+    values = (response[name] if isinstance(name, str) else name).to_numpy()
     columns = values.reshape(len(angle), -1).T
     return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
         len(at), *values.shape[1:]

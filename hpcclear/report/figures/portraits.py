@@ -28,17 +28,18 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
         The last ones are drawn; half of all by default.
     """
     shown = motion.steady(response, revolutions)
-    figure, axes = style.grid(2, 1, 170.0)
+    joints = motion.joints(shown)
+    figure, axes = style.grid(len(joints), 1, 85.0 * len(joints))
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = motion.clearances(shown) * unit.factor
-    for row, (joint, panel) in enumerate(zip(style.JOINT_NAMES, axes[:, 0], strict=True)):
+    for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() * unit.factor for c in "xy")
         contact = shown["penetration"].sel(joint=joint).to_numpy() > 0.0
         panel.plot(x, y, color=_FLIGHT, lw=0.7, label="free flight")
         panel.plot(*_only(x, y, contact), color=_CONTACT, lw=0.7, label="contact")
         _circle(panel, clearances[row])
         _arcs(panel, clearances[row], x, y, contact)
-        panel.set_title(f"{style.JOINT_NAMES[joint]}: in contact {contact.mean():.0%} of the time")
+        panel.set_title(f"{joints[joint]}: in contact {contact.mean():.0%} of the time")
         _equal(panel, unit)
     handles, words = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, words, loc="outside lower center", ncols=2)
@@ -50,10 +51,13 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
     """Contact force over its direction in the fixed frame; parameters as for `orbit_figure`."""
     shown = motion.steady(response, revolutions)
-    figure, axes = style.grid(2, 1, 165.0, subplot_kw={"projection": "polar"})
+    joints = motion.joints(shown)
+    figure, axes = style.grid(
+        len(joints), 1, 82.5 * len(joints), subplot_kw={"projection": "polar"}
+    )
     force = labels.of(shown["contact_force"])
     turn = motion.turns(shown)
-    for joint, panel in zip(style.JOINT_NAMES, axes[:, 0], strict=True):
+    for joint, panel in zip(joints, axes[:, 0], strict=True):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() for c in "xy")
         radius = shown["contact_force"].sel(joint=joint).to_numpy() * force.factor
         contact = radius > 0.0
@@ -62,7 +66,7 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
         drawn = panel.scatter(
             np.arctan2(y, x)[contact], radius[contact], c=colour, s=3.0, **options
         )
-        panel.set_title(style.JOINT_NAMES[joint])
+        panel.set_title(joints[joint])
         panel.set_rlabel_position(112.5)
         panel.set_ylabel(force.label("contact force"), labelpad=22.0)
         panel.set_xlabel("direction of the force on the bearing (°)")
@@ -77,27 +81,30 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
 
 @style.drawn
 def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
-    """Phase portraits of the slider: velocity over position, acceleration over velocity.
+    """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
-    Parameters as for `orbit_figure`.
+    Of a linkage, speed of its last body over its angle. Parameters as for `orbit_figure`.
     """
     from matplotlib.collections import LineCollection
 
     shown = motion.steady(response, revolutions)
-    figure, axes = style.grid(2, 1, 125.0)
-    pairs = (("slider_position", "slider_velocity"), ("slider_velocity", "slider_acceleration"))
+    position, velocity = motion.followed(shown)
+    pairs = [(position, velocity)]
+    if "slider_acceleration" in shown:
+        pairs.append((velocity, shown["slider_acceleration"]))
+    figure, axes = style.grid(len(pairs), 1, 62.5 * len(pairs))
     turn = motion.turns(shown)
-    for panel, names in zip(axes[:, 0], pairs, strict=True):
-        x, y = (labels.of(shown[name]) for name in names)
+    for panel, both in zip(axes[:, 0], pairs, strict=True):
+        x, y = (labels.of(one) for one in both)
         points = np.column_stack(
-            [shown[n].to_numpy() * u.factor for n, u in zip(names, (x, y), strict=True)]
+            [one.to_numpy() * unit.factor for one, unit in zip(both, (x, y), strict=True)]
         )
         parts = np.stack([points[:-1], points[1:]], axis=1)
         line = LineCollection(list(parts), array=turn[1:], cmap=style.COLOURS, linewidths=0.6)
         panel.add_collection(line)
         panel.autoscale_view()
-        panel.set_xlabel(x.label(labels.words(shown[names[0]])))
-        panel.set_ylabel(y.label(labels.words(shown[names[1]])))
+        panel.set_xlabel(x.label(labels.words(both[0])))
+        panel.set_ylabel(y.label(labels.words(both[1])))
     bar = figure.colorbar(line, ax=axes[:, 0].tolist(), location="bottom", aspect=50, pad=0.02)
     bar.set_label("crank angle (revolutions)")
     style.settle([*axes[:, 0], bar.ax])
@@ -108,7 +115,7 @@ def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 def poincare_figure(
     response: xr.Dataset, phase: float = 0.0, revolutions: int | None = None
 ) -> "Figure":
-    """Poincaré section: slider and journal centres once a revolution, at one crank angle.
+    """Poincaré section: output (slider, or a linkage's last body) and journal centres once a revolution, at one crank angle.
 
     A periodic motion is one point, a motion of period n is n points, anything else a cloud; the more revolutions
     the response has, the more it says.
@@ -124,11 +131,15 @@ def poincare_figure(
     """
     shown = motion.steady(response, revolutions)
     figure = style.page(118.0)
-    cells = figure.add_gridspec(2, 2, height_ratios=[1.1, 1.0])
+    joints = list(motion.joints(shown).values())
+    cells = figure.add_gridspec(2, max(len(joints), 1), height_ratios=[1.1, 1.0])
     top = figure.add_subplot(cells[0, :])
-    x, y = labels.of(shown["slider_position"]), labels.of(shown["slider_velocity"])
-    position = motion.section(shown, "slider_position", phase) * x.factor
-    velocity = motion.section(shown, "slider_velocity", phase) * y.factor
+    output = motion.followed(shown)
+    x, y = (labels.of(one) for one in output)
+    position, velocity = (
+        motion.section(shown, one, phase) * unit.factor
+        for one, unit in zip(output, (x, y), strict=True)
+    )
     order = np.arange(1, len(position) + 1)
     options: dict[str, Any] = {
         "c": order,
@@ -138,21 +149,22 @@ def poincare_figure(
         "zorder": 3,
     }
     drawn = top.scatter(position, velocity, **options)
-    top.set_xlabel(x.label("slider position"))
-    top.set_ylabel(y.label("slider velocity"))
+    top.set_xlabel(x.label(labels.words(output[0])))
+    top.set_ylabel(y.label(labels.words(output[1])))
     top.set_title(f"{len(order)} crossings of crank angle {np.degrees(phase):g}°")
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = motion.clearances(shown) * unit.factor
     across, up = (motion.section(shown, f"eccentricity_{c}", phase) * unit.factor for c in "xy")
-    panels = [figure.add_subplot(cells[1, joint]) for joint in range(2)]
+    panels = [figure.add_subplot(cells[1, joint]) for joint in range(len(joints))]
     reach = 1.08 * np.nanmax([*clearances, *np.abs(np.ravel([across, up]))])
     for joint, panel in enumerate(panels):
         panel.scatter(across[:, joint], up[:, joint], **options)
         _circle(panel, clearances[joint])
-        panel.set_title(list(style.JOINT_NAMES.values())[joint])
+        panel.set_title(joints[joint])
         _equal(panel, unit, reach)
         panel.tick_params(labelleft=joint == 0)
-    panels[1].set_ylabel("")
+    for panel in panels[1:]:
+        panel.set_ylabel("")
     top.ticklabel_format(useOffset=False)
     bar = figure.colorbar(drawn, ax=[top, *panels], location="bottom", aspect=50, pad=0.02)
     bar.set_label("crossing (number)")

@@ -1,7 +1,7 @@
 """Figures of responses (kind ``response``) over the crank angle, frequency and clearance, and of their energies."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -13,22 +13,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_JOINT_STYLES = (("crank_rod", "#0072b2", "-"), ("rod_slider", "#d55e00", "-"))
-
 
 def _joints(axes: "Axes", response: xr.Dataset, name: str, unit: labels.Scale) -> None:
     """One curve for each joint against the revolution of the crank."""
-    for row, (joint, colour, dashes) in enumerate(_JOINT_STYLES):
+    for row, (joint, label) in enumerate(motion.joints(response).items()):
         values = response[name].sel(joint=joint).to_numpy() * unit.factor
-        label = style.JOINT_NAMES[joint]
-        axes.plot(
-            motion.turns(response), values, dashes, color=colour, lw=0.8 - 0.2 * row, label=label
-        )
+        axes.plot(motion.turns(response), values, label=label, **_curve(row))
+
+
+def _curve(row: int) -> dict[str, Any]:
+    """Style of a joint's curve; later ones are thinner, since they lie on top."""
+    return {"color": style.CYCLE[row % 7], "lw": max(0.8 - 0.2 * row, 0.4)}
 
 
 @style.drawn
 def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
-    """Slider motion, contact forces and crank moment over the last revolutions.
+    """Slider motion, where there is a slider, contact forces and crank moment over the last revolutions.
 
     Parameters
     ----------
@@ -38,22 +38,17 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
         How many; fewer if the response has fewer.
     """
     shown = motion.latest(response, revolutions)
-    names = (
+    every = (
         "slider_position",
         "slider_velocity",
         "slider_acceleration",
         "contact_force",
         "crank_moment",
     )
-    words = (
-        "slider\nposition",
-        "slider\nvelocity",
-        "slider\nacceleration",
-        "contact\nforce",
-        "crank\nmoment",
-    )
-    figure, axes = style.grid(len(names), 1, 140.0, sharex=True)
-    for panel, name, word in zip(axes[:, 0], names, words, strict=True):
+    names = [name for name in every if name in shown]
+    figure, axes = style.grid(len(names), 1, 28.0 * len(names), sharex=True)
+    for panel, name in zip(axes[:, 0], names, strict=True):
+        word = name.replace("_", "\n")
         unit = labels.of(shown[name])
         if "joint" in shown[name].dims:
             _joints(panel, shown, name, unit)
@@ -74,16 +69,18 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 
 @style.drawn
 def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
-    """Penetration of both joints over the last revolutions; parameters as for `response_figure`."""
+    """Penetration of the joints over the last revolutions; parameters as for `response_figure`."""
     shown = motion.latest(response, revolutions)
-    figure, axes = style.grid(2, 1, 80.0, sharex=True, sharey=True)
+    joints = motion.joints(shown)
+    figure, axes = style.grid(len(joints), 1, 40.0 * len(joints), sharex=True, sharey=True)
     unit = labels.of(shown["penetration"])
-    for panel, (joint, colour, _) in zip(axes[:, 0], _JOINT_STYLES, strict=True):
+    for row, (panel, joint) in enumerate(zip(axes[:, 0], joints, strict=True)):
+        colour = style.CYCLE[row % 7]
         depth = shown["penetration"].sel(joint=joint).to_numpy() * unit.factor
         panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
         share = float((depth > 0.0).mean())
-        panel.set_title(f"{style.JOINT_NAMES[joint]}: in contact {share:.0%} of the time")
+        panel.set_title(f"{joints[joint]}: in contact {share:.0%} of the time")
         panel.set_ylabel(unit.label("penetration"))
     axes[0, 0].set_ylim(
         bottom=0.0
@@ -97,26 +94,23 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 def spectrum_figure(
     response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
 ) -> "Figure":
-    """Amplitude spectra of slider acceleration and contact forces over the order of the crank frequency.
+    """Amplitude spectra of slider acceleration (of a linkage: crank moment) and contact forces over orders of the crank frequency.
 
     `orders`: right end of the axis, multiples of the crank frequency; else as for `bifurcation_figure`, of one response.
     """
     shown = motion.steady(response, revolutions)
     figure, axes = style.grid(2, 1, 90.0, sharex=True)
-    unit = labels.of(shown["slider_acceleration"])
-    acceleration = shown["slider_acceleration"].to_numpy() * unit.factor
-    order, amplitude = motion.spectrum(shown, acceleration)
+    first = "slider_acceleration" if "slider_acceleration" in shown else "crank_moment"
+    unit = labels.of(shown[first])
+    order, amplitude = motion.spectrum(shown, shown[first].to_numpy() * unit.factor)
     inside = (order > 0.0) & (order <= orders)
     axes[0, 0].semilogy(order[inside], amplitude[inside], color=style.PALETTE["blue"], lw=0.7)
-    axes[0, 0].set_ylabel(unit.label("slider acceleration"))
+    axes[0, 0].set_ylabel(unit.label(first.replace("_", " ")))
     unit = labels.of(shown["contact_force"])
-    for row, (joint, colour, _) in enumerate(_JOINT_STYLES):
+    for row, (joint, label) in enumerate(motion.joints(shown).items()):
         force = shown["contact_force"].sel(joint=joint).to_numpy() * unit.factor
         _, amplitude = motion.spectrum(shown, force)
-        label = style.JOINT_NAMES[joint]
-        axes[1, 0].semilogy(
-            order[inside], amplitude[inside], color=colour, lw=0.8 - 0.2 * row, label=label
-        )
+        axes[1, 0].semilogy(order[inside], amplitude[inside], label=label, **_curve(row))
     axes[1, 0].legend(loc="upper right", ncols=2)
     axes[1, 0].set_ylabel(unit.label("contact force"))
     axes[1, 0].set_xlabel("order (multiples of the crank frequency)")
@@ -193,9 +187,9 @@ def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None 
     rows = (
         ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
         (
-            "slider velocity at crank angle 0",
-            "m/s",
-            [motion.section(r, "slider_velocity") for r in steady],
+            f"{labels.words(motion.followed(steady[0])[1])} at crank angle 0",
+            str(motion.followed(steady[0])[1].attrs["units"]),
+            [motion.section(r, motion.followed(r)[1]) for r in steady],
         ),
     )
     across = labels.scale("m", clearances)

@@ -43,6 +43,7 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 COLOURS = "viridis"  # perceptually even, the same order in grey
 JOINT_NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
+"""Of the slider-crank's joints; those of a linkage have the names their users gave them."""
 
 RC: dict[str, Any] = {
     "font.family": "sans-serif",

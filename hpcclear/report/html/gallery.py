@@ -67,7 +67,7 @@ _RESPONSE = (
     (portraits.orbit_figure, "journal-centre orbits in the clearance circle"),
     (portraits.force_polar_figure, "contact force by its direction"),
     (response.penetration_figure, "penetration"),
-    (portraits.phase_figure, "phase portraits of the slider"),
+    (portraits.phase_figure, "phase portraits"),
     (portraits.poincare_figure, "Poincaré section, once a revolution"),
     (response.spectrum_figure, "spectra"),
     (response.energy_figure, "energy ledger"),
@@ -112,7 +112,7 @@ def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
 def _plays(*responses: xr.Dataset) -> str:
     """At which clearances these were simulated, where that is the same for all."""
     told = []
-    for joint, name in enumerate(style.JOINT_NAMES.values()):
+    for joint, name in enumerate(motion.joints(responses[0]).values()):
         known = [motion.clearances(one)[joint] for one in responses]
         shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}
         if len(shown) == 1:

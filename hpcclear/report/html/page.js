@@ -234,32 +234,35 @@
     for (const name of names) put(select, "option", name, { value: name });
     const svg = draw(place, "svg", { role: "img" });
     svg.setAttribute("aria-label", "The mechanism, its clearances drawn larger than they are");
-    const shapes = {};
-    for (const name of ["guide", "slider", "crank", "rod", "ring0", "ring1", "pin0", "pin1", "force0", "force1", "hub"]) {
-      const kind = /ring|pin|hub/.test(name) ? "circle" : name === "slider" ? "rect" : "line";
-      shapes[name] = draw(svg, kind);
-    }
+    let shapes = {}, motion = null, frame = 0, playing = false, last = 0, strongest = 1, l = 1;
     const set = (name, attributes) => {
       for (const [key, value] of Object.entries(attributes)) shapes[name].setAttribute(key, value);
     };
-    let motion = null, frame = 0, playing = false, last = 0, strongest = 1;
+    const add = (name, kind, attributes) => { shapes[name] = draw(svg, kind); set(name, attributes); };
 
     function load(name) {
       motion = content.motions[name];
-      const l = motion.crank, far = Math.max(...motion.slider) + 0.9 * l;
+      const x = motion.points.flatMap((row) => row.filter((_, k) => k % 2 === 0));
+      const y = motion.points.flatMap((row) => row.filter((_, k) => k % 2 === 1));
+      const box = [Math.min(...x), -Math.max(...y), Math.max(...x), -Math.min(...y)];
+      l = 0.3 * Math.max(box[2] - box[0], box[3] - box[1]);
       strongest = Math.max(1e-9, ...motion.force.flat());
-      svg.setAttribute("viewBox", `${-1.5 * l} ${-1.5 * l} ${far + 1.5 * l} ${3 * l}`);
+      svg.setAttribute("viewBox", `${box[0] - 0.5 * l} ${box[1] - 0.5 * l} ${box[2] - box[0] + l} ${box[3] - box[1] + l}`);
+      svg.replaceChildren();
+      shapes = {};
       const thin = `${0.02 * l}`, thick = `${0.09 * l}`;
-      set("guide", { x1: 0, x2: far, y1: 0, y2: 0, stroke: "var(--line)", "stroke-width": thin });
-      set("slider", { width: 0.9 * l, height: 0.7 * l, y: -0.35 * l, fill: "var(--line)", stroke: "var(--soft)", "stroke-width": thin });
-      set("hub", { cx: 0, cy: 0, r: 0.12 * l, fill: "var(--soft)" });
-      set("crank", { x1: 0, y1: 0, stroke: "var(--c0)", "stroke-width": thick, "stroke-linecap": "round" });
-      set("rod", { stroke: "var(--c2)", "stroke-width": thick, "stroke-linecap": "round", "stroke-opacity": 0.75 });
-      for (const k of [0, 1]) {
-        set(`ring${k}`, { fill: "none", stroke: "var(--c2)", "stroke-width": `${0.035 * l}` });
-        set(`pin${k}`, { r: 0.05 * l, fill: "var(--ink)" });
-        set(`force${k}`, { stroke: "var(--c1)", "stroke-width": `${0.05 * l}`, "stroke-linecap": "round" });
-      }
+      motion.still.forEach((still, k) => {
+        if (still) add(`hub${k}`, "circle", { cx: motion.points[0][2 * k], cy: -motion.points[0][2 * k + 1], r: 0.12 * l, fill: "var(--soft)" });
+      });
+      motion.bodies.forEach((points, b) => {
+        if (points.length === 1) add(`body${b}`, "rect", { width: 0.7 * l, height: 0.5 * l, x: -0.35 * l, y: -0.25 * l, fill: "var(--line)", stroke: "var(--soft)", "stroke-width": thin });
+        else add(`body${b}`, "polygon", { fill: points.length > 2 ? "var(--line)" : "none", "fill-opacity": 0.5, stroke: `var(--c${2 * (b % 2)})`, "stroke-width": thick, "stroke-linejoin": "round", "stroke-opacity": 0.8 });
+      });
+      motion.pairs.forEach((_, j) => {
+        add(`ring${j}`, "circle", { fill: "none", stroke: "var(--c2)", "stroke-width": `${0.035 * l}` });
+        add(`pin${j}`, "circle", { r: 0.05 * l, fill: "var(--ink)" });
+        add(`force${j}`, "line", { stroke: "var(--c1)", "stroke-width": `${0.05 * l}`, "stroke-linecap": "round" });
+      });
       const widest = Math.max(...motion.clearance, 1e-9);
       gain.max = Math.max(2, Math.round((0.6 * l) / widest));
       gain.value = Math.min(gain.max, Math.max(1, Math.round((0.16 * l) / widest)));
@@ -269,27 +272,31 @@
 
     function show(k) {
       frame = Math.floor(k);
-      const g = Number(gain.value), l = motion.crank;
-      const pin = motion.pin[frame], e = motion.e[frame], s = motion.slider[frame];
-      /* journals stay where they are, the rod's bearings move away from them by the enlarged eccentricity */
-      const ends = [[pin[0], -pin[1]], [s, 0]];
-      const centres = [[pin[0] - g * e[0], -(pin[1] - g * e[1])], [s - g * e[2], g * e[3]]];
-      set("crank", { x2: ends[0][0], y2: ends[0][1] });
-      set("slider", { x: s - 0.45 * l });
-      set("rod", { x1: centres[0][0], y1: centres[0][1], x2: centres[1][0], y2: centres[1][1] });
-      for (const j of [0, 1]) {
+      const g = Number(gain.value), e = motion.e[frame], row = motion.points[frame];
+      const place = (p) => [row[2 * p], -row[2 * p + 1]];
+      /* journals stay where they are, bearings move away from them by the enlarged eccentricity */
+      const moved = new Map(motion.pairs.map(([journal, bearing], j) => {
+        const [x, y] = place(journal);
+        return [bearing, [x - g * e[2 * j], y + g * e[2 * j + 1]]];
+      }));
+      motion.bodies.forEach((points, b) => {
+        const corners = points.map((p) => moved.get(p) || place(p));
+        if (points.length === 1) set(`body${b}`, { transform: `translate(${corners[0].join(" ")}) rotate(${(-180 * motion.angles[frame][b]) / Math.PI})` });
+        else set(`body${b}`, { points: corners.map((c) => c.join(",")).join(" ") });
+      });
+      motion.pairs.forEach(([journal, bearing], j) => {
         const size = (0.6 * l * motion.force[frame][j]) / strongest, length = Math.hypot(e[2 * j], e[2 * j + 1]) || 1;
-        set(`ring${j}`, { cx: centres[j][0], cy: centres[j][1], r: Math.max(g * motion.clearance[j], 0.03 * l) });
-        set(`pin${j}`, { cx: ends[j][0], cy: ends[j][1] });
+        const [x, y] = place(journal), [cx, cy] = moved.get(bearing);
+        set(`ring${j}`, { cx, cy, r: Math.max(g * motion.clearance[j], 0.03 * l) });
+        set(`pin${j}`, { cx: x, cy: y });
         set(`force${j}`, {
-          x1: ends[j][0], y1: ends[j][1],
-          x2: ends[j][0] + (size * e[2 * j]) / length, y2: ends[j][1] - (size * e[2 * j + 1]) / length,
+          x1: x, y1: y, x2: x + (size * e[2 * j]) / length, y2: y - (size * e[2 * j + 1]) / length,
           visibility: size > 0 ? "visible" : "hidden",
         });
-      }
+      });
       at.value = frame;
       const angle = Math.round((motion.turn[frame] % 1) * 360) % 360;
-      const force = motion.force[frame].map((f, j) => `${j ? "O23" : "O12"} ${f > 0 ? `${(f / 1000).toFixed(2)} kN` : "free flight"}`);
+      const force = motion.force[frame].map((f, j) => `${motion.joints[j]} ${f > 0 ? `${(f / 1000).toFixed(2)} kN` : "free flight"}`);
       out.textContent = `crank ${String(angle).padStart(3, "\u2007")}°, ${force.join(", ")}, clearance × ${g}`;
       at.setAttribute("aria-valuetext", `crank ${angle} degrees`);
     }

@@ -15,12 +15,6 @@ _LEGEND = {
     "printed": "the paper’s design",
 }
 FRAMES = 180  # of a revolution
-_SERIES = (
-    ("contact_force", "crank_rod", "contact force 1 (O12)"),
-    ("contact_force", "rod_slider", "contact force 2 (O23)"),
-    ("crank_moment", "", "crank moment"),
-    ("slider_acceleration", "", "slider acceleration"),
-)
 
 
 def picture(content: Content) -> dict[str, Any]:
@@ -167,7 +161,7 @@ def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
     shown = shown.isel(time=slice(None, None, every))
     turn = motion.turns(shown) - motion.turns(shown)[0]
     found = []
-    for name, joint, word in _SERIES:
+    for name, joint, word in motion.quantities(shown):
         one = shown[name].sel(joint=joint) if joint else shown[name]
         values = np.nan_to_num(one.to_numpy())
         found.append(
@@ -182,32 +176,65 @@ def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
 
 
 def frames(response: xr.Dataset) -> dict[str, Any]:
-    """The mechanism in motion over the last two revolutions.
-
-    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
-    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
-    """
+    """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs."""
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))
     e = np.stack([shown["eccentricity_x"].to_numpy(), shown["eccentricity_y"].to_numpy()], axis=-1)
-    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
-    crank, along = (
-        np.column_stack([np.cos(angle), np.sin(angle)])
-        for angle in (shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy())
-    )
-    # crank length * crank = rod - u2 * along + e12
-    both = np.column_stack([crank.ravel(), along.ravel()])
-    length = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0])
+    bodies, points, angles = _slider_crank(shown, e) if "rod_x" in shown else _linkage(shown)
+    pairs = [_pair(points, e[:, j]) for j in range(e.shape[1])]
+    still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
     return {
-        "crank": length,
+        "bodies": bodies,
+        "points": _digits(points.reshape(len(points), -1)),
+        "angles": _digits(angles),
+        "still": [bool(one) for one in still],
+        "pairs": pairs,
+        "joints": list(motion.joints(shown).values()),
         "clearance": np.nan_to_num(motion.clearances(response)).tolist(),
         "turn": _digits(motion.turns(shown)),
-        "pin": _digits(length * crank),
-        "slider": _digits(shown["slider_position"].to_numpy()),
-        "e": _digits(e.reshape(len(e), 4)),
+        "e": _digits(e.reshape(len(e), -1)),
         "force": _digits(shown["contact_force"].to_numpy()),
     }
+
+
+Drawn = tuple[list[list[int]], np.ndarray, np.ndarray]
+"""Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
+
+
+def _slider_crank(shown: xr.Dataset, e: np.ndarray) -> Drawn:
+    """Points of crank, rod and slider.
+
+    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
+    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
+    """
+    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
+    phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
+    crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
+    # crank length * crank = rod - u2 * along + e12
+    both = np.column_stack([crank.ravel(), along.ravel()])
+    pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
+    slider = np.column_stack([shown["slider_position"].to_numpy(), np.zeros(len(pin))])
+    points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
+    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
+
+
+def _linkage(shown: xr.Dataset) -> Drawn:
+    names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
+    bodies = [
+        [k for k, name in enumerate(names) if name == body]
+        for body in map(str, shown["body"].to_numpy())
+    ]
+    points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
+    return bodies, points, shown["body_angle"].to_numpy()
+
+
+def _pair(points: np.ndarray, e: np.ndarray) -> list[int]:
+    """The two points, journal's and bearing's, whose distance is a joint's eccentricity at every instant."""
+    count = points.shape[1]
+    off = points[:, :, None] - points[:, None, :] - e[:, None, None]
+    worst = np.abs(off).max(axis=(0, 3)) + np.where(np.eye(count) > 0, np.inf, 0.0)
+    return [int(k) for k in np.unravel_index(int(worst.argmin()), worst.shape)]
 
 
 def _digits(values: np.ndarray) -> Any:

@@ -1,0 +1,265 @@
+"""Scenes of linkages: whole motions against a dense model and scipy, energy, samples, drives, tables, and what is refused."""
+
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dense_linkage import Contact, Dense
+from scipy.integrate import solve_ivp
+
+from hpcclear import load_scene, simulate
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.ensemble.api import evaluate
+
+LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
+NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
+ROCKER = tomllib.loads((LINKAGES / "crank_rocker.toml").read_text())
+CHI, MU, RAMP, GRAVITY = 0.4, 0.05, 0.01, 9.81
+
+
+def rocker(*sets):
+    """The crank-rocker without its study, one revolution from the start."""
+    content = {key: value for key, value in ROCKER.items() if key != "study"}
+    short = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
+    return load_scene(content, (*short, *sets))
+
+
+# ---- physics -----------------------------------------------------------------------------------------
+
+
+def test_a_whole_motion_is_the_dense_model_s():
+    """Positions to 1e-8 m over the stretch on which two tolerances of scipy's agree, through contact; energy closed."""
+    scene = rocker("numerics.rtol=1e-10", "numerics.method=dormand-prince")
+    mechanism = linkage_of(scene).mechanism
+    contact = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
+    dense = Dense(mechanism, [contact] * 2, GRAVITY)
+    assembly = assemble(mechanism)
+    order = [
+        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
+        for one in assembly.loops.forest.coordinates
+    ]
+    start = np.zeros((2, dense.n))
+    start[0, order], start[1, order] = assembly.q, assembly.v
+    n, end = dense.n, 0.012  # s: contact begins in both joints before
+
+    def rates(t, y):
+        return [*y[n:], *dense.accelerations(y[:n], y[n:], t)[0]]
+
+    one, two = (
+        solve_ivp(rates, (0.0, end), start.ravel(), method="DOP853", rtol=r, atol=1e-12,
+                  max_step=end / 400, dense_output=True).sol
+        for r in (1e-10, 1e-11)
+    )  # fmt: skip
+    response = simulate(scene)
+    time = response["time"].to_numpy()
+    early = time[time <= end]
+    x = np.array([two(t)[:n] for t in early])
+    well_posed = np.abs(x - [one(t)[:n] for t in early]).max(axis=1) < 1e-9
+    assert well_posed.mean() > 0.9
+    for k, name in enumerate(("body_x", "body_y", "body_angle")):
+        seen = response[name].to_numpy()[: len(early)]
+        np.testing.assert_allclose(
+            seen[well_posed], x[well_posed, k::3], rtol=0, atol=1e-8 * (10 if k == 2 else 1)
+        )
+    assert (response["contact_force"].to_numpy()[: len(early)].max(axis=0) > 10.0).all()
+    work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
+    assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
+
+
+def slider_crank_pair():
+    """The paper's slider-crank, and the same by bodies and joints."""
+    scene = load_scene(
+        Path(__file__).parents[1] / "jobs" / "slider_crank.toml",
+        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1", "numerics.rtol=1e-9",
+         "numerics.method=dormand-prince"),
+    )  # fmt: skip
+    m, j = scene.slider_crank, scene.joints.crank_rod
+    material = {
+        "bearing": j.bearing.model_dump(), "journal": j.journal.model_dump()
+    }  # fmt: skip
+    play = {
+        "kind": "clearance", "clearance": j.clearance, "bearing_radius": j.bearing_radius,
+        "materials": material,
+    }  # fmt: skip
+    bars = {
+        name: {
+            "length": link.length, "mass": link.mass, "mass_center": link.mass_center,
+            "inertia": link.inertia,
+        }
+        for name, link in (("crank", m.crank), ("rod", m.rod))
+    }  # fmt: skip
+    joints = {
+        "main": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+        "guide": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
+        "crank_rod": {**play, "journal": "crank.b", "bearing": "rod.a"},
+        "rod_slider": {**play, "journal": "slider.pin", "bearing": "rod.b"},
+    }
+    slider = {"mass": m.slider.mass, "points": {"pin": [0.0, 0.0]}}
+    drive = {"motor": {"kind": "constant-speed", "body": "crank", "speed": scene.drive.speed}}
+    kept = {key: value for key, value in scene.resolved().items() if key in ("effects", "numerics")}
+    planar = load_scene(
+        {
+            "mechanism": {
+                "kind": "planar", "bodies": {**bars, "slider": slider}, "joints": joints,
+                "drives": drive,
+            },
+            **kept,
+        }
+    )  # fmt: skip
+    return scene, planar
+
+
+def test_the_slider_crank_by_bodies_is_the_slider_crank():
+    given, planar = (simulate(scene) for scene in slider_crank_pair())
+    half = given.sizes["time"] // 2  # chaos parts them later
+    for name, scale in (("eccentricity_x", 1e-9), ("contact_force", 1.0), ("crank_moment", 0.1)):
+        np.testing.assert_allclose(
+            planar[name].to_numpy()[:half], given[name].to_numpy()[:half], rtol=1e-4, atol=scale
+        )
+    slider = planar["body_x"].sel(body="slider").to_numpy()
+    np.testing.assert_allclose(slider[:half], given["slider_position"].to_numpy()[:half], atol=1e-9)
+    assert given["contact_force"].to_numpy()[:half].max() > 1e3
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_gallery_runs_and_closes_its_energy(name):
+    scene = load_scene(
+        LINKAGES / f"{name}.toml",
+        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"),
+    )
+    response = simulate(scene.with_({"study": None}))
+    assert int(response["status"]) == 0
+    work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
+    kinetic = float(response["kinetic_energy"].max())
+    assert float(np.abs(response["energy_residual"]).max()) < 1e-4 * max(work, kinetic)
+    assert float(response["objective"]) > 0.0
+    points = [str(point) for point in response["point"].to_numpy()]
+    assert len(points) == len(set(points))
+
+
+DRIVES = {
+    "torque": {
+        "kind": "torque", "body": "crank", "torque": 1.0, "initial_speed": 90.0,
+        "flywheel_inertia": 1e-2,
+    },
+    "torque over the angle": {
+        "kind": "torque", "body": "crank", "torque": [[0.0, 2.0], ["180 deg", -1.0]],
+        "initial_speed": 90.0, "flywheel_inertia": 1e-2,
+    },
+    "clockwise": {"kind": "constant-speed", "body": "crank", "speed": -90.0},
+    "two turns": {"kind": "constant-speed", "body": "crank", "speed": 90.0, "turns": 2},
+    "swinging": {
+        "kind": "harmonic", "body": "crank", "amplitude": "50 deg", "frequency": "12 Hz",
+        "mean": "60 deg",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_every_drive_closes_the_energy(drive):
+    content = {key: value for key, value in ROCKER.items() if key != "study"}
+    mechanism = {**content["mechanism"], "drives": {"motor": DRIVES[drive]}}
+    scene = load_scene(
+        {**content, "mechanism": mechanism},
+        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=2", "numerics.energy=true"),
+    )  # fmt: skip
+    response = simulate(scene)
+    assert int(response["status"]) == 0
+    work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
+    size = max(work, float(response["kinetic_energy"].max()))
+    assert float(np.abs(response["energy_residual"]).max()) < 1e-5 * size
+    turns = float(response["crank_angle"][-1]) / (2 * math.pi)
+    assert turns == pytest.approx(4.0 if drive == "two turns" else 2.0, abs=0.1)
+    found = evaluate(scene, {"mechanism.joints.o2.clearance": [1e-4, 3e-4]})
+    assert (found["status"] == 0).all()
+    assert (found["energy_error"] < 1e-5).all()
+
+
+def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():
+    latched = rocker(
+        'effects.contact={law="lankarani-nikravesh", restitution=0.8}', "numerics.energy=true"
+    )
+    for scene in (
+        latched,
+        rocker("numerics.formulation=baumgarte", "numerics.energy=true"),
+        rocker("numerics.method=radau", "numerics.energy=true"),
+    ):
+        found = evaluate(scene, {"mechanism.joints.o2.clearance": [1e-4, 3e-4]})
+        assert (found["status"] == 0).all()
+        assert (found["energy_error"] < 1e-4).all()
+
+
+# ---- samples -----------------------------------------------------------------------------------------
+
+
+def test_samples_are_the_scenes_with_their_numbers():
+    """Whatever a column drives: masses, lengths, points of the ground, play, speed, a start angle."""
+    scene = rocker()
+    columns = {
+        "mechanism.bodies.coupler.mass": [0.25, 0.35],
+        "mechanism.bodies.rocker.length": [0.08, 0.082],
+        "mechanism.ground.points.p.x": [0.131, 0.129],
+        "mechanism.joints.o3.clearance": [1e-4, 3e-4],
+        "mechanism.drives.motor.speed": [90.0, 100.0],
+        "mechanism.bodies.crank.start_angle": [0.3, 0.6],
+        "effects.friction.coefficient": [0.04, 0.06],
+    }
+    found = evaluate(scene, columns)
+    for row in (0, 1):
+        alone = scene.with_({path: values[row] for path, values in columns.items()})
+        one = float(simulate(alone)["objective"])
+        assert float(found["objective"][row]) == pytest.approx(one, rel=1e-9)
+    assert list(found["joint"].to_numpy()) == ["o2", "o3"]
+
+
+def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():
+    scene = rocker()
+    with pytest.raises(InputError, match="nought in this scene"):
+        evaluate(scene, {"mechanism.bodies.coupler.center.y": [1e-3]})
+
+
+# ---- what is refused ---------------------------------------------------------------------------------
+
+BROKEN = {
+    "joints.o2.journal=crank.c": ("mechanism.joints.o2.journal", "no point"),
+    "joints.o2.bearing=arm.a": ("mechanism.joints.o2.bearing", "no body"),
+    "joints.o2.clearance=-1e-4": ("mechanism.joints.o2.clearance", "above 0"),
+    "joints.o2.clearance=20 mm": ("mechanism.joints.o2.clearance", "smaller than the bearing"),
+    "joints.o2.kind=welded": ("mechanism.joints.o2.kind", "known values"),
+    "joints.o2.materials.bearing.youngs_modulus=0": (
+        "mechanism.joints.o2.materials.bearing.youngs_modulus",
+        "above 0",
+    ),
+    "bodies.crank.mass=0": ("mechanism.bodies.crank.mass", "above 0"),
+    "bodies.coupler.inertia=0": ("mechanism.bodies.coupler.inertia", "inertia"),
+    "bodies.coupler.length=2 m": ("mechanism.joints", "does not close"),
+    "bodies.coupler.center=[0.1, 0.0]": ("mechanism.bodies.coupler.center", "mass_center"),
+    "drives.motor.body=shaft": ("mechanism.drives.motor.body", "no such body"),
+    "drives.motor.speed=0": ("mechanism.drives.motor.speed", "nothing would turn"),
+    "drives.motor.turns=0": ("mechanism.drives.motor.turns", "from 1"),
+    "drives.motor.torque=3": ("mechanism.drives.motor.torque", "not a known key"),
+    "loads.pull.kind=magnet": ("mechanism.loads.pull.kind", "known values"),
+    "ground.points.p=[0.1]": ("mechanism.ground.points.p", "pair"),
+}
+
+
+@pytest.mark.parametrize("change", BROKEN)
+def test_broken_linkages_are_refused_by_name(change):
+    key, reason = BROKEN[change]
+    with pytest.raises(InputError) as caught:
+        simulate(rocker(f"mechanism.{change}"))
+    assert caught.value.key.startswith(key)
+    assert reason in f"{caught.value.reason} {caught.value.remedy}"
+
+
+def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
+    content = {key: value for key, value in ROCKER.items() if key != "study"}
+    for table, value in (("drive", {"kind": "torque"}), ("joints", {})):
+        with pytest.raises(InputError, match="belongs to a slider-crank"):
+            load_scene({**content, table: value})
+    with pytest.raises(InputError, match="belongs to a slider-crank"):
+        rocker("effects.slider_load=3")
