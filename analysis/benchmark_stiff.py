@@ -94,7 +94,9 @@ def impacts(given: Setup, row: int) -> list[tuple[float, Array]]:
             after[rec.CONTACTS + rec.JOINTS : rec.CONTACTS + rec.JOINTS + 2] != pieces[-1][1]
         )
         if new.any() and after[rec.REVOLUTION] == 0.0:
-            inverse = np.where(new, after[rec.CONTACTS + rec.JOINTS : rec.CONTACTS + rec.JOINTS + 2], pieces[-1][1])
+            inverse = np.where(
+                new, after[rec.CONTACTS + rec.JOINTS : rec.CONTACTS + rec.JOINTS + 2], pieces[-1][1]
+            )
             pieces.append((float(after[rec.TURN_TIME]), inverse))
     return pieces
 

@@ -32,8 +32,12 @@ def rocker(*sets):
 
 
 def test_a_whole_motion_is_the_dense_model_s():
-    """Positions to 1e-8 m over the stretch on which two tolerances of scipy's agree, through contact; energy closed."""
-    scene = rocker("numerics.rtol=1e-10", "numerics.method=dormand-prince")
+    """From assembly through contact in both joints: positions to 1e-8 m while the motion is well-posed; energy closed."""
+    scene = rocker(
+        "numerics.rtol=1e-10", "numerics.method=dormand-prince",
+        "mechanism.joints.o2.start_eccentricity=[2e-5, 1e-5]",
+        "mechanism.joints.o3.start_eccentricity=[-2e-5, 1e-5]",
+    )  # fmt: skip
     mechanism = linkage_of(scene).mechanism
     contact = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
     dense = Dense(mechanism, [contact] * 2, GRAVITY)
@@ -44,28 +48,21 @@ def test_a_whole_motion_is_the_dense_model_s():
     ]
     start = np.zeros((2, dense.n))
     start[0, order], start[1, order] = assembly.q, assembly.v
-    n, end = dense.n, 0.012  # s: contact begins in both joints before
-
-    def rates(t, y):
-        return [*y[n:], *dense.accelerations(y[:n], y[n:], t)[0]]
-
-    one, two = (
-        solve_ivp(rates, (0.0, end), start.ravel(), method="DOP853", rtol=r, atol=1e-12,
-                  max_step=end / 400, dense_output=True).sol
-        for r in (1e-10, 1e-11)
-    )  # fmt: skip
+    n, end = (
+        dense.n,
+        0.0025,
+    )  # s: contact begins in both joints before; later chaos parts any two solutions
     response = simulate(scene)
     time = response["time"].to_numpy()
     early = time[time <= end]
-    x = np.array([two(t)[:n] for t in early])
-    well_posed = np.abs(x - [one(t)[:n] for t in early]).max(axis=1) < 1e-9
-    assert well_posed.mean() > 0.9
+    y = solve_ivp(
+        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, end), start.ravel(),
+        method="DOP853", rtol=1e-10, atol=1e-12, max_step=end / 100, t_eval=early,
+    ).y  # fmt: skip
     for k, name in enumerate(("body_x", "body_y", "body_angle")):
         seen = response[name].to_numpy()[: len(early)]
-        np.testing.assert_allclose(
-            seen[well_posed], x[well_posed, k::3], rtol=0, atol=1e-8 * (10 if k == 2 else 1)
-        )
-    assert (response["contact_force"].to_numpy()[: len(early)].max(axis=0) > 10.0).all()
+        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
+    assert (response["contact_force"].to_numpy()[: len(early)].max(axis=0) > 100.0).all()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
 

@@ -213,5 +213,5 @@ def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
     p = Parameters(par)
     # places without a joint have neither radii nor penetration
     ratio = p.journal_radius / np.maximum(p.bearing_radius, 1e-300)
-    beyond: Booleans = outcome.deepest > HERTZ_RANGE * ratio * p.clearance
-    return beyond.any(axis=1)
+    beyond: Booleans = np.any(outcome.deepest > HERTZ_RANGE * ratio * p.clearance, axis=1)
+    return beyond

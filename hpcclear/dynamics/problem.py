@@ -1,7 +1,7 @@
 """What is common to the samples of a scene: effects, coordinates, method, tolerances, tables."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -246,8 +246,8 @@ def periodic_cells(
     if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
         angles, values = angles[:-1], values[:-1]
     # three turns side by side, so that the middle one sees its neighbours
-    turns = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
-    smooth = PchipInterpolator(turns, np.tile(values, 3))
+    three = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
+    smooth = PchipInterpolator(three, np.tile(values, 3))
     grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
     height = smooth(grid)
     slope = smooth.derivative()(grid) * (at.TURN / cells)
@@ -280,9 +280,8 @@ def implicit_method(scene: Scene) -> str:
     friction = scene.effects.friction.law
     contact_law = getattr(scene.effects.contact, "law", "hertz")
     is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
-    none = np.zeros(at.MAX_JOINTS)
-    ramp = par.friction * par.inverse_ramp if friction != "none" else none
-    damping = par.damping if contact_law != "hertz" else none
+    ramp = par.friction * par.inverse_ramp * (friction != "none")
+    damping = par.damping * (contact_law != "hertz")
     stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
     return "stiff" if (stiff & is_open).any() else "never"
 
@@ -324,7 +323,7 @@ def problem_of(
     """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
-    linkage, turns, curves = None, 1, ()
+    linkage, turns, curves = None, 1, cast(tuple[Array, ...], ())
     if scene.is_planar:
         linkage, tables = planar.linkage_of(scene), planar.tables_of(scene)
         turns = turns_of(tables)

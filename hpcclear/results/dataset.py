@@ -8,7 +8,7 @@ import functools
 import os
 import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from importlib import metadata
 from pathlib import Path
 
@@ -227,7 +227,7 @@ def samples_dataset(
     return dataset("samples", coords, data, attributes, units, objective, words)
 
 
-def at_joints(values: np.ndarray, joints: Sequence[str]) -> np.ndarray:
+def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
     """Values of records at the joints there are, shape (n, joints); of a quantity without joints as they are."""
     return values[:, : len(joints)] if values.ndim > 1 else values
 

@@ -53,10 +53,10 @@ class Rows:
     time: int = at.STAGE_TIME
     torque_value: int = at.TORQUE_VALUE
     load_value: int = at.LOAD_VALUE
-    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
     holds: int | None = None  # first of the multipliers, where they are asked for
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
+    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
 
 
 @dataclass(frozen=True)

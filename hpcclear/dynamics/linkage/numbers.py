@@ -48,7 +48,7 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
     for body in mechanism.bodies:
         drive = mechanism.drive_of(body.name)
         inertia = body.inertia + (drive.inertia if isinstance(drive, TorqueDrive) else 0.0)
-        inertia = np.where(np.asarray(inertia) == 0.0, 1.0, inertia)[()]  # of what does not turn
+        inertia = inertia + 1.0 * (np.asarray(inertia) == 0.0)[()]  # 1 for what does not turn
         places = {**body.points, CENTER: body.center}
         for a, (ax, ay) in places.items():
             for b, (bx, by) in places.items():
