@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import overrides, run
 from dense_linkage import Contact, Dense
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.ensemble.api import evaluate
+from hpcclear.ensemble.api import as_points, evaluate
 
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
@@ -195,7 +197,8 @@ def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():
 
 def test_samples_are_the_scenes_with_their_numbers():
     """Whatever a column drives: masses, lengths, points of the ground, play, speed, a start angle."""
-    scene = rocker()
+    # tolerances go by the scene's own speed, so that both agree as well as they are integrated
+    scene = rocker("numerics.rtol=1e-11")
     columns = {
         "mechanism.bodies.coupler.mass": [0.25, 0.35],
         "mechanism.bodies.rocker.length": [0.08, 0.082],
@@ -209,8 +212,34 @@ def test_samples_are_the_scenes_with_their_numbers():
     for row in (0, 1):
         alone = scene.with_({path: values[row] for path, values in columns.items()})
         one = float(simulate(alone)["objective"])
-        assert float(found["objective"][row]) == pytest.approx(one, rel=1e-9)
+        assert float(found["objective"][row]) == pytest.approx(one, rel=1e-4)
     assert list(found["joint"].to_numpy()) == ["o2", "o3"]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n in ("press", "four_stroke") else pytest.mark.full) for n in NAMES]
+)  # fmt: skip
+def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
+    """And a sample comes to the bits of a single response by the same method."""
+    sets = (
+        "numerics.transient_revolutions=0",
+        "numerics.averaged_revolutions=1",
+        "study.samples=12",
+    )
+    scene = load_scene(LINKAGES / f"{name}.toml", sets)
+    columns = {"C": np.linspace(*scene.required_study.variable("C").range, 9)}
+    one, many = (
+        evaluate_records(scene, as_points(scene, columns), lanes=lanes) for lanes in (1, 8)
+    )
+    assert one.tobytes() == many.tobytes()
+    files = []
+    for ranks in (1, 2):
+        out = tmp_path / f"{ranks}.nc"
+        words = ["sample", str(LINKAGES / f"{name}.toml"), "-o", str(out), *overrides(*sets)]
+        code, output = run(words, ranks)
+        assert code == 0, output
+        files.append(out.read_bytes())
+    assert files[0] == files[1]
 
 
 def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():

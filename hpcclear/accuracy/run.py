@@ -52,6 +52,11 @@ def measure(
     InputError
         If both joints are ideal: the objective is 0 then, whatever the settings.
     """
+    if scene.is_planar:
+        raise InputError(
+            "mechanism.kind", "planar", "what accuracy costs is measured on slider-cranks alone so far",
+            "Compare numerics.rtol by hand with simulate, or set numerics.uncertainty = true",
+        )  # fmt: skip
     if not scene.clearance_joints():
         raise InputError(
             "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"

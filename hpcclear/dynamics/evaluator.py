@@ -121,6 +121,8 @@ class Evaluator:
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
         records = outcome_records(labels, outcome, par, bool(self._problem.effects.responses))
+        if self._problem.linkage is not None and not self._problem.linkage.follow:
+            records["slider_acceleration_deviation"] = np.nan  # nothing slides
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
             off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)

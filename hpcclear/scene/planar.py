@@ -1,4 +1,4 @@
-"""Tables of a planar linkage: bodies, ground, joints, drives, loads. `dynamics/planar/tables.py` makes the mechanism of them."""
+"""Tables of a planar linkage: bodies, ground, joints, drives, loads. `dynamics/planar/tables.py` makes a mechanism of them."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal

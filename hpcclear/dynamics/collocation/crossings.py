@@ -7,7 +7,7 @@ from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.stepping.events import impact_fraction, root
 from hpcclear.dynamics.stepping.settings import GAP_TOLERANCE
-from hpcclear.dynamics.stepping.stops import cut, latch, latch_at_start
+from hpcclear.dynamics.stepping.stops import cut, latch_at_start, latch_if
 
 
 @scalar_function
@@ -71,15 +71,17 @@ def contact_change(flag, latched, work, m, joint, settings):
 def stop_at_contacts(effects, work, m, settings):
     """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
     first = 2.0
+    fraction: dict = {}
     for joint in written_out(at.JOINTS):
         flag = getattr(effects.open, joint.flag)
-        first = min(first, contact_change(flag, effects.rules.latched, work, m, joint, settings))
+        fraction[joint] = contact_change(flag, effects.rules.latched, work, m, joint, settings)
+        first = min(first, fraction[joint])
     if first < 1.0:
         cut(0, 1, work, first)
     elif first == 1.0:
         for joint in written_out(at.JOINTS):
-            flag = getattr(effects.open, joint.flag)
-            if contact_change(flag, effects.rules.latched, work, m, joint, settings) == 1.0:
-                latch(0, 1, work, settings, joint)
+            latch_if(
+                getattr(effects.open, joint.flag), fraction[joint], 0, 1, work, settings, joint
+            )
     if first <= 1.0:
         m[lob.KINK] = lob.KINK_AT_END

@@ -38,7 +38,7 @@ class Linkage:
         self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = ""
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
-        self.cartesian = cartesian
+        self.cartesian, self.follow = cartesian, follow
         self._on = On(friction=friction, gravity=gravity, follow=follow)
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}

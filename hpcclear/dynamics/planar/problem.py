@@ -12,8 +12,9 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import Harmonic, TorqueDrive, split
+from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TorqueDrive, split
 from hpcclear.dynamics.linkage.poses import coordinates
+from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
@@ -48,12 +49,30 @@ def linkage_of(scene: Scene) -> Linkage:
     shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
     mechanism = mechanism_of(tables_of(shown))
     check_drives(mechanism)
+    cartesian = scene.numerics.formulation == "baumgarte"
+    follow = guided(mechanism, cartesian)
+    if scene.objective.name == "slider-acceleration-deviation" and not follow:
+        raise InputError(
+            "study.objective", scene.objective.name, "no body slides along a line of the ground here",
+            'Take another objective, say "peak-contact-force"',
+        )  # fmt: skip
     return Linkage(
         mechanism,
+        follow=follow,
         gravity=scene.effects.gravity > 0.0,
         friction=scene.effects.friction.law != "none",
-        cartesian=scene.numerics.formulation == "baumgarte",
+        cartesian=cartesian,
     )
+
+
+def guided(mechanism: Mechanism, cartesian: bool) -> str:
+    """The first body whose place along a line of the ground is a coordinate: what stands for the slider; "" for none."""
+    for one in forest(mechanism, cartesian).coordinates:
+        if one.kind == "slide":
+            joint = next(joint for joint in mechanism.joints if joint.name == one.joint)
+            if split(joint.places[1])[0] == GROUND:
+                return one.body
+    return ""
 
 
 def check_drives(mechanism: Mechanism) -> None:
@@ -159,17 +178,17 @@ def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
         If a sample does not close.
     """
     linkage = linkage_of(scene)
-    forest = linkage.forest
-    n = len(forest.coordinates)
+    trees = linkage.forest
+    n = len(trees.coordinates)
     start = Start.at_rest(len(par))
     if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
         shared = put_together(mechanism_of(tables_of(scene)))
-        start.coordinates(n)[:], start.velocities(n)[:] = coordinates(forest, shared)
+        start.coordinates(n)[:], start.velocities(n)[:] = coordinates(trees, shared)
     else:
         for row in range(len(par)):
             one = scene_of(scene, points, row)
             made = put_together(mechanism_of(tables_of(one)))
-            start.coordinates(n)[row], start.velocities(n)[row] = coordinates(forest, made)
+            start.coordinates(n)[row], start.velocities(n)[row] = coordinates(trees, made)
     _start_contacts(scene, linkage, par, start)
     return start
 
@@ -208,15 +227,3 @@ def _start_contacts(scene: Scene, linkage: Linkage, par: Array, start: Start) ->
         touching = np.hypot(offset.x, offset.y) >= Parameters(par).clearance[:, k]
         start.active[:, k] = touching
         start.inverse_impact[:, k] = touching / law.minimum_impact_speed
-
-
-def bodies_named(mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of the bodies, in file order."""
-    return tuple(body.name for body in mechanism.bodies)
-
-
-def followed(mechanism: Mechanism) -> list[str]:
-    """Places worth following: points of bodies that no joint or load names."""
-    taken = {place for joint in mechanism.joints for place in joint.places}
-    every = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
-    return [place for place in every if place not in taken and split(place)[1] not in ("a", "b")]

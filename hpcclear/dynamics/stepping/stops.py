@@ -66,16 +66,26 @@ def latch(lane, W, work, settings, joint):
 def stop_at_impacts(effects, lane, W, work, settings):
     """Shorten the step to the first impact inside it, or latch the contacts that begin at its end."""
     first = 2.0
+    fraction: dict = {}
     for joint in written_out(at.JOINTS):
         flag = getattr(effects.open, joint.flag)
-        first = min(first, meet_impact(flag, lane, W, work, settings, joint))
+        fraction[joint] = meet_impact(flag, lane, W, work, settings, joint)
+        first = min(first, fraction[joint])
     if first < 1.0:
         cut(lane, W, work, first)
     elif first == 1.0:
         for joint in written_out(at.JOINTS):
-            flag = getattr(effects.open, joint.flag)
-            if meet_impact(flag, lane, W, work, settings, joint) == 1.0:
-                latch(lane, W, work, settings, joint)
+            latch_if(
+                getattr(effects.open, joint.flag), fraction[joint], lane, W, work, settings, joint
+            )
+
+
+@lane_event
+def latch_if(flag, fraction, lane, W, work, settings, joint):
+    """Start the contact of an open joint whose fraction is 1, the end of the step."""
+    if flag is not None:
+        if fraction == 1.0:
+            latch(lane, W, work, settings, joint)
 
 
 @lane_event

@@ -94,7 +94,7 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 def spectrum_figure(
     response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
 ) -> "Figure":
-    """Amplitude spectra of slider acceleration (of a linkage: crank moment) and contact forces over orders of the crank frequency.
+    """Amplitude spectra of slider acceleration (linkage: crank moment) and contact forces over orders of the crank frequency.
 
     `orders`: right end of the axis, multiples of the crank frequency; else as for `bifurcation_figure`, of one response.
     """
