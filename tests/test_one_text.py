@@ -82,7 +82,7 @@ def test_the_text_does_what_the_calls_do(flag, gaps):
 
 def test_what_is_off_is_not_in_the_text():
     with_, without = (
-        text_of(everything, "everything", {"flag": flag, "gaps": at.Effects(), "n": 2})
+        text_of(everything, "everything", {"flag": flag, "gaps": at.Open(), "n": 2})
         for flag in (1, None)
     )
     assert "3.0 *" in with_
@@ -92,7 +92,7 @@ def test_what_is_off_is_not_in_the_text():
 def test_a_function_of_the_other_kind_stands_beside():
     """It is compiled with its own rules of arithmetic."""
     assert (written_kind(everything), written_kind(first_beyond)) == ("lane", "scalar")
-    text = text_of(everything, "everything", {"flag": None, "gaps": at.Effects(), "n": 2})
+    text = text_of(everything, "everything", {"flag": None, "gaps": at.Open(), "n": 2})
     beside = text[: text.index("def first_beyond")].splitlines()[-1]
     assert beside.startswith("@njit(")
     assert "fastmath" not in beside

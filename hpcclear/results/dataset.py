@@ -242,6 +242,9 @@ def records(samples: xr.Dataset) -> np.ndarray:
             found[name] = nothing
         else:
             values = samples[name].to_numpy()
+            if values.ndim > 1:  # places that no joint has are as in a fresh record
+                failed = np.isnan(values).all(axis=1) if values.dtype.kind == "f" else False
+                found[name] = np.where(failed, nothing, 0)[..., None]
             at_joints(found[name], samples["joint"].to_numpy())[:] = values
     return found
 

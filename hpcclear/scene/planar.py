@@ -57,6 +57,8 @@ class PlaceRows(NamedRows):
 
     def rows(self, value: Any) -> Any:
         """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; raises PydanticCustomError."""
+        if not isinstance(value, (Mapping, tuple)):
+            raise invalid("named points are expected here", "Write { name = [x, y] }")
         if isinstance(value, Mapping):
             for name, place in value.items():
                 if isinstance(place, (list, tuple)) and len(place) != 2:

@@ -32,6 +32,11 @@ class Linkage:
         Every body by itself, with multipliers and feedback.
     follow : str
         A guided body whose acceleration responses tell of; "" for none.
+
+    Raises
+    ------
+    InputError
+        If it needs more parameters than there is room for.
     """
 
     def __init__(
@@ -87,7 +92,7 @@ class Linkage:
 
     @cached_property
     def curve_rows(self) -> dict[str, int]:
-        """Rows of tabulated values at the stage, by drive or load."""
+        """Rows of tabulated values at the stage, by drive or load; raises InputError if there are too many."""
         tabled = [
             one.name
             for one in (*self.mechanism.drives, *self.mechanism.loads)

@@ -207,7 +207,7 @@ def scene_of(scene: Scene, points: Points, row: int) -> Scene:
 
 
 def put_together(mechanism: Mechanism) -> Assembly:
-    """`assemble`, its errors below ``mechanism``."""
+    """`assemble`, its InputError below ``mechanism``."""
     try:
         return assemble(mechanism)
     except InputError as error:

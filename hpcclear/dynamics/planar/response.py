@@ -29,7 +29,7 @@ class Seen(NamedTuple):
 
 
 def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
-    """Every time series of the response; names as in the response dataset."""
+    """Every time series of the response, names as in the response dataset; parameters (PARAMETERS,)."""
     linkage = linkage_of(scene)
     mechanism = linkage.mechanism
     pose, eccentricity = linkage.poses.at(par, seen.q.T, seen.v.T, seen.turn_time)
@@ -69,7 +69,7 @@ def contacts_on(scene: Scene, contacts: Array, count: int) -> Array:
 
 
 def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
-    """Energy stored in the contacts, J, (t,)."""
+    """Energy stored in the contacts, J, (t,); stiffness (joints,), gaps and contact flags (t, joints)."""
     stored: Array = (0.4 * stiffness * active * np.maximum(gaps, 0.0) ** 2.5).sum(axis=-1)
     return stored
 

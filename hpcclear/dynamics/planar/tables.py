@@ -41,7 +41,7 @@ def planar_mechanism(content: Mapping[str, Any]) -> Mechanism:
 
 
 def mechanism_of(planar: Planar) -> Mechanism:
-    """The mechanism of a scene's tables; errors as `planar_mechanism`, below ``mechanism``."""
+    """The mechanism of a scene's tables; raises InputError as `planar_mechanism`, below ``mechanism``."""
     try:
         return Mechanism(**_tables(planar))
     except InputError as error:
