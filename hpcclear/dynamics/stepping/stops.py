@@ -83,9 +83,8 @@ def stop_at_impacts(effects, lane, W, work, settings):
 @lane_event
 def latch_if(flag, fraction, lane, W, work, settings, joint):
     """Start the contact of an open joint whose fraction is 1, the end of the step."""
-    if flag is not None:
-        if fraction == 1.0:
-            latch(lane, W, work, settings, joint)
+    if flag is not None and fraction == 1.0:
+        latch(lane, W, work, settings, joint)
 
 
 @lane_event
