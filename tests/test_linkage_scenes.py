@@ -126,6 +126,33 @@ def test_the_slider_crank_by_bodies_is_the_slider_crank():
     assert given["contact_force"].to_numpy()[:half].max() > 1e3
 
 
+def test_without_play_nothing_is_integrated_and_reactions_are_the_closed_form_s():
+    given, planar = slider_crank_pair()
+    ideal = {"kind": "ideal"}
+    given = given.with_(
+        {"joints.crank_rod": ideal, "joints.rod_slider": ideal, "effects": {"gravity": 9.81}}
+    )
+    pins = {
+        f"mechanism.joints.{name}": {"kind": "revolute", "journal": journal, "bearing": bearing}
+        for name, journal, bearing in (
+            ("crank_rod", "crank.b", "rod.a"), ("rod_slider", "slider.pin", "rod.b")
+        )
+    }  # fmt: skip
+    planar = planar.with_({**pins, "effects": {"gravity": 9.81}})
+    one, two = simulate(given), simulate(planar)
+    assert two.sizes["joint"] == 0
+    for name, scale in (("crank_moment", 1e-7), ("kinetic_energy", 1e-9), ("driving_work", 1e-3)):
+        np.testing.assert_allclose(
+            two[name].to_numpy(), one[name].to_numpy(), atol=scale, rtol=1e-9
+        )
+    for axis in "xy":  # on the slider, and on the rod
+        pin = two[f"pin_force_{axis}"].sel(pin="rod_slider").to_numpy()
+        rod = one[f"reaction_{axis}"].sel(joint="rod_slider").to_numpy()
+        np.testing.assert_allclose(pin, -rod, atol=1e-6, rtol=1e-9)
+    found = evaluate(planar, {"mechanism.bodies.rod.mass": [0.2, 0.3]})
+    assert (found["objective"] == 0.0).all()
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_the_gallery_runs_and_closes_its_energy(name):
     scene = load_scene(

@@ -81,6 +81,7 @@ def describe_scene(scene: Scene, cost: bool) -> None:
             "revolutions",
             f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
         ),
+        *_assembly(scene),
         ("scene hash", scene.hash[:16]),
         ("MPI", _mpi()),
     ]
@@ -91,6 +92,18 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         out.print(table("Study", _study_rows(scene)))
     if cost:
         out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
+
+
+def _assembly(scene: Scene) -> list[tuple[str, str]]:
+    """How a linkage was put together, a row a body; refuses one that does not close."""
+    if not scene.is_planar:
+        return []
+    from hpcclear.dynamics.planar.problem import linkage_of, put_together, tables_of
+    from hpcclear.dynamics.planar.tables import mechanism_of
+
+    linkage_of(scene)
+    lines = put_together(mechanism_of(tables_of(scene))).report()
+    return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
 
 def _mpi() -> str:

@@ -6,6 +6,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.prescribed import outcomes
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
@@ -37,13 +38,15 @@ class ClosedForm:
     def collect(self) -> tuple[Integers, Outcome, Array]:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
         labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
-        par = np.concatenate([np.zeros((0, Parameters.size)), *self._par])
+        par = np.concatenate([np.zeros((0, self._problem.parameter_rows)), *self._par])
         self._labels, self._par = [], []
         return labels, self.run(par), par
 
     def run(self, par: Array, start: Start | None = None) -> Outcome:
         """Outcomes of samples, in their order: parameters (m, PARAMETERS); there is no start to heed."""
         p = self._problem
+        if p.linkage is not None:
+            return Outcome(outcomes(p, par))
         return Outcome(ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged))
 
 

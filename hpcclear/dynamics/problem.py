@@ -256,14 +256,14 @@ def periodic_cells(
     return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
 
 
-def curve_at(curve: Curve, angle: Array) -> Array:
-    """A torque or load at crank angles (n,) in rad, as the kernel reads it."""
+def curve_at(curve: Curve, angle: Array, turns: int = 1) -> Array:
+    """A torque or load at crank angles (n,) in rad, over `turns` where it takes several, as the kernel reads it."""
     if not isinstance(curve, tuple):
         return np.full(len(angle), curve)
     place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
     cell = np.minimum(place.astype(int), at.CELLS - 1)
     s = place - cell
-    c0, c1, c2, c3 = periodic_cells(curve).reshape(-1, 4)[cell].T
+    c0, c1, c2, c3 = periodic_cells(curve, turns=turns).reshape(-1, 4)[cell].T
     return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
 
 

@@ -19,6 +19,7 @@ from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
@@ -216,8 +217,16 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
         | {"integrator": integrator_of(scene, single=True)},
         objective,
         labels,
-        planar_labels(linkage_of(scene).mechanism) if scene.is_planar else None,
+        _dimensions(scene),
     )
+
+
+def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
+    """Labels along what a linkage's series have besides time and joints."""
+    if not scene.is_planar:
+        return None
+    found = planar_labels(linkage_of(scene).mechanism)
+    return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
 
 
 _TOLD = (
@@ -268,7 +277,8 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
     record = outcome_records(*lanes.collect(), bool(problem.effects.responses))
-    return *ideal_series(scene), record
+    found = prescribed_series(scene) if scene.is_planar else ideal_series(scene)
+    return *found, record
 
 
 def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Records]:

@@ -24,7 +24,7 @@ from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kin
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
-LINKAGE_DIMS = {"body", "point"}
+LINKAGE_DIMS = {"body", "point", "pin"}
 """Coordinates that only a linkage's files have."""
 
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results

@@ -4,6 +4,7 @@ Positions and velocities from the loops, accelerations, reactions and drive mome
 coordinates (feedback off), all instants at once.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,8 +57,13 @@ class Prescribed:
     margin: Array
 
 
-def prescribed_motion(mechanism: Mechanism, times: Array, gravity: float = 0.0) -> Prescribed:
-    """Motion and reactions at instants (t,), s, which rise from 0.
+def prescribed_motion(
+    mechanism: Mechanism,
+    times: Array,
+    gravity: float = 0.0,
+    turned: Mapping[str, Array] | None = None,
+) -> Prescribed:
+    """Motion and reactions at instants (t,), s, which rise from 0; `turned`: values (t,) of tabulated loads, by name.
 
     Raises
     ------
@@ -81,7 +87,7 @@ def prescribed_motion(mechanism: Mechanism, times: Array, gravity: float = 0.0) 
             here = time
         margin[row] = check_rank(loops, loops.at(q, v, time).jacobian, everything, time)
         found[row] = q, v
-    return _reactions(assembly, np.asarray(times), found, gravity, margin)
+    return _reactions(assembly, np.asarray(times), found, gravity, margin, turned or {})
 
 
 def _passed(
@@ -121,20 +127,30 @@ def _passed(
 
 
 def _reactions(
-    assembly: Assembly, times: Array, found: Array, gravity: float, margin: Array
+    assembly: Assembly,
+    times: Array,
+    found: Array,
+    gravity: float,
+    margin: Array,
+    turned: Mapping[str, Array],
 ) -> Prescribed:
     """Accelerations and reactions from the equations of motion, instants side by side as rows of arrays."""
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)
-    rows = Rows(0, n, 2 * n, rates, 3 * n, rates + 30, rates + 31, holds)
+    curves = {name: rates + at.RATES + 2 + k for k, name in enumerate(turned)}
+    rows = Rows(
+        0, n, 2 * n, rates, 3 * n, rates + at.RATES, rates + at.RATES + 1, holds, curves=curves
+    )
     on = On(gravity=gravity != 0.0, ledger=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
     names: dict[str, Any] = dict(WORDS)
     exec(text.source, names)
-    work = np.zeros((rates + 40, len(times)))
+    work = np.zeros((rates + at.RATES + 2 + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
-    work[rates + 30 :] = 1.0
+    work[rates + at.RATES :] = 1.0
+    for name, row in curves.items():
+        work[row] = turned[name]
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     names["lane"](None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}

@@ -158,6 +158,8 @@ def driven_length(mechanism: Mechanism) -> float:
 
 def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     """Absolute tolerances of coordinates, then velocities, as `problem.absolute_tolerances` has them."""
+    if is_prescribed(scene):
+        return ()
     linkage = linkage_of(scene)
     a = scene.numerics.absolute_tolerance
     angles = [one.kind == "angle" for one in linkage.forest.coordinates]

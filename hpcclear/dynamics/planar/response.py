@@ -45,7 +45,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     return {
         "crank_angle": angle,
         "crank_speed": speed,
-        **_bodies(scene, mechanism, pose),
+        **bodies_and_points(mechanism, pose),
         "eccentricity_x": eccentricity[:, 0].T,
         "eccentricity_y": eccentricity[:, 1].T,
         "penetration": np.maximum(gaps, 0.0) * active,
@@ -84,7 +84,7 @@ def _turned(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> tuple[Arr
     return angle, np.full(len(angle), named.speed)
 
 
-def _bodies(scene: Scene, mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
+def bodies_and_points(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     """Mass centres and angles of the bodies (t, body), and all their points (t, point)."""
     found: dict[str, Any] = {
         "body_x": pose.x.T,
