@@ -187,10 +187,6 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
 
     scene = _scene(file, overrides, warn=False)
     describe_scene(scene, cost)
-    if sketch is not None and scene.is_planar:
-        raise InputError(
-            "--sketch", str(sketch), "draws slider-cranks alone so far", "Simulate, and look at the report"
-        )  # fmt: skip
     if sketch is not None:
         from hpcclear.report import save, sketch_figure
 

@@ -12,7 +12,7 @@ from hpcclear.dynamics.linkage.prescribed import prescribed_motion
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
 from hpcclear.dynamics.planar.response import bodies_and_points
 from hpcclear.dynamics.planar.tables import curves_of
-from hpcclear.dynamics.problem import Problem, curve_at
+from hpcclear.dynamics.problem import Problem, curve_at, problem_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -39,8 +39,9 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     InputError
         If the linkage comes to a dead centre.
     """
-    mechanism, tables, numerics = linkage_of(scene).mechanism, tables_of(scene), scene.numerics
-    revolutions = numerics.transient_revolutions + numerics.averaged_revolutions
+    mechanism, tables = linkage_of(scene).mechanism, tables_of(scene)
+    problem = problem_of(scene)
+    revolutions = problem.transient + problem.averaged
     count = scene.output.instants_per_revolution or 720
     period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import ClearanceJoint, Link
@@ -27,7 +28,17 @@ def sketch_figure(scene: Scene) -> "Figure":
     """The mechanism at a crank angle of 50 degrees, and a key with every number's place.
 
     Lengths are to scale; plays are not, they would be invisible.
+
+    Raises
+    ------
+    InputError
+        If the scene has another mechanism than a slider-crank.
     """
+    if scene.is_planar:
+        raise InputError(
+            "mechanism.kind", "planar", "sketches are of slider-cranks alone so far",
+            "Simulate, and look at the report, which draws it in motion",
+        )  # fmt: skip
     lines = [part for line in _key(scene) for part in textwrap.wrap(line, _COLUMNS)]
     height = _DRAWING + _LINE * len(lines)
     figure = style.page(height)
