@@ -1,7 +1,6 @@
 """How much a study simulates, from what each of its stages says of itself."""
 
 from hpcclear.scene import Scene
-from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.study import (
     chaos,
     optimisation,
@@ -19,7 +18,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
     """Samples on the ranks by stage, if no surface or model is refused.
 
     The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
-    accuracy verified designs are taken to need twice the simulations that it is first judged by.
+    accuracy verified designs are taken to need what the paper's did.
 
     Raises
     ------
@@ -29,7 +28,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
     study = scene.required_study
     extremes, spread = optimisation.chosen_in_all(study)
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
-    count = study.verification.draws or 2 * SCRAMBLINGS * truth.first_length(study.verification)
+    count = truth.expected(study.verification)
     if study.verification.infill_rounds:
         verified += refinement.RUNNERS_UP * len(study.cases)
     begun, rounds = refinement.simulations(study)
