@@ -111,7 +111,8 @@ class Reader:
         """A whole scene is loaded; a part takes the place of what stands in the named file, or in a shipped scene."""
         part = tomllib.loads(block.text)
         file = self.place / block.title if block.title else None
-        if not {"mechanism", "drive", "joints"} <= part.keys():
+        linkage = part.get("mechanism", {}).get("kind") == "planar"
+        if not linkage and not {"mechanism", "drive", "joints"} <= part.keys():
             shipped = "quickstart" if "study" in part else "slider_crank"
             base = file or self.place / "jobs" / f"{shipped}.toml"
             part = replaced(tomllib.loads(base.read_text(encoding="utf-8")), part)
