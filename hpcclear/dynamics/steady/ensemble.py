@@ -113,7 +113,7 @@ def ensemble(
         if early:
             stretches = LASTING - len(copies.outcomes)
         elif drifting:
-            stretches = FIRST if seen.short else len(copies.outcomes)
+            stretches = 1 if seen.short else len(copies.outcomes)
         else:
             stretches = yield from _more(effort, copies, rtol, seen, level - seen.settling)
 
