@@ -215,3 +215,11 @@ def test_wherever_the_budget_ends_limits_are_finite_or_there_are_none():
         assert not np.isinf(found["objective_limit"])
         assert np.isnan(found["objective_limit"]) or found["objective_limit"] > 0.0
         assert found["steady_revolutions"] >= budget
+
+
+def test_a_linkage_is_looked_at_too():
+    scene = load_scene(FILE.parent / "linkages" / "crank_rocker.toml")
+    asked = {"numerics.target_error": 0.3, "numerics.target_revolutions": 100}
+    found = evaluate_records(scene.with_(asked), NOTHING)[0]
+    assert found["regime"] != Regime.UNJUDGED
+    assert found["steady_revolutions"] >= 4

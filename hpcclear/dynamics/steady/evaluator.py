@@ -100,7 +100,7 @@ class SteadyEvaluator:
         self._asks: dict[int, _Ask] = {}
         contact = scene.effects.contact
         self._latched = contact is not None and contact.latched
-        self._free = scene.drive.kind == "torque"
+        self._free = scene.drive is not None and scene.drive.kind == "torque"
         self._responses = bool(
             self._lanes_of(1e-4, 1).problem.effects.responses
         )  # refuses what cannot be simulated
