@@ -70,11 +70,11 @@ def error_of(
     """Error over all groups of so many copies, from their starts on and from later ones; and Student's limits of these."""
     windows = (len(gaps) - spin_up) // length
     used = gaps[spin_up : spin_up + windows * length]
-    parts = used.reshape(windows, length, COPIES // copies, copies, 2).mean(axis=(1, 3))
+    parts = used.reshape(windows, length, COPIES // copies, copies, -1).mean(axis=(1, 3))
     error = float(np.sqrt(np.mean((objective(parts) / truth - 1.0) ** 2)))
     if copies < 4:
         return error, np.inf
-    each = objective(used.reshape(windows, length, COPIES // copies, copies, 2).mean(axis=1))
+    each = objective(used.reshape(windows, length, COPIES // copies, copies, -1).mean(axis=1))
     scatter = np.sqrt(np.mean(each.var(axis=-1, ddof=1)) / copies) / truth
     return error, float(stats.t.ppf(0.975, copies - 1) * scatter)
 

@@ -16,6 +16,7 @@ import numpy as np
 from hpcclear.accuracy.averaging import doubling
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
@@ -104,7 +105,7 @@ class Run:
 
     Attributes
     ----------
-    gaps : ndarray, shape (stretches, r, copies, 2)
+    gaps : ndarray, shape (stretches, r, copies, joints)
     seconds : ndarray, shape (r,)
         Processor time so far.
     start : ndarray, shape (r, copies, Start.size)
@@ -124,7 +125,7 @@ class Run:
             kicked(first, scale, range(1 + k * COPIES, 1 + (k + 1) * COPIES)).rows
             for k in range(len(TOLERANCES))
         ]
-        nothing = np.empty((0, len(TOLERANCES), COPIES, 2))
+        nothing = np.empty((0, len(TOLERANCES), COPIES, MAX_JOINTS))
         return cls(nothing, np.zeros(len(TOLERANCES)), np.stack(starts))
 
 
@@ -193,7 +194,7 @@ def analyse(run: Run) -> Spending:
 
 
 def _spin_up(gaps: Array) -> int:
-    """Stretches (stretches, copies, 2) to leave out: until copies have parted and their mean has settled, half at most."""
+    """Stretches (stretches, copies, joints) to leave out: until copies have parted and their mean has settled, half at most."""
     if gaps.shape[1] < 3:
         return 0
     y = judging.projected(gaps)
@@ -224,7 +225,7 @@ def _known_bias(bias: Array, error: Array) -> Array:
 
 
 def _error(gaps: Array, stretches: int, truth: float) -> float:
-    """Relative error of means of so many stretches, from gaps (stretches, copies, 2): of one copy, or of several at once."""
+    """Relative error of means of so many stretches, from gaps (stretches, copies, joints): of one copy or of several."""
     length, copies = gaps.shape[:2]
     together = -(-stretches // length)  # copies in a mean
     long = stretches // together
@@ -232,5 +233,5 @@ def _error(gaps: Array, stretches: int, truth: float) -> float:
     if groups * pieces < 4:
         return np.nan
     used = gaps[: pieces * long, : groups * together]
-    parts = used.reshape(pieces, long, groups, together, 2).mean(axis=(1, 3))
+    parts = used.reshape(pieces, long, groups, together, -1).mean(axis=(1, 3))
     return float(np.sqrt(np.mean((objective(parts) / truth - 1.0) ** 2)))
