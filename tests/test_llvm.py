@@ -75,7 +75,7 @@ MARKERS = {
     "series": (set(), {work(at.RATE_NOW + at.FRICTIONS), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
     "responses": (
         set(),
-        {work(at.RATE_NOW + at.SLIDER_SQUARE), work(at.RATE_NOW + at.DRIVE_MOMENT)},
+        {work(at.RATE_NOW + at.FOLLOWED_SQUARE), work(at.RATE_NOW + at.DRIVE_MOMENT)},
     ),
 }
 # rows that an effect shares with another: not its own marker

@@ -65,7 +65,7 @@ def state_after(scene: Scene, tableau: Tableau, steps: int) -> np.ndarray:
     assert out.attempts == steps
     n = problem.coordinates
     return np.r_[
-        out.coordinates(n), out.velocities(n), out.mean_gap, out.drive_work, out.dissipated
+        out.coordinates(n), out.velocities(n), out.mean_gap[:2], out.drive_work, out.dissipated
     ]
 
 
