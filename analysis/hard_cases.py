@@ -146,7 +146,11 @@ def closed_form(scene: Scene) -> Run:
     outcome = np.zeros(1, OUTCOME)[0]
     for name in OUTCOME.names:
         if name in response:
-            outcome[name] = response[name].values
+            value = response[name].values
+            if value.ndim:  # of joints
+                outcome[name][: len(value)] = value
+            else:
+                outcome[name] = value
     size = max(response.kinetic_energy.max(), np.abs(np.diff(response.driving_work)).sum())
     residual = float(np.abs(response.energy_residual).max() / size)
     return Run(outcome, residual, 0.0, time.perf_counter() - began)

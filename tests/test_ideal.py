@@ -72,7 +72,7 @@ def test_reactions_equal_the_textbook():
 def test_reactions_equal_the_multipliers_of_the_dense_model(effects):
     """All bodies with mass, gravity, load and guide friction."""
     seen, par = response(effects, ANGLES[:240:7])
-    mech = dense_model(effects, par, np.ones(4))
+    mech = dense_model(effects, par, np.ones(2 * at.MAX_JOINTS))
     expected = []
     for phi in ANGLES[:240:7]:
         q = assembled(mech, phi, ZERO, ZERO)
@@ -119,7 +119,7 @@ def test_a_torque_driven_crank_gets_its_torque_back():
     effects = FULL | {"torque"}
     rng = np.random.default_rng(8)
     par = row_of_parameters(effects, rng)
-    mech = dense_model(effects, par, np.ones(4))
+    mech = dense_model(effects, par, np.ones(2 * at.MAX_JOINTS))
     for phi in rng.uniform(0, at.TURN, 10):
         q = assembled(mech, phi, ZERO, ZERO)
         wanted = np.zeros(9)

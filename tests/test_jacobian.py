@@ -43,7 +43,7 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     m = new_memory(1)[0]
     rows = m[: mem.JACOBIAN].reshape(-1, mem.LANES)
     for bank in (rows[: mem.SECOND], rows[mem.SECOND : 2 * mem.SECOND]):
-        bank[mem.PAR :] = par[0][:, None]
+        bank[mem.PAR : mem.PAR + len(par[0])] = par[0][:, None]
         bank[at.STAGE_TIME] = 1e-4
     rows[at.QS : at.QS + n], rows[at.VS : at.VS + n] = q[:, None], v[:, None]
     settings = problem.settings()

@@ -119,7 +119,9 @@ def dense_model(effects, par, contacts, feedback=False):
         (("o12", at.JOINT_12, "crank_rod"), ("o23", at.JOINT_23, "rod_slider"))
     ):
         if on(flag):
-            joints[name] = joint_of(effects, par, base, contacts[k], 1 / contacts[2 + k])
+            joints[name] = joint_of(
+                effects, par, base, contacts[k], 1 / contacts[at.MAX_JOINTS + k]
+            )
     return Dense(
         CRANK,
         ROD,
@@ -171,7 +173,10 @@ def cases(rng, effects, count=25):
     """Random states of a set of effects with the model that describes each."""
     par = row_of_parameters(effects, rng)
     for _ in range(count):
-        contacts = np.array([*rng.integers(0, 2, 2), *rng.uniform(0.3, 3.0, 2)], float)
+        contacts = np.zeros((2, at.MAX_JOINTS))
+        contacts[0, :2] = rng.integers(0, 2, 2)
+        contacts[1, :2] = rng.uniform(0.3, 3.0, 2)
+        contacts = contacts.ravel()
         mech = dense_model(effects, par, contacts)
         yield par, contacts, mech, *random_state(mech, rng, par)
 
@@ -273,7 +278,7 @@ def test_constraint_violation_is_the_largest_constraint():
     rng = np.random.default_rng(6)
     for names in TOPOLOGIES.values():
         par = row_of_parameters(names, rng)
-        mech = dense_model(names, par, np.ones(4))
+        mech = dense_model(names, par, np.ones(2 * at.MAX_JOINTS))
         q = random_state(mech, rng, par)[0] + 1e-6 * rng.normal(size=9)
         rows = np.delete(mech.constraints(q, q[PHI] / SPEED), 4)
         rows[3] *= ROD["length"]
