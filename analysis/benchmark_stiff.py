@@ -87,7 +87,7 @@ def impacts(given: Setup, row: int) -> list[tuple[float, Array]]:
     while lanes.pending:
         lanes.advance(10.0)
     rows = lanes.take_record()
-    inverse = given.start[row].inverse_impact.copy()
+    inverse = given.start[row].inverse_impact[:2].copy()
     pieces = [(0.0, inverse)]
     for after in rows[1:]:
         new = (after[rec.CONTACTS : rec.CONTACTS + 2] == 1.0) & (
@@ -136,12 +136,12 @@ def prepare(name: str, revolutions: int, rtols: Array) -> Case:
 @cache
 def mechanics(latched: bool):
     """The plain loop's right-hand side for LSODA, compiled; 1/d'_0 of both joints follow the parameters."""
-    size = at.PARAMETERS + 2
+    size = at.OWN + 2
 
     @njit(error_model="numpy", fastmath=FASTMATH)
     def rates(t, y, dy, p):
         gaps = np.empty(4)
-        motion(t, y, dy, p, latched, np.ones(2, np.bool_), p[at.PARAMETERS :], gaps)
+        motion(t, y, dy, p, latched, np.ones(2, np.bool_), p[at.OWN :], gaps)
 
     @cfunc(lsoda_sig)
     def right_hand_side(t, u, du, p):

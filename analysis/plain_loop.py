@@ -191,7 +191,7 @@ def simulate_all(par, state, rtol, atol, transient, averaged, latched, floor):
     out = np.full((len(par), 6), np.nan)
     for m in range(len(par)):
         start = np.zeros(STATES)
-        start[:4], start[4:8] = state[m, :4], state[m, 9:13]
+        start[:4], start[4:8] = state[m, :4], state[m, at.MAX_COORDINATES :][:4]
         simulate(
             par[m], start, np.zeros(2, np.bool_), np.zeros(2), rtol, atol, transient, averaged,
             latched, floor, out[m],

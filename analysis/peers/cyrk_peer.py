@@ -11,7 +11,7 @@ from peers.system import SLIDER, STATES, end_time, right_hand_side, start, toler
 
 
 def _right_hand_side(dy, t, y, args):
-    right_hand_side(t, carray(y, (STATES,)), carray(dy, (STATES,)), carray(args, (at.PARAMETERS,)))
+    right_hand_side(t, carray(y, (STATES,)), carray(dy, (STATES,)), carray(args, (at.OWN,)))
 
 
 _ADDRESS = nb_diffeq_addr(_right_hand_side)

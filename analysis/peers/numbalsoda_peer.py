@@ -13,7 +13,7 @@ from peers.system import SLIDER, STATES, end_time, right_hand_side, start
 
 @cfunc(lsoda_sig)
 def _right_hand_side(t, u, du, p):
-    right_hand_side(t, carray(u, (STATES,)), carray(du, (STATES,)), carray(p, (at.PARAMETERS,)))
+    right_hand_side(t, carray(u, (STATES,)), carray(du, (STATES,)), carray(p, (at.OWN,)))
 
 
 def _solver(method: Callable) -> Callable[[Setup, int], float]:
