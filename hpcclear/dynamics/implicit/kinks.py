@@ -105,21 +105,34 @@ def kink_functions(effects, m):
 
 
 @scalar_function
+@unrolled
 def kinks_of_start(effects, m):
     """Keep the functions at the last state evaluated, where a step begins; True where one has changed its sign, or come or
     gone, since the start kept before."""
     kink_functions(effects, m)
-    changed = False
-    for f in range(mem.ALL_KINKS):
-        before = m[mem.START_KINKS + f]
-        now = m[(mem.KINKS + f) * LANES + END]
-        m[mem.START_KINKS + f] = now
-        same = before * now > 0.0 or (before == 0.0 and now == 0.0)
-        changed = changed or not same
+    changed = 0.0
+    for joint in written_out(at.JOINTS):
+        flag = getattr(effects.open, joint.flag)
+        changed = max(changed, kept_kinks(flag, m, mem.KINKS_A_JOINT * (joint.active - at.ACTIVE)))
+    return changed > 0.0
+
+
+@scalar_function
+def kept_kinks(flag, m, first):
+    """`kinks_of_start` of an open joint, whose functions are those from `first` on; 1.0 where one has changed."""
+    changed = 0.0
+    if flag is not None:
+        for f in range(first, first + mem.KINKS_A_JOINT):
+            before = m[mem.START_KINKS + f]
+            now = m[(mem.KINKS + f) * LANES + END]
+            m[mem.START_KINKS + f] = now
+            same = before * now > 0.0 or (before == 0.0 and now == 0.0)
+            changed = changed if same else 1.0
     return changed
 
 
 @scalar_function
+@unrolled
 def kink_fraction(effects, m, beyond):
     """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none.
 
@@ -127,11 +140,23 @@ def kink_fraction(effects, m, beyond):
     """
     kink_functions(effects, m)
     first = 2.0
-    for f in range(mem.ALL_KINKS):
-        start = m[mem.START_KINKS + f]
-        row = (mem.KINKS + f) * LANES
-        if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
-            first = min(first, crossing(m, start, row, beyond))
+    for joint in written_out(at.JOINTS):
+        flag = getattr(effects.open, joint.flag)
+        kinks = mem.KINKS_A_JOINT * (joint.active - at.ACTIVE)
+        first = min(first, first_kink(flag, m, kinks, beyond))
+    return first
+
+
+@scalar_function
+def first_kink(flag, m, kinks, beyond):
+    """`kink_fraction` of an open joint, whose functions are those from `kinks` on."""
+    first = 2.0
+    if flag is not None:
+        for f in range(kinks, kinks + mem.KINKS_A_JOINT):
+            start = m[mem.START_KINKS + f]
+            row = (mem.KINKS + f) * LANES
+            if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
+                first = min(first, crossing(m, start, row, beyond))
     return first
 
 

@@ -8,6 +8,7 @@ step would.
 import math
 
 from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank, fill
@@ -128,15 +129,24 @@ def take_over(n, lane, W, par, m, settings):
 
 
 @scalar_function
+@unrolled
+def fetch_contacts(effects, lane, W, work, m):
+    """Contact states of the open joints, in both banks."""
+    for joint in written_out(at.JOINTS):
+        if getattr(effects.open, joint.flag) is not None:
+            for row in (joint.active, joint.inverse_impact):
+                fill(m, row, work[row * W + lane])
+                fill(m, mem.SECOND + row, work[row * W + lane])
+
+
+@scalar_function
 def fetch(effects, motion, n, lane, W, block, m, tables):
     """Bring the start of the step into the lane's memory."""
     work, stages = block.work, block.stages
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
     m[mem.STEP] = work[at.STEP * W + lane]
-    for row in range(at.ACTIVE, at.ACTIVE + 2 * at.MAX_JOINTS):  # and the impact speeds
-        fill(m, row, work[row * W + lane])
-        fill(m, mem.SECOND + row, work[row * W + lane])
+    fetch_contacts(effects, lane, W, work, m)
     for k in range(n):
         m[mem.Q + k] = work[(at.Q + k) * W + lane]
         m[mem.V + k] = work[(at.V + k) * W + lane]
