@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
@@ -275,6 +276,13 @@ def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
         assert code == 0, output
         files.append(out.read_bytes())
     assert files[0] == files[1]
+
+
+def test_a_sample_that_does_not_close_has_failed_and_the_others_go_on():
+    found = evaluate(rocker(), {"mechanism.bodies.coupler.length": [0.12, 1.0, 0.121]})
+    assert list(found["status"].to_numpy()) == [0, Status.NOT_FINITE, 0]
+    assert np.isnan(found["objective"][1])
+    assert np.isfinite(found["objective"][[0, 2]]).all()
 
 
 def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():

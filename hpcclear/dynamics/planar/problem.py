@@ -174,23 +174,28 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
 def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
     """Start of each sample: put together with journals at their `start_eccentricity`, velocities of ideal joints.
 
+    A sample that does not close starts at NaN, and so ends as one that failed.
+
     Raises
     ------
     InputError
-        If a sample does not close.
+        If the scene itself does not close.
     """
     linkage = linkage_of(scene)
     trees = linkage.forest
     n = len(trees.coordinates)
     start = Start.at_rest(len(par))
     if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
-        shared = put_together(mechanism_of(tables_of(scene)))
-        start.coordinates(n)[:], start.velocities(n)[:] = coordinates(trees, shared)
+        made: Any = coordinates(trees, put_together(mechanism_of(tables_of(scene))))
+        start.coordinates(n)[:], start.velocities(n)[:] = made
     else:
         for row in range(len(par)):
-            one = scene_of(scene, points, row)
-            made = put_together(mechanism_of(tables_of(one)))
-            start.coordinates(n)[row], start.velocities(n)[row] = coordinates(trees, made)
+            try:
+                one = scene_of(scene, points, row)
+                made = coordinates(trees, put_together(mechanism_of(tables_of(one))))
+            except InputError:
+                made = np.full((2, n), np.nan)
+            start.coordinates(n)[row], start.velocities(n)[row] = made
     _start_contacts(scene, linkage, par, start)
     return start
 
