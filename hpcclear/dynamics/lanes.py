@@ -13,8 +13,17 @@ from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import make_stepper
 from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.memory import LANES
+from hpcclear.dynamics.implicit.stiff import implicit_code
 from hpcclear.dynamics.problem import Problem
-from hpcclear.dynamics.stepping.settings import COUNTERS, FINISHED, NEXT_SLOT, RECORDED, SLOTS
+from hpcclear.dynamics.stepping.settings import (
+    COUNTERS,
+    FINISHED,
+    NEXT_SLOT,
+    RECORDED,
+    SLOTS,
+    numbers_of,
+)
+from hpcclear.dynamics.stepping.special import special_code
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 NO_LIMIT = 1 << 40  # of block steps in a call
@@ -43,18 +52,12 @@ class Lanes:
         self.problem = problem
         self.width = width
         self.record = record
-        self._method = at.Method(
-            problem.settings().rows,
-            problem.tableau.packed(),
-            problem.tables,
-            at.measures_of(problem.effects),
-        )
-        bank = np.zeros(at.BANK * width)
-        bank[at.WORK * width :] = 1.0  # parameters: a resting lane divides by them
+        bank = np.zeros((at.STAGES + tab.STAGES * at.MAX_COORDINATES) * width)
+        bank[at.WORK * width : at.STAGES * width] = 1.0  # parameters: a resting lane divides by them
         self._block = at.Block(
             work=bank[: at.WORK * width],
-            stages=np.zeros(tab.STAGES * n * width),
-            par=bank[at.WORK * width :],
+            stages=bank[at.STAGES * width :],
+            par=bank[at.WORK * width : at.STAGES * width],
             book=np.zeros(at.BOOK * width),
         )
         implicit = problem.implicit != "never"
@@ -63,14 +66,27 @@ class Lanes:
             self._memory = lobatto.new_memory()
         at_once = self._memory is not None  # evaluations of one lane, eight side by side
         effects = problem.effects._replace(sliding=1 if at_once else None)
-        self._motion = problem.motion(effects, width).address
-        self._bank = problem.motion(effects, LANES).address if at_once else 0
         self._rules = at.rules_of(effects)
-        joints, recorded = at.open_of(effects), record is not None
+        alone = implicit and not problem.collocation
+        self._addresses = (
+            problem.motion(effects, width).address,
+            special_code().address,
+            implicit_code(n).address if alone else 0,
+        )
+        of_eight = problem.motion(effects, LANES).address if at_once else 0
+        recorded = record is not None
         self._step = (
-            make_collocation_stepper(n, joints, recorded=recorded)
+            make_collocation_stepper(n, recorded=recorded)
             if problem.collocation
-            else make_stepper(width, n, joints, recorded=recorded, implicit=implicit)
+            else make_stepper(width, recorded=recorded, implicit=implicit)
+        )
+        measures = at.measures_of(problem.effects)
+        self._method = at.Method(
+            problem.settings().rows,
+            problem.tableau.packed(),
+            problem.tables,
+            measures,
+            numbers_of(self._rules, width, n, len(measures), of_eight),
         )
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
@@ -180,9 +196,10 @@ class Lanes:
 
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running."""
-        arrays = (self._motion, self._bank, self._rules, self._block, self._queue, self._method)
+        arrays = (self._rules, self._block, self._queue, self._method)
         some = (one for one in (self.record, self._memory) if one is not None)
-        going = self._step(*arrays, *some, budget)
+        count = () if self.problem.collocation else (self.problem.coordinates,)
+        going = self._step(*count, *self._addresses, *arrays, *some, budget)
         return bool(going)
 
     def collect(self) -> tuple[Integers, Outcome, Array]:

@@ -111,8 +111,14 @@ OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
 PARAMETERS = OWN + 192
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
-# three of each joint: gap, normal force, rate of the gap
-(GAP_12, FORCE_12, RATE_12, GAP_23, FORCE_23, RATE_23) = range(6)
+# of each joint: its gap, its normal force and the rate of its gap, rows of all joints side by side like all that joints have:
+# so the compiler knows the distances between one joint's rows, whichever it is
+GAP = 0
+FORCE = GAP + MAX_JOINTS
+GAP_RATE = FORCE + MAX_JOINTS
+(GAP_12, GAP_23), (FORCE_12, FORCE_23), (RATE_12, RATE_23) = (
+    (first, first + 1) for first in (GAP, FORCE, GAP_RATE)
+)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
@@ -134,9 +140,9 @@ class Integrated(NamedTuple):
 
 _PLACES = range(MAX_JOINTS)
 GAPS = tuple(
-    Integrated(3 * k, f"joint_{k}", JOINT_BLOCKS + JOINT_ROWS * k + CLEARANCE) for k in _PLACES
+    Integrated(GAP + k, f"joint_{k}", JOINT_BLOCKS + JOINT_ROWS * k + CLEARANCE) for k in _PLACES
 )
-_FORCES = tuple(Integrated(3 * k + 1, "responses") for k in _PLACES)
+_FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
 MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
     Integrated(ABS_DRIVE_POWER, "ledger"),
@@ -218,6 +224,9 @@ WORK = ENDED + MAX_JOINTS
 BANK = WORK + PARAMETERS
 """Rows of what a motion reads and writes: those of `work`, then the parameters."""
 
+STAGES = BANK
+"""First row of the explicit method's stage accelerations, behind them: row STAGES + s MAX_COORDINATES + k."""
+
 # ---- tabulated curves, one behind the other -----------------------------------------------------
 CELLS = 2048  # cubic cells over one turn, 4 coefficients each
 TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
@@ -295,7 +304,7 @@ class Joint(NamedTuple):
 
 JOINTS = tuple(
     Joint(
-        JOINT_BLOCKS + JOINT_ROWS * k, 3 * k, 3 * k + 1, 3 * k + 2, FRICTIONS + k, SLIDINGS + k,
+        JOINT_BLOCKS + JOINT_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
         ACTIVE + k, INVERSE_IMPACT + k, PEAK + k, DEEPEST + k, ENDED + k, LATCHED + k, f"joint_{k}",
     )
     for k in _PLACES
@@ -306,7 +315,7 @@ O12, O23 = JOINTS[:2]
 class Block(NamedTuple):
     """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books.
 
-    `work` and `par` are neighbours in memory, as a motion asks for."""
+    `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
 
     work: Any
     stages: Any
@@ -325,12 +334,14 @@ class Queue(NamedTuple):
 
 
 class Method(NamedTuple):
-    """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured."""
+    """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
+    which a stepper asks for what is compiled apart from it (`stepping.special`)."""
 
     settings: Any
     weights: Any
     tables: Any  # (TABLES,)
     measures: Any  # as `measures_of`
+    numbers: Any
 
 
 class Rules(NamedTuple):
@@ -343,6 +354,8 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
+    begin: Any  # places of open joints, from `begin` on
+    end: Any  # and before `end`
 
 
 def rules_of(effects: Effects) -> Rules:
@@ -350,12 +363,12 @@ def rules_of(effects: Effects) -> Rules:
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
     flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses)
-    return Rules(*(int(flag is not None) for flag in flags))
+    places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
+    return Rules(*(int(flag is not None) for flag in flags), places[0], places[-1] + 1)
 
 
 class Stepped(NamedTuple):
-    """What the functions of a stepper read: which joints are open (known when it is compiled), rules, measures."""
+    """What the functions of a stepper read: rules and measures."""
 
-    open: Any
     rules: Rules
     measures: Any

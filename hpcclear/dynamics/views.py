@@ -218,8 +218,8 @@ class Rates(View):
 
     size = at.RATES
 
-    gap = _of_joints(at.GAP_12, 3)  # m
-    force = _of_joints(at.FORCE_12, 3)  # N, normal
+    gap = _of_joints(at.GAP)  # m
+    force = _of_joints(at.FORCE)  # N, normal
     friction = _of_joints(at.FRICTIONS)  # N
     drive_moment = Column(at.DRIVE_MOMENT)  # N m
     powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load

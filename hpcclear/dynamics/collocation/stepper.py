@@ -22,8 +22,8 @@ from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, PARAMETER_ROWS, RTOL
-from hpcclear.dynamics.stepping.stops import integrate_gap, turn_of_free_crank, wrap_crank
+from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, MOTION, PARAMETER_ROWS, RTOL
+from hpcclear.dynamics.stepping.stops import integrate_gap, stop_free_crank, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
 EXPONENT = (
@@ -120,22 +120,18 @@ def sweep(motion, work, m, tables, n):
 
 
 @lane_function
-def gap_tail(flag, work, m, gap, clearance, row, rtol):
-    """Squares of the last two coefficients of a gap and of the two before, scaled as its integral's error is."""
-    if flag is not None:
-        lob.coefficients_of(m, at.RATE_NOW + gap, work[at.RATE_OLD + gap], row)
-        scale = work[at.STEP] / (
-            rtol * m[(lob.PAR + clearance) * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES]
-        )
-        last, before = lob.tail(m, row)
-        weight = m[(lob.PAR + at.STRICTNESS) * STAGES] * scale * scale
-        return weight * last, weight * before
-    else:
-        return 0.0, 0.0
+def gap_tail(work, m, p, rtol):
+    """Squares of the last two coefficients of joint p's gap and of the two before, scaled as its integral's error is."""
+    row = lob.GAP_COEFFICIENT + p
+    lob.coefficients_of(m, at.RATE_NOW + at.GAP + p, work[at.RATE_OLD + at.GAP + p], row)
+    clearance = lob.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
+    scale = work[at.STEP] / (rtol * m[clearance * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
+    last, before = lob.tail(m, row)
+    weight = m[(lob.PAR + at.STRICTNESS) * STAGES] * scale * scale
+    return weight * last, weight * before
 
 
 @lane_function
-@unrolled
 def error_of(effects, work, m, rtol, n):
     """Square of the scaled error of a converged step.
 
@@ -148,33 +144,28 @@ def error_of(effects, work, m, rtol, n):
         last, before = lob.tail(m, lob.COEFFICIENT + k)
         high += m[lob.WEIGHT * STAGES + k] * last
         low += m[lob.WEIGHT * STAGES + k] * before
-    row = lob.GAP_COEFFICIENT
-    for gap in written_out(at.GAPS):
-        flag = getattr(effects.open, gap.asked_by)
-        last, before = gap_tail(flag, work, m, gap.rate, gap.clearance, row, rtol)
+    for p in range(effects.rules.begin, effects.rules.end):
+        last, before = gap_tail(work, m, p, rtol)
         high += last
         low += before
-        row += 1
     return high * min(high / (low + 1e-300), 1.0)
 
 
 @lane_function
-def quadrature(flag, work, m, rate):
+def quadrature(work, m, rate):
     """Integral of a rate over the step, over h."""
-    if flag is not None:
-        row = lob.row_of(m, at.RATE_NOW + rate)
-        start = work[at.RATE_OLD + rate]
-        work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, start, row, STAGES - 1)
+    row = lob.row_of(m, at.RATE_NOW + rate)
+    start = work[at.RATE_OLD + rate]
+    work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, start, row, STAGES - 1)
 
 
 @lane_function
-@unrolled
 def quadratures(effects, work, m):
     """Integrals of all that is integrated over the step, over h."""
-    for gap in written_out(at.GAPS):
-        quadrature(getattr(effects.open, gap.asked_by), work, m, gap.rate)
+    for p in range(effects.rules.begin, effects.rules.end):
+        quadrature(work, m, at.GAP + p)
     for r in range(len(effects.measures)):
-        quadrature(1, work, m, effects.measures[r])
+        quadrature(work, m, effects.measures[r])
 
 
 @lane_function
@@ -194,16 +185,14 @@ def end_of_step(work, m, n):
 
 
 @lane_function
-def peaks_inside(flag, work, m, joint):
-    """Extremes of a joint at the nodes of an accepted step, its end left to `commit`."""
-    if flag is not None and work[at.AVERAGING] == 1.0:
+def peaks_inside(work, m, p):
+    """Extremes of joint p at the nodes of an accepted step, its end left to `commit`."""
+    if work[at.AVERAGING] == 1.0:
         for i in range(STAGES):
-            force, depth = (
-                m[(at.RATE_NOW + joint.force) * STAGES + i],
-                m[(at.RATE_NOW + joint.gap) * STAGES + i],
-            )
-            work[joint.peak] = max(work[joint.peak], force)
-            work[joint.deepest] = max(work[joint.deepest], depth)
+            force = m[(at.RATE_NOW + at.FORCE + p) * STAGES + i]
+            depth = m[(at.RATE_NOW + at.GAP + p) * STAGES + i]
+            work[at.PEAK + p] = max(work[at.PEAK + p], force)
+            work[at.DEEPEST + p] = max(work[at.DEEPEST + p], depth)
 
 
 @lane_function
@@ -260,22 +249,22 @@ def try_step(effects, motion, block, m, tables, settings, n):
 
 
 @lane_function
-@unrolled
 def judge_end(effects, work, stages, m, settings, n):
     """What an accepted step shows of contacts, turns and integrals; it may yet be cut. Returns OK or why the lane ends."""
     status = OK
+    rules = effects.rules
     if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
         status = failure(0, 1, n, work, stages, settings)
     if status == OK and work[at.ACCEPT] == 1.0:
         end_of_step(work, m, n)
         quadratures(effects, work, m)
-        stop_at_contacts(effects, work, m, settings)
+        stop_at_contacts(rules, work, m, settings)
+        if work[at.ACCEPT] == 1.0 and rules.free:
+            status = stop_free_crank(0, 1, work, settings, n - 1)
         if work[at.ACCEPT] == 1.0:
-            status = turn_of_free_crank(effects.rules.free, 0, 1, work, settings, n - 1)
-        if work[at.ACCEPT] == 1.0:
-            for joint in written_out(at.JOINTS):
-                integrate_gap(getattr(effects.open, joint.flag), 0, 1, work, joint)
-                peaks_inside(getattr(effects.open, joint.flag), work, m, joint)
+            for p in range(rules.begin, rules.end):
+                integrate_gap(0, 1, work, p)
+                peaks_inside(work, m, p)
     return status
 
 
@@ -287,9 +276,9 @@ def next_sample(n, block, queue, settings, m):
 
 
 @lane_function
-def advance(joints, n, motion, bank, rules, block, queue, method, record, m, budget):
-    """Take at most `budget` steps. Returns whether the lane holds a sample. The motion of one lane is not asked for."""
-    effects = at.Stepped(joints, rules, method.measures)
+def advance(n, motion, special, implicit, rules, block, queue, method, record, m, budget):
+    """Take at most `budget` steps. Returns whether the lane holds a sample. None of the addresses is asked for."""
+    effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book
     if work[at.RUNNING] == 0.0:
@@ -297,7 +286,7 @@ def advance(joints, n, motion, bank, rules, block, queue, method, record, m, bud
     full = False
     while budget > 0 and work[at.RUNNING] > 0.0 and not full:
         budget -= 1
-        try_step(effects, bank, block, m, tables, settings, n)
+        try_step(effects, method.numbers[MOTION], block, m, tables, settings, n)
         status = judge_end(effects, work, stages, m, settings, n)
         goes_on = status == OK
         if goes_on and work[at.ACCEPT] == 1.0:
@@ -307,7 +296,8 @@ def advance(joints, n, motion, bank, rules, block, queue, method, record, m, bud
             full = no_room(record, counters)
             after_step(work, m)
             if ended > 0.0:
-                wrap_crank(effects.rules.turning, 0, 1, work, n - 1, settings)
+                if rules.turning:
+                    wrap_crank(0, 1, work, n - 1, settings)
                 status = end_revolution(0, 1, work, book, settings)
                 goes_on = status == UNFINISHED
         if not goes_on:
@@ -317,10 +307,8 @@ def advance(joints, n, motion, bank, rules, block, queue, method, record, m, bud
 
 
 @cache
-def make_collocation_stepper(
-    n: int, joints: at.Open, *, recorded: bool = False
-) -> Callable[..., Any]:
-    """Return the compiled stepper of one response with n coordinates.
+def make_collocation_stepper(n: int, *, recorded: bool = False) -> Callable[..., Any]:
+    """Return the compiled stepper of one response with n coordinates, whatever joints are open.
 
     Its arguments are those of `stepper.make_stepper` with an implicit method, so that either serves `lanes.Lanes`; the
     tableau is not read, and `memory` is what `lobatto.new_memory` makes.
@@ -332,7 +320,7 @@ def make_collocation_stepper(
     """
     if not 1 <= n <= lob.MOST_COORDINATES:
         raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"joints": joints, "n": n}
+    known: dict[str, Any] = {"n": n}
     if not recorded:
         known["record"] = None
     text = one_text(advance, "collocation", **known)

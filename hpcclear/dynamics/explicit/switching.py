@@ -6,8 +6,8 @@ All that a scene which may be stiff has to pay for lanes that are not.
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
-from hpcclear.dynamics.explicit.combine import group_of
-from hpcclear.dynamics.stepping.control import count_up
+from hpcclear.dynamics.explicit.combine import stage_row
+from hpcclear.dynamics.stepping.control import coordinate, count_up
 from hpcclear.dynamics.stepping.settings import IMPLICIT
 
 CALM_STEPS = 6.0  # so many in a row send a lane back
@@ -48,12 +48,12 @@ def edge_excess(step, k, i, W):
     the step hides its slope from this estimate; but then the acceleration changes far more between these two stages
     than over the whole step, which on a smooth path it never does.
     """
-    stages, n = step.stages, step.n
+    stages = step.stages
     new = step.work[(at.ACC + k) * W + i]
-    change = new - stages[((tab.STAGES - 2) * n + k) * W + i]
+    change = new - stages[stage_row(tab.STAGES - 2, k) * W + i]
     dv = 0.0  # without a factor h
     for j in range(tab.STAGES - 1):
-        dv += step.weights[tab.LAST + j] * stages[(j * n + k) * W + i]
+        dv += step.weights[tab.LAST + j] * stages[stage_row(j, k) * W + i]
     scale = 1.0 / step.atol[at.MAX_COORDINATES + k]
     over_step = CHATTER * (abs(new - stages[k * W + i]) + 1e-8 * abs(new))
     least = min(EDGE * abs(dv), over_step) * scale
@@ -62,28 +62,17 @@ def edge_excess(step, k, i, W):
 
 
 @lane_function
-def excess_part(step, first, count, W):
-    """Excess at the edge of stability of some coordinates, added to that of those before."""
-    work = step.work
-    for i in range(W):
-        excess = -1e-300 if first == 0 else work[at.EDGE_EXCESS * W + i]
-        for k in range(first, first + count):
-            excess += edge_excess(step, k, i, W)
-        work[at.EDGE_EXCESS * W + i] = excess
-
-
-@lane_function
 def sense_stiffness(memory, step, W):
     """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
     decaying count of rejections."""
     if memory is not None:
-        work, n = step.work, step.n
-        count = group_of(n)
-        whole = n - n % count
-        for first in range(0, whole, count):
-            excess_part(step, first, count, W)
-        if whole < n:
-            excess_part(step, whole, n % count, W)
+        work = step.work
+        for i in range(W):
+            work[at.EDGE_EXCESS * W + i] = -1e-300
+        for number in range(step.n):
+            k = coordinate(number)
+            for i in range(W):
+                work[at.EDGE_EXCESS * W + i] += edge_excess(step, k, i, W)
         for i in range(W):
             at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
             score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5

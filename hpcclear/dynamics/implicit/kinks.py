@@ -6,7 +6,6 @@ solution. Each kink is the zero of a smooth function: damping factor, sliding sp
 """
 
 from hpcclear.base.jit import lane_function, scalar_function
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.memory import END, LANES
@@ -29,134 +28,121 @@ LEAST_CUT = 0.02
 
 
 @lane_function
-def damping_part(fixed, latched, m, joint, rate, i):
+def entry(m, p, entry, i):
+    """A parameter of joint p."""
+    return m[(mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry) * LANES + i]
+
+
+@lane_function
+def damping_part(rules, m, p, rate, i):
     """Damping factor of the normal force; 1 without damping or contact."""
-    damping = m[(mem.PAR + joint.block + at.DAMPING) * LANES + i]
-    if latched:
-        return 1.0 + damping * rate * m[joint.inverse_impact * LANES + i]
-    elif fixed:
+    damping = entry(m, p, at.DAMPING, i)
+    if rules.latched:
+        return 1.0 + damping * rate * m[(at.INVERSE_IMPACT + p) * LANES + i]
+    elif rules.fixed:
         return 1.0 + damping * rate
     else:
         return 1.0
 
 
 @lane_function
-def in_contact(latched, m, gap, active, i):
+def in_contact(rules, m, gap, p, i):
     """Whether the joint transmits a force but for its damping."""
-    if latched:
-        return gap > 0.0 and m[active * LANES + i] == 1.0
+    if rules.latched:
+        return gap > 0.0 and m[(at.ACTIVE + p) * LANES + i] == 1.0
     else:
         return gap > 0.0
 
 
 @lane_function
-def impact_ahead(latched, m, active, i):
+def impact_ahead(rules, m, p, i):
     """Whether a change of the gap's sign is the stepper's to find: an impact to be located."""
-    if latched:
-        return m[active * LANES + i] == 0.0
+    if rules.latched:
+        return m[(at.ACTIVE + p) * LANES + i] == 0.0
     else:
         return False
 
 
 @lane_function
-def ramp_sides(coulomb, ambrosio, m, joint, sliding, i):
+def ramp_sides(rules, m, p, sliding, i):
     """Functions that vanish where friction's ramp begins and ends."""
-    inverse_ramp = m[(mem.PAR + joint.block + at.INVERSE_RAMP) * LANES + i]
-    if coulomb:
+    inverse_ramp = entry(m, p, at.INVERSE_RAMP, i)
+    if rules.coulomb:
         return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
-    elif ambrosio:
-        ramp = (
-            abs(sliding) - m[(mem.PAR + joint.block + at.DEAD_SPEED) * LANES + i]
-        ) * inverse_ramp
+    elif rules.ambrosio:
+        ramp = (abs(sliding) - entry(m, p, at.DEAD_SPEED, i)) * inverse_ramp
         return ramp, ramp - 1.0
     else:
         return 0.0, 0.0
 
 
-@lane_function
-def kinks_of_joint(flag, effects, latched, m, joint, row, i):
-    """The four functions of a joint, from `row` on, at the state in lane i; 0 where no kink can be felt."""
-    if flag is not None:
-        gap = m[(at.RATE_NOW + joint.gap) * LANES + i]
-        rate = m[(at.RATE_NOW + joint.rate) * LANES + i]
-        sliding = m[(at.RATE_NOW + joint.sliding) * LANES + i]
-        factor = damping_part(effects.rules.fixed, latched, m, joint, rate, i)
-        touches = in_contact(latched, m, gap, joint.active, i)
-        pushes = touches and factor > 0.0
-        low, high = ramp_sides(effects.rules.coulomb, effects.rules.ambrosio, m, joint, sliding, i)
-        free = impact_ahead(latched, m, joint.active, i)
-        unit = GAP_UNIT * m[(mem.PAR + joint.block + at.CLEARANCE) * LANES + i]
-        m[row * LANES + i] = factor if touches else 0.0
-        m[(row + 1) * LANES + i] = low if pushes else 0.0
-        m[(row + 2) * LANES + i] = high if pushes else 0.0
-        m[(row + 3) * LANES + i] = 0.0 if free else gap / unit
+@scalar_function
+def kinks_of_joint(rules, m, p, i):
+    """The four functions of joint p at the state in lane i; 0 where no kink can be felt."""
+    row = mem.KINKS + mem.KINKS_A_JOINT * p
+    gap = m[(at.RATE_NOW + at.GAP + p) * LANES + i]
+    rate = m[(at.RATE_NOW + at.GAP_RATE + p) * LANES + i]
+    sliding = m[(at.RATE_NOW + at.SLIDINGS + p) * LANES + i]
+    factor = damping_part(rules, m, p, rate, i)
+    touches = in_contact(rules, m, gap, p, i)
+    pushes = touches and factor > 0.0
+    low, high = ramp_sides(rules, m, p, sliding, i)
+    free = impact_ahead(rules, m, p, i)
+    unit = GAP_UNIT * entry(m, p, at.CLEARANCE, i)
+    m[row * LANES + i] = factor if touches else 0.0
+    m[(row + 1) * LANES + i] = low if pushes else 0.0
+    m[(row + 2) * LANES + i] = high if pushes else 0.0
+    m[(row + 3) * LANES + i] = 0.0 if free else gap / unit
 
 
 @scalar_function
-@unrolled
-def kink_functions(effects, m):
+def kink_functions(rules, m):
     """Kink functions of all open joints at the states of the first bank, as evaluated."""
-    for i in range(LANES):
-        row = mem.KINKS
-        for joint in written_out(at.JOINTS):
-            flag = getattr(effects.open, joint.flag)
-            kinks_of_joint(flag, effects, effects.rules.latched, m, joint, row, i)
-            row += mem.KINKS_A_JOINT
+    for p in range(rules.begin, rules.end):
+        for i in range(LANES):
+            kinks_of_joint(rules, m, p, i)
+
+
+@lane_function
+def first_function(rules):
+    """The first of the open joints' functions."""
+    return mem.KINKS_A_JOINT * rules.begin
+
+
+@lane_function
+def after_functions(rules):
+    """What comes after the last of them."""
+    return mem.KINKS_A_JOINT * rules.end
 
 
 @scalar_function
-@unrolled
-def kinks_of_start(effects, m):
+def kinks_of_start(rules, m):
     """Keep the functions at the last state evaluated, where a step begins; True where one has changed its sign, or come or
     gone, since the start kept before."""
-    kink_functions(effects, m)
-    changed = 0.0
-    for joint in written_out(at.JOINTS):
-        flag = getattr(effects.open, joint.flag)
-        changed = max(changed, kept_kinks(flag, m, mem.KINKS_A_JOINT * (joint.active - at.ACTIVE)))
-    return changed > 0.0
-
-
-@scalar_function
-def kept_kinks(flag, m, first):
-    """`kinks_of_start` of an open joint, whose functions are those from `first` on; 1.0 where one has changed."""
-    changed = 0.0
-    if flag is not None:
-        for f in range(first, first + mem.KINKS_A_JOINT):
-            before = m[mem.START_KINKS + f]
-            now = m[(mem.KINKS + f) * LANES + END]
-            m[mem.START_KINKS + f] = now
-            same = before * now > 0.0 or (before == 0.0 and now == 0.0)
-            changed = changed if same else 1.0
+    kink_functions(rules, m)
+    changed = False
+    for f in range(first_function(rules), after_functions(rules)):
+        before = m[mem.START_KINKS + f]
+        now = m[(mem.KINKS + f) * LANES + END]
+        m[mem.START_KINKS + f] = now
+        if not (before * now > 0.0 or (before == 0.0 and now == 0.0)):
+            changed = True
     return changed
 
 
 @scalar_function
-@unrolled
-def kink_fraction(effects, m, beyond):
+def kink_fraction(rules, m, beyond):
     """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none.
 
     `beyond`: how far, in units of the kink's function, a stage must be for it to count.
     """
-    kink_functions(effects, m)
+    kink_functions(rules, m)
     first = 2.0
-    for joint in written_out(at.JOINTS):
-        flag = getattr(effects.open, joint.flag)
-        kinks = mem.KINKS_A_JOINT * (joint.active - at.ACTIVE)
-        first = min(first, first_kink(flag, m, kinks, beyond))
-    return first
-
-
-@scalar_function
-def first_kink(flag, m, kinks, beyond):
-    """`kink_fraction` of an open joint, whose functions are those from `kinks` on."""
-    first = 2.0
-    if flag is not None:
-        for f in range(kinks, kinks + mem.KINKS_A_JOINT):
-            start = m[mem.START_KINKS + f]
-            row = (mem.KINKS + f) * LANES
-            if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
-                first = min(first, crossing(m, start, row, beyond))
+    for f in range(first_function(rules), after_functions(rules)):
+        start = m[mem.START_KINKS + f]
+        row = (mem.KINKS + f) * LANES
+        if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
+            first = min(first, crossing(m, start, row, beyond))
     return first
 
 

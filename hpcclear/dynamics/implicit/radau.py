@@ -327,49 +327,42 @@ def refilter_error(motion, n, m, tables, h):
 
 
 @lane_function
-def gap_error(flag, m, work, gap, clearance, lane, W):
-    """Square of the scaled error of a gap's integral over the step, as for the explicit method."""
-    if flag is not None:
-        error = work[(at.RATE_OLD + gap) * W + lane]
-        for s in range(3):
-            error += ERROR_BY_MATRIX[s] * m[(at.RATE_NOW + gap) * LANES + s]
-        span = m[(mem.PAR + clearance) * LANES] * m[(mem.PAR + at.PERIOD) * LANES]
-        error *= m[mem.STEP] / MU / (m[mem.TOLERANCE] * span)
-        return error * error
-    else:
-        return 0.0
+def gap_error(m, work, p, lane, W):
+    """Square of the scaled error of the integral of joint p's gap over the step, as for the explicit method."""
+    error = work[(at.RATE_OLD + at.GAP + p) * W + lane]
+    for s in range(3):
+        error += ERROR_BY_MATRIX[s] * m[(at.RATE_NOW + at.GAP + p) * LANES + s]
+    clearance = mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
+    span = m[clearance * LANES] * m[(mem.PAR + at.PERIOD) * LANES]
+    error *= m[mem.STEP] / MU / (m[mem.TOLERANCE] * span)
+    return error * error
 
 
-@lane_function
-@unrolled
-def gap_errors(effects, m, work, lane, W):
+@scalar_function
+def gap_errors(rules, m, work, lane, W):
     """Squares of the scaled errors of all gaps' integrals, added."""
     total = 0.0
-    for gap in written_out(at.GAPS):
-        total += gap_error(
-            getattr(effects.open, gap.asked_by), m, work, gap.rate, gap.clearance, lane, W
-        )
+    for p in range(rules.begin, rules.end):
+        total += gap_error(m, work, p, lane, W)
     return total
 
 
 @lane_function
-def mean_of_step(flag, m, work, rate, lane, W):
+def mean_of_step(m, work, rate, lane, W):
     """Mean of a rate over the step."""
-    if flag is not None:
-        total = 0.0
-        for s in range(3):
-            total += MATRIX[2, s] * m[(at.RATE_NOW + rate) * LANES + s]
-        work[(at.RATE_SUM + rate) * W + lane] = total
+    total = 0.0
+    for s in range(3):
+        total += MATRIX[2, s] * m[(at.RATE_NOW + rate) * LANES + s]
+    work[(at.RATE_SUM + rate) * W + lane] = total
 
 
-@lane_function
-@unrolled
+@scalar_function
 def means_of_step(effects, m, work, lane, W):
     """Means of all that is integrated over the step."""
-    for gap in written_out(at.GAPS):
-        mean_of_step(getattr(effects.open, gap.asked_by), m, work, gap.rate, lane, W)
+    for p in range(effects.rules.begin, effects.rules.end):
+        mean_of_step(m, work, at.GAP + p, lane, W)
     for r in range(len(effects.measures)):
-        mean_of_step(1, m, work, effects.measures[r], lane, W)
+        mean_of_step(m, work, effects.measures[r], lane, W)
 
 
 @scalar_function

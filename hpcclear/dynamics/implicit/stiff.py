@@ -6,9 +6,14 @@ step would.
 """
 
 import math
+from functools import cache
+from typing import Any
 
-from hpcclear.base.jit import lane_function, scalar_function
-from hpcclear.base.unrolled import unrolled, written_out
+from numba import carray, cfunc, types
+
+from hpcclear.base.bits import call_at
+from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
+from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank, fill
@@ -34,7 +39,18 @@ from hpcclear.dynamics.implicit.radau import (
     refilter_error,
     start_of_step,
 )
-from hpcclear.dynamics.stepping.settings import ATOL, PARAMETER_ROWS, RTOL
+from hpcclear.dynamics.stepping.settings import (
+    ATOL,
+    LANE,
+    MEASURES,
+    MOTION,
+    NUMBERS,
+    PARAMETER_ROWS,
+    RTOL,
+    SETTINGS,
+    WIDTH,
+    rules_in,
+)
 
 CHEAP_CONTRACTION = 0.002
 """While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
@@ -129,14 +145,12 @@ def take_over(n, lane, W, par, m, settings):
 
 
 @scalar_function
-@unrolled
-def fetch_contacts(effects, lane, W, work, m):
+def fetch_contacts(rules, lane, W, work, m):
     """Contact states of the open joints, in both banks."""
-    for joint in written_out(at.JOINTS):
-        if getattr(effects.open, joint.flag) is not None:
-            for row in (joint.active, joint.inverse_impact):
-                fill(m, row, work[row * W + lane])
-                fill(m, mem.SECOND + row, work[row * W + lane])
+    for p in range(rules.begin, rules.end):
+        for row in (at.ACTIVE + p, at.INVERSE_IMPACT + p):
+            fill(m, row, work[row * W + lane])
+            fill(m, mem.SECOND + row, work[row * W + lane])
 
 
 @scalar_function
@@ -146,7 +160,7 @@ def fetch(effects, motion, n, lane, W, block, m, tables):
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
     m[mem.STEP] = work[at.STEP * W + lane]
-    fetch_contacts(effects, lane, W, work, m)
+    fetch_contacts(effects.rules, lane, W, work, m)
     for k in range(n):
         m[mem.Q + k] = work[(at.Q + k) * W + lane]
         m[mem.V + k] = work[(at.V + k) * W + lane]
@@ -163,7 +177,7 @@ def fetch(effects, motion, n, lane, W, block, m, tables):
         for r in range(at.RATES):
             work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
         work[at.FRESH * W + lane] = 0.0
-    if (unknown or follows) and kinks_of_start(effects, m):
+    if (unknown or follows) and kinks_of_start(effects.rules, m):
         m[mem.RATE] = 1.0
         m[mem.RATE_SLOPE] = 0.0
         m[mem.CEILING] = math.inf
@@ -198,7 +212,7 @@ def cut_at_kink(effects, motion, n, lane, W, work, m, tables):
     h = m[mem.STEP]
     evaluate_stages(motion, n, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 3.0
-    fraction = kink_fraction(effects, m, GUESSED_BEYOND)
+    fraction = kink_fraction(effects.rules, m, GUESSED_BEYOND)
     if fraction < 1.0:
         m[mem.POLYNOMIAL_STEP] = h
         h *= max(fraction, LEAST_CUT)
@@ -295,7 +309,7 @@ def implicit_step(effects, motion, n, lane, W, block, tables, memory, settings):
     h = m[mem.STEP]
     m[mem.POLYNOMIAL_STEP] = h
     m[mem.CONTINUES] = 0.0
-    fraction = kink_fraction(effects, m, BEYOND)
+    fraction = kink_fraction(effects.rules, m, BEYOND)
     if fraction < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS:
         # the guess did not show it; the solution is a good guess for the part before it
         m[mem.KINK_CUTS] += 1.0
@@ -322,7 +336,7 @@ def judge(effects, motion, n, lane, W, work, m, tables, iterations):
     # as the last correction left them: integrals fit the end of the step
     evaluate_stages(motion, n, m, tables, h)
     work[at.EVALUATIONS * W + lane] += 1.0
-    gaps = gap_errors(effects, m, work, lane, W)
+    gaps = gap_errors(effects.rules, m, work, lane, W)
     means_of_step(effects, m, work, lane, W)
     leave(n, lane, W, work, m)
     mean = (total + gaps) * (0.5 / n)
@@ -367,11 +381,41 @@ def leave(n, lane, W, work, m):
         work[(at.RATE_NOW + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
 
 
+@scalar_function
+def implicit_steps(n, numbers, work, stages, par, settings, tables, measures, memory):
+    """`implicit_step` of one lane, with arrays at addresses."""
+    of = carray(numbers, NUMBERS)
+    W = of[WIDTH]
+    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
+    block = at.Block(
+        carray(work, at.WORK * W), carray(stages, at.MAX_COORDINATES * W), carray(par, at.PARAMETERS * W), None
+    )
+    implicit_step(
+        effects, of[MOTION], n, of[LANE], W, block, carray(tables, at.TABLES), carray(memory, (W, mem.MEMORY)),
+        carray(settings, SETTINGS),
+    )  # fmt: skip
+
+
+_DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
+SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
+
+
+@cache
+def implicit_code(n: int) -> Any:
+    """The compiled implicit step of n coordinates, whatever joints and lanes there are; its ``address`` is what steppers take."""
+    text = one_text(implicit_steps, f"implicit_{n}", n=n)
+    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+
+
 @lane_function
-def take_implicit_steps(effects, motion, n, block, tables, memory, settings, W):
+def ask_implicit(address, numbers, block, method, memory, W):
     """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
     if memory is not None:
         work = block.work
+        arrays = (
+            numbers, work, block.stages, block.par, method.settings, method.tables, method.measures, memory
+        )  # fmt: skip
         for i in range(W):
             if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
-                implicit_step(effects, motion, n, i, W, block, tables, memory, settings)
+                numbers[LANE] = i
+                call_at(address, arrays)  # type: ignore[call-arg]

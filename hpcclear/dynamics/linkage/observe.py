@@ -82,7 +82,7 @@ def derivative(motion, tables, contacts, time, y, out, joints, lane):
     for k in range(n):
         out[k] = y[n + k]
         out[n + k] = lane[at.ACC + k]
-    for j, gap in ((0, at.GAP_12), (1, at.GAP_23)):
+    for j in range(2):
         for m in range(3):
-            joints[j, m] = lane[at.RATE_NOW + gap + m]
+            joints[j, m] = lane[at.RATE_NOW + at.GAP + m * at.MAX_JOINTS + j]
         out[2 * n + j] = abs(joints[j, OPEN])

@@ -8,7 +8,6 @@ from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
@@ -42,10 +41,9 @@ def choose_step(work, par, free, W):
 
 @lane_function
 def judge_step(work, settings, W):
-    """Accept or reject by the error, propose the next step; lanes that cannot go on become special."""
+    """Accept or reject by the error, propose the next step; mark lanes that cannot go on for the scalar code."""
     expo, beta = settings[EXPONENT], settings[BETA]
     max_steps, smallest = settings[MAX_STEPS], settings[SMALLEST_STEP]
-    special = 0.0
     for i in range(W):
         error = work[at.ERROR * W + i]
         # not a number has a sign too, and a negative one would pass for a tiny error below
@@ -72,44 +70,59 @@ def judge_step(work, settings, W):
         work[at.NEXT_STEP * W + i] = proposal
         stuck = 1.0 if (accept == 0.0) & (h <= smallest * (h + work[at.TIME * W + i])) else 0.0
         over = 1.0 if attempts >= max_steps else 0.0
-        flag = running * max(stuck, over)
-        work[at.SPECIAL * W + i] = flag
-        special = count_up(special, flag)
-    return special
+        work[at.SPECIAL * W + i] = running * max(stuck, over)
 
 
 @lane_function
-def gap_flag(latched, work, joint, i, W, tolerance):
-    """1 where the joint's gap needs the scalar code: an impact inside the step, or a change of sign."""
-    d0 = work[(at.RATE_OLD + joint.gap) * W + i]
-    d1 = work[(at.RATE_NOW + joint.gap) * W + i]
+def place(joint):
+    """The place of a joint: not below 0, which spares the compiler a question for every lane."""
+    return joint & 7
+
+
+@lane_function
+def coordinate(number):
+    """The number of a coordinate: not below 0, likewise."""
+    return number & 31
+
+
+@lane_function
+def gap_flag(latched, work, p, i, W, tolerance):
+    """1 where joint p's gap needs the scalar code: an impact inside the step, or a change of sign."""
+    d0 = work[(at.RATE_OLD + at.GAP + p) * W + i]
+    d1 = work[(at.RATE_NOW + at.GAP + p) * W + i]
     flag = 1.0 if d0 * d1 < 0.0 else 0.0
     h = work[at.STEP * W + i]
-    m0 = h * work[(at.RATE_OLD + joint.rate) * W + i]
-    m1 = h * work[(at.RATE_NOW + joint.rate) * W + i]
-    flight = latched * (1.0 - work[joint.active * W + i])
+    m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
+    m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
+    flight = latched * (1.0 - work[(at.ACTIVE + p) * W + i])
     hit = 1.0 if d1 > -tolerance else 0.0
     bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
     return max(flag, flight * max(hit, bump))
 
 
 @lane_function
-@unrolled
-def flag_gaps(effects, work, last, tolerance, cycle, W):
-    """Mark accepted lanes that need the scalar code before the step is committed."""
+def flag_accepted(work, flag, i, W):
+    """Mark a lane whose step was accepted for the scalar code, where `flag` is 1."""
+    flag = flag * work[at.ACCEPT * W + i] * work[at.RUNNING * W + i]
+    work[at.SPECIAL * W + i] = max(work[at.SPECIAL * W + i], flag)
+
+
+@lane_function
+def flag_gaps(rules, work, last, tolerance, cycle, W):
+    """Mark accepted lanes that need the scalar code before the step is committed. Returns how many lanes are marked."""
+    latched = 1.0 * rules.latched
+    for joint in range(rules.begin, rules.end):
+        p = place(joint)
+        for i in range(W):
+            flag_accepted(work, gap_flag(latched, work, p, i, W, tolerance), i, W)
+    if rules.free:
+        for i in range(W):
+            turned = 1.0 if work[(at.QS + last) * W + i] > cycle - 1e-6 else 0.0
+            stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
+            flag_accepted(work, max(turned, stalled), i, W)
     special = 0.0
-    latched, free = 1.0 * effects.rules.latched, 1.0 * effects.rules.free
     for i in range(W):
-        flag = 0.0
-        for joint in written_out(at.JOINTS):
-            if getattr(effects.open, joint.flag) is not None:
-                flag = max(flag, gap_flag(latched, work, joint, i, W, tolerance))
-        turned = 1.0 if work[(at.QS + last) * W + i] > cycle - 1e-6 else 0.0
-        stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
-        flag = max(flag, free * max(turned, stalled))
-        flag = flag * work[at.ACCEPT * W + i] * work[at.RUNNING * W + i]
-        work[at.SPECIAL * W + i] = max(work[at.SPECIAL * W + i], flag)
-        special = count_up(special, flag)
+        special = count_up(special, work[at.SPECIAL * W + i])
     return special
 
 
@@ -134,23 +147,23 @@ def add_integral(work, rate, mean, yes, i, W):
 
 
 @lane_function
-def commit_joint(flag, latched, work, joint, i, W):
-    """Contact state, integral and extremes of one joint after a step."""
-    if flag is not None:
-        accept = work[at.ACCEPT * W + i]
-        yes = accept == 1.0
-        counts = accept * work[at.AVERAGING * W + i] == 1.0
-        d = work[(at.RATE_NOW + joint.gap) * W + i]
-        force = work[(at.RATE_NOW + joint.force) * W + i]
-        work[joint.peak * W + i] = max(work[joint.peak * W + i], force if counts else 0.0)
-        work[joint.deepest * W + i] = max(work[joint.deepest * W + i], d if counts else 0.0)
-        add_integral(work, joint.gap, abs(work[(at.RATE_SUM + joint.gap) * W + i]), yes, i, W)
-        keep(work, at.RATE_OLD + joint.gap, d, yes, i, W)
-        keep(work, at.RATE_OLD + joint.rate, work[(at.RATE_NOW + joint.rate) * W + i], yes, i, W)
-        on = work[joint.active * W + i]
-        off = 1.0 if (latched * accept * on == 1.0) & (d < 0.0) else 0.0
-        work[joint.active * W + i] = on - off
-        work[joint.ended * W + i] += off
+def commit_joint(latched, work, p, i, W):
+    """Contact state, integral and extremes of joint p after a step."""
+    accept = work[at.ACCEPT * W + i]
+    yes = accept == 1.0
+    counts = accept * work[at.AVERAGING * W + i] == 1.0
+    d = work[(at.RATE_NOW + at.GAP + p) * W + i]
+    force = work[(at.RATE_NOW + at.FORCE + p) * W + i]
+    work[(at.PEAK + p) * W + i] = max(work[(at.PEAK + p) * W + i], force if counts else 0.0)
+    work[(at.DEEPEST + p) * W + i] = max(work[(at.DEEPEST + p) * W + i], d if counts else 0.0)
+    add_integral(work, at.GAP + p, abs(work[(at.RATE_SUM + at.GAP + p) * W + i]), yes, i, W)
+    keep(work, at.RATE_OLD + at.GAP + p, d, yes, i, W)
+    rate = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
+    keep(work, at.RATE_OLD + at.GAP_RATE + p, rate, yes, i, W)
+    on = work[(at.ACTIVE + p) * W + i]
+    off = 1.0 if (latched * accept * on == 1.0) & (d < 0.0) else 0.0
+    work[(at.ACTIVE + p) * W + i] = on - off
+    work[(at.ENDED + p) * W + i] += off
 
 
 @lane_function
@@ -183,23 +196,33 @@ def commit_peak(work, i, W):
 
 
 @lane_function
-@unrolled
+def commit_coordinate(work, stages, k, i, W):
+    """Coordinate k, its velocity and its acceleration after a step."""
+    yes = work[at.ACCEPT * W + i] == 1.0
+    keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
+    keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
+    new = work[(at.ACC + k) * W + i]
+    old = stages[k * W + i]
+    stages[k * W + i] = new if yes else old
+
+
+@lane_function
 def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     commit_measures(effects, work, W)
-    ended = 0.0
     latched = 1.0 * effects.rules.latched
+    for joint in range(effects.rules.begin, effects.rules.end):
+        p = place(joint)
+        for i in range(W):
+            commit_joint(latched, work, p, i, W)
+    for number in range(n):
+        k = coordinate(number)
+        for i in range(W):
+            commit_coordinate(work, stages, k, i, W)
+    ended = 0.0
     for i in range(W):
-        for joint in written_out(at.JOINTS):
-            commit_joint(getattr(effects.open, joint.flag), latched, work, joint, i, W)
         accept = work[at.ACCEPT * W + i]
         yes = accept == 1.0
-        for k in range(n):
-            keep(work, at.Q + k, work[(at.QS + k) * W + i], yes, i, W)
-            keep(work, at.V + k, work[(at.VS + k) * W + i], yes, i, W)
-            new = work[(at.ACC + k) * W + i]
-            old = stages[k * W + i]
-            stages[k * W + i] = new if yes else old
         work[at.TIME * W + i] += accept * work[at.STEP * W + i]
         keep(work, at.LOG_ERROR, 0.5 * rough_log2(max(work[at.ERROR * W + i], 1e-8)), yes, i, W)
         rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0

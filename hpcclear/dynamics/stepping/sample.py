@@ -188,7 +188,7 @@ def book_averages(lane, W, work, book, time, settings):
     for k in range(
         JOINTS - 1, -1, -1
     ):  # O12 last, which keeps the bits of f as they have always been
-        gap = settings[CHOSEN + k] * work[(at.INTEGRAL + 3 * k) * W + lane]
+        gap = settings[CHOSEN + k] * work[(at.INTEGRAL + at.GAP + k) * W + lane]
         total += gap * gap
         if work[(at.ACTIVE + k) * W + lane] == 1.0 and work[(at.ENDED + k) * W + lane] == 0.0:
             book[(at.LATCHED + k) * W + lane] = 1.0

@@ -1,5 +1,9 @@
 """Numbers shared by all lanes of a run: the settings of its control, and the counters of its queue."""
 
+import numpy as np
+
+from hpcclear.base.arrays import Integers
+from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 
 (
@@ -26,3 +30,23 @@ SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 # ---- counters shared by all lanes
 (NEXT_SLOT, SLOTS, FINISHED, RECORDED) = range(4)
 COUNTERS = 4
+
+# ---- numbers by which a stepper asks for what is compiled apart from it
+(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION) = range(7)
+RULES = 7  # the first of them
+NUMBERS = RULES + len(at.Rules._fields)
+
+
+def numbers_of(rules: at.Rules, width: int, n: int, measures: int, motion: int) -> Integers:
+    """Those of a stepper of `width` lanes; `motion`: the address of the motion of eight lanes."""
+    return np.array([0, 0, 0, width, n, measures, motion, *rules], np.int64)
+
+
+@lane_function
+def rules_in(numbers):
+    """The rules among such numbers."""
+    r = RULES
+    return at.Rules(
+        numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
+        numbers[r + 5], numbers[r + 6], numbers[r + 7], numbers[r + 8],
+    )  # fmt: skip

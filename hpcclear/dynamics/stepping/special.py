@@ -1,0 +1,130 @@
+"""What happens to single lanes between steps: contacts, ends of revolutions, samples that end and begin. One function for all steppers.
+
+It is compiled once, for any number of lanes, coordinates and joints, and called by its address: a stepper is compiled
+without it.
+"""
+
+from functools import cache
+from typing import Any
+
+from numba import carray, cfunc, types
+
+from hpcclear.base.bits import call_at
+from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
+from hpcclear.base.one_text import one_text
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
+from hpcclear.dynamics.stepping.settings import (
+    ASKED,
+    COORDINATES,
+    COUNTERS,
+    FOUND,
+    LANE,
+    NUMBERS,
+    PARAMETER_ROWS,
+    SETTINGS,
+    SLOTS,
+    WIDTH,
+    rules_in,
+)
+from hpcclear.dynamics.stepping.stops import (
+    integrate_gap,
+    stop_at_impacts,
+    stop_at_kinks,
+    stop_free_crank,
+    wrap_crank,
+)
+
+NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION = range(3)
+"""What may be asked."""
+
+
+@scalar_function
+def change_sample(lane, W, n, status, block, queue, settings):
+    """Write down a lane's sample, if its status is one, and give it the next."""
+    if status != UNFINISHED:
+        finish(lane, W, n, status, block, queue, settings)
+    load(lane, W, n, block, queue, settings)
+
+
+@scalar_function
+def end_of_step(rules, lane, W, n, block, settings):
+    """What the end of a special lane's step shows: it may be cut. Returns OK or why the lane ends."""
+    work = block.work
+    status = failure(lane, W, n, work, block.stages, settings)
+    if status == OK and work[at.ACCEPT * W + lane] == 1.0:
+        if rules.latched:
+            stop_at_impacts(rules, lane, W, work, settings)
+        if work[at.ACCEPT * W + lane] == 1.0:
+            stop_at_kinks(rules, lane, W, work, settings)
+        if work[at.ACCEPT * W + lane] == 1.0 and rules.free:
+            status = stop_free_crank(lane, W, work, settings, n - 1)
+        for p in range(rules.begin, rules.end):
+            integrate_gap(lane, W, work, p)
+    return status
+
+
+@scalar_function
+def answer(numbers, rules, block, queue, settings):
+    """Do what is asked for of one lane; by how much the number of running lanes changes is left in `FOUND`."""
+    asked, lane, W, n = numbers[ASKED], numbers[LANE], numbers[WIDTH], numbers[COORDINATES]
+    ends = True
+    status = UNFINISHED
+    if asked == END_OF_STEP:
+        status = end_of_step(rules, lane, W, n, block, settings)
+        ends = status != OK
+    elif asked == END_OF_REVOLUTION:
+        if rules.turning:
+            wrap_crank(lane, W, block.work, n - 1, settings)
+        status = end_revolution(lane, W, block.work, block.book, settings)
+        ends = status != UNFINISHED
+    before = block.work[at.RUNNING * W + lane]
+    if ends:
+        change_sample(lane, W, n, status, block, queue, settings)
+    numbers[FOUND] = int(block.work[at.RUNNING * W + lane] - before)
+
+
+@scalar_function
+def special(numbers, work, stages, par, book, settings, queued, starts, out, finished, counters):
+    """`answer` for arrays at addresses."""
+    of = carray(numbers, NUMBERS)
+    W = of[WIDTH]
+    block = at.Block(
+        carray(work, at.WORK * W),
+        carray(stages, at.MAX_COORDINATES * W),
+        carray(par, at.PARAMETERS * W),
+        carray(book, at.BOOK * W),
+    )
+    entries, counts = carray(settings, SETTINGS), carray(counters, COUNTERS)
+    slots = counts[SLOTS]
+    queue = at.Queue(
+        carray(queued, (slots, int(entries[PARAMETER_ROWS]))),
+        carray(starts, (slots, at.START)),
+        carray(out, (slots, at.OUT)),
+        carray(finished, slots),
+        counts,
+    )
+    answer(of, rules_in(of), block, queue, entries)
+
+
+_NUMBERS, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
+SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 8, *[_COUNTS] * 2)
+
+
+@cache
+def special_code() -> Any:
+    """The compiled `special`; its ``address`` is what steppers take."""
+    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(one_text(special, "special"))
+
+
+@lane_function
+def ask(address, asked, lane, numbers, block, queue, settings):
+    """Have `special` do one thing for one lane. Returns the change of the number of running lanes."""
+    numbers[ASKED] = asked
+    numbers[LANE] = lane
+    arrays = (
+        numbers, block.work, block.stages, block.par, block.book, settings,
+        queue.par, queue.start, queue.out, queue.finished, queue.counters,
+    )  # fmt: skip
+    call_at(address, arrays)  # type: ignore[call-arg]
+    return numbers[FOUND]
