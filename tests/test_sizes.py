@@ -10,13 +10,14 @@ from numba import njit
 from running import scene_with
 
 import hpcclear.dynamics
-from hpcclear.base.jit import FASTMATH
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.stepper import make_collocation_stepper, quadratures
 from hpcclear.dynamics.explicit import tableau as tab
-from hpcclear.dynamics.explicit.combine import Step, group_of, stage_state, step_error
-from hpcclear.dynamics.explicit.stepper import make_stepper, weigh_rates
+from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
+from hpcclear.dynamics.explicit.steps import weigh_rates
 from hpcclear.dynamics.implicit.radau import means_of_step
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
@@ -24,30 +25,33 @@ from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
 W = 4
-NONE_OPEN = at.Stepped(at.Open(), at.rules_of(at.Effects()), np.zeros(0, np.int64))
+NONE_OPEN = at.Stepped(at.rules_of(at.Effects()), np.zeros(0, np.int64))
 
 
-@pytest.mark.parametrize("n", [4, 7, 8])
+@lane_function
+def last_stage_and_error(n, effects, work, stages, par, weights, atol, W):
+    step = Step(work, stages, par, weights, n, 1e-3, atol, W)
+    stage_state(step, tab.STAGES - 1, tab.STAGES - 1, W)
+    step_error(effects, step, W)
+
+
+@pytest.mark.parametrize("n", [1, 4, 7, at.MAX_COORDINATES])
 def test_a_stage_and_its_error_reach_every_coordinate(n: int):
     """Of any number of coordinates, once each, and no number beside them is touched."""
     s = tab.STAGES - 1
-
-    @njit(error_model="numpy", fastmath=FASTMATH)
-    def both(effects, work, stages, par, weights, atol):
-        step = Step(work, stages, par, weights, n, 1e-3, atol)
-        stage_state(step, s, s, W)
-        step_error(effects, step, W)
+    both = njit(error_model="numpy", fastmath=FASTMATH)(one_text(last_stage_and_error, "both", W=W))
 
     rng = np.random.default_rng(n)
     pair = tab.DORMAND_PRINCE
     work, par = rng.normal(size=(at.WORK, W)), np.ones((at.PARAMETERS, W))
-    stages, atol = (
-        rng.normal(size=(tab.STAGES, n, W)),
+    room, atol = (
+        rng.normal(size=(tab.STAGES, at.MAX_COORDINATES, W)),
         rng.uniform(0.5, 1.0, (2, at.MAX_COORDINATES)),
     )
+    stages = room[:, :n].copy()
     work[at.STEP] = 1e-2
     before = work.copy()
-    both(NONE_OPEN, work.ravel(), stages.ravel(), par.ravel(), pair.packed(), atol.ravel())
+    both(n, NONE_OPEN, work.ravel(), room.ravel(), par.ravel(), pair.packed(), atol.ravel())
     h = before[at.STEP]
     q, v, a = (before[row : row + n] for row in (at.Q, at.V, at.ACC))
     stages[s - 1] = a  # the latest, put away on the way
@@ -68,17 +72,12 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int):
     np.testing.assert_array_equal(work, before)
 
 
-def test_groups_are_short():
-    for n in range(1, at.MAX_COORDINATES + 1):
-        assert 1 <= group_of.py_func(n) <= 5
-
-
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match="24 coordinates, not 25"):
-        make_stepper(4, 25, at.Open(1, 1))
     with pytest.raises(ValueError, match="5 coordinates, not 6"):
-        make_collocation_stepper(6, at.Open(1, 1))
+        make_collocation_stepper(6)
     problem = problem_of(scene_with())
+    with pytest.raises(ValueError, match="24 coordinates at most, not 25"):
+        replace(problem, coordinates=25, atol=50 * problem.atol[:1])
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])
     nine = problem_of(scene_with({"numerics.formulation": "baumgarte"}))
@@ -109,12 +108,10 @@ def test_an_end_is_a_start():
 
 @pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_measures])
 def test_every_stepper_integrates_all_of_the_list(traversal):
-    """Each gap and its joint stand in the code that was written out (`commit` has its own); the rest is measured."""
+    """The gaps of the joints that are open (`commit` has its own); the rest is measured."""
     seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
     assert "measures" in seen
-    for gap in at.GAPS if traversal is not commit_measures else ():
-        assert gap.rate in seen
-        assert gap.asked_by in seen
+    assert {"begin", "end"} <= seen or traversal is commit_measures
 
 
 def test_what_is_measured_goes_by_the_effects():
@@ -124,7 +121,9 @@ def test_what_is_measured_goes_by_the_effects():
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE]
     assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
     assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
-    assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [1, 4, 7]
+    assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
+        at.FORCE + k for k in range(3)
+    ]
     assert len(at.measures_of(at.Effects(crank_rod=1, latched=1))) == 0
 
 
@@ -136,16 +135,30 @@ def test_rules_are_numbers_of_one_kind():
         (at.Effects(baumgarte=1, coulomb=1, gravity=1), {"turning", "coulomb"}),
     ):
         rules = at.rules_of(effects)
-        assert {name for name in rules._fields if getattr(rules, name)} == on
+        assert {name for name in rules._fields[:-2] if getattr(rules, name)} == on
         assert {type(value) for value in rules} == {int}
 
 
-def test_scenes_of_the_same_joints_share_a_stepper():
-    one, other = (
-        Lanes(problem_of(scene_with(changes)), 4)._step
-        for changes in ({}, {"effects.gravity": 9.81, "numerics.energy": True})
+def test_rules_say_which_joints_are_open():
+    for effects, places in (
+        (at.Effects(crank_rod=1, rod_slider=1), (0, 2)),
+        (at.Effects(rod_slider=1), (1, 2)),
+        (at.Effects(joints=5), (0, 5)),
+        (at.Effects(torque=1), (0, 0)),
+    ):
+        rules = at.rules_of(effects)
+        assert (rules.begin, rules.end) == places
+
+
+def test_all_mechanisms_share_a_stepper():
+    changes = (
+        {},
+        {"effects.gravity": 9.81, "numerics.energy": True},
+        {"joints.rod_slider": {"kind": "ideal"}},
+        {"numerics.formulation": "baumgarte"},
     )
-    assert one is other
+    steppers = {Lanes(problem_of(scene_with(change)), 4)._step for change in changes}
+    assert len(steppers) == 1
 
 
 def test_no_stepper_names_a_rate_of_its_own():
@@ -196,4 +209,4 @@ def test_a_loop_written_out_does_what_the_loop_does():
 
 def test_a_function_without_such_a_loop_is_refused():
     with pytest.raises(ValueError, match="no loop"):
-        unrolled(test_groups_are_short)
+        unrolled(test_an_end_is_a_start)

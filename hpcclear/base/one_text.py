@@ -13,7 +13,7 @@ import ast
 import builtins
 import copy
 import hashlib
-import importlib.util
+import importlib
 import math
 import operator
 import os
@@ -709,18 +709,23 @@ def one_text(function: Any, label: str, **known: Any) -> Callable[..., Any]:
 
 def module_of(name: str, write: Callable[[], str]) -> ModuleType:
     """The module of a text that is kept for the next process; `write` is called where there is none yet."""
-    module_name = f"hpcclear_texts.{name}"
-    if module_name not in sys.modules:
-        path = _folder() / f"{name}.py"
-        if not path.exists():
-            _keep(path, write())
-        spec = importlib.util.spec_from_file_location(module_name, path)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[module_name] = module  # Numba looks a cached function's module up there
-        spec.loader.exec_module(module)
-    return sys.modules[module_name]
+    path = _folder() / f"{name}.py"
+    if not path.exists():
+        _keep(path, write())
+    return text_named(name)
+
+
+def text_named(name: str) -> ModuleType:
+    """The module of a text that is there."""
+    if _TEXTS not in sys.modules:  # a package, so that one text can import from another
+        package = ModuleType(_TEXTS)
+        package.__path__ = [str(_folder())]
+        sys.modules[_TEXTS] = package
+    importlib.invalidate_caches()  # the folder may have changed within its date's resolution
+    return importlib.import_module(f"{_TEXTS}.{name}")
+
+
+_TEXTS = "hpcclear_texts"
 
 
 def _keep(path: Path, text: str) -> None:

@@ -1,23 +1,30 @@
 """The stepper's arrays and its queue: queue samples, advance, collect what finished; or run all at once."""
 
 import time
+from typing import Any
 
 import numpy as np
+from numba import typeof
 
 from hpcclear.base.arrays import Array, Booleans, Integers
+from hpcclear.base.beside import compiled_beside
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.collocation.stepper import make_collocation_stepper
 from hpcclear.dynamics.explicit import tableau as tab
-from hpcclear.dynamics.explicit.stepper import make_stepper
+from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
+from hpcclear.dynamics.explicit.steps import explicit_code
 from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.memory import LANES
 from hpcclear.dynamics.implicit.stiff import implicit_code
+from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.stepping.settings import (
     COUNTERS,
     FINISHED,
+    MOTION,
+    MOTION_OF_EIGHT,
     NEXT_SLOT,
     RECORDED,
     SLOTS,
@@ -27,6 +34,9 @@ from hpcclear.dynamics.stepping.special import special_code
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 NO_LIMIT = 1 << 40  # of block steps in a call
+SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
+TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
+IMPLICIT = f"{implicit_code.__module__}:{implicit_code.__name__}"
 
 
 class Lanes:
@@ -53,7 +63,9 @@ class Lanes:
         self.width = width
         self.record = record
         bank = np.zeros((at.STAGES + tab.STAGES * at.MAX_COORDINATES) * width)
-        bank[at.WORK * width : at.STAGES * width] = 1.0  # parameters: a resting lane divides by them
+        bank[at.WORK * width : at.STAGES * width] = (
+            1.0  # parameters: a resting lane divides by them
+        )
         self._block = at.Block(
             work=bank[: at.WORK * width],
             stages=bank[at.STAGES * width :],
@@ -64,35 +76,53 @@ class Lanes:
         self._memory = radau.new_memory(width) if implicit else None
         if problem.collocation:
             self._memory = lobatto.new_memory()
-        at_once = self._memory is not None  # evaluations of one lane, eight side by side
-        effects = problem.effects._replace(sliding=1 if at_once else None)
+        effects = problem.effects._replace(sliding=None if self._memory is None else 1)
         self._rules = at.rules_of(effects)
-        alone = implicit and not problem.collocation
-        self._addresses = (
-            problem.motion(effects, width).address,
-            special_code().address,
-            implicit_code(n).address if alone else 0,
-        )
-        of_eight = problem.motion(effects, LANES).address if at_once else 0
-        recorded = record is not None
-        self._step = (
-            make_collocation_stepper(n, recorded=recorded)
-            if problem.collocation
-            else make_stepper(width, recorded=recorded, implicit=implicit)
-        )
         measures = at.measures_of(problem.effects)
         self._method = at.Method(
             problem.settings().rows,
             problem.tableau.packed(),
             problem.tables,
             measures,
-            numbers_of(self._rules, width, n, len(measures), of_eight),
+            numbers_of(self._rules, width, n, len(measures)),
+        )
+        self._codes: tuple[Any, ...] = () if problem.collocation else (n, Codes(0, 0, 0))
+        self._step = (
+            make_collocation_stepper(n, recorded=record is not None)
+            if problem.collocation
+            else make_stepper(width, recorded=record is not None, implicit=implicit)
         )
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
         self._accept_queue(
             np.empty((0, problem.parameter_rows)), np.empty((0, Start.size)), np.empty(0, np.int64)
         )
+        self._effects = effects
+        self._compiled = False
+
+    def _compile(self) -> None:
+        """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
+        problem, n, effects = self.problem, self.problem.coordinates, self._effects
+        self._compiled = True
+        stiff = self._memory is not None and not problem.collocation
+        blocks = not problem.collocation
+        # of so many lanes, and of eight where evaluations of one lane stand side by side
+        widths = (self.width if blocks else 0, LANES if self._memory is not None else 0)
+        texts = [problem.motion_text(effects, width) for width in widths if width]
+        apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)] if blocks else []
+        with compiled_beside([f"{IMPLICIT}:{n}"] if stiff else apart):  # either is half of it
+            explicit = explicit_code(self.width, stiff).address if blocks else 0
+            self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
+        if blocks:
+            implicit = implicit_code(n).address if stiff else 0
+            self._codes = (n, Codes(special_code().address, explicit, implicit))
+        for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
+            self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+
+    def _arguments(self, budget: int) -> tuple[Any, ...]:
+        arrays = (self._rules, self._block, self._queue, self._method)
+        some = (one for one in (self.record, self._memory) if one is not None)
+        return (*self._codes, *arrays, *some, budget)
 
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
         count = len(labels)
@@ -196,10 +226,11 @@ class Lanes:
 
     def step(self, budget: int) -> bool:
         """Take at most `budget` block steps; True while samples are running."""
-        arrays = (self._rules, self._block, self._queue, self._method)
-        some = (one for one in (self.record, self._memory) if one is not None)
-        count = () if self.problem.collocation else (self.problem.coordinates,)
-        going = self._step(*count, *self._addresses, *arrays, *some, budget)
+        if (
+            not self._compiled
+        ):  # at the first call, which one rank of a node makes before the others
+            self._compile()
+        going = self._step(*self._arguments(budget))
         return bool(going)
 
     def collect(self) -> tuple[Integers, Outcome, Array]:

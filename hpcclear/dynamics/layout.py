@@ -364,7 +364,7 @@ def rules_of(effects: Effects) -> Rules:
     turning = e.torque or (None if e.swinging else e.baumgarte)
     flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
-    return Rules(*(int(flag is not None) for flag in flags), places[0], places[-1] + 1)
+    return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 
 
 class Stepped(NamedTuple):

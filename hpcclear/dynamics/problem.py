@@ -13,7 +13,7 @@ from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import Harmonic, TorqueDrive
-from hpcclear.dynamics.linkage.rhs import compiled_motion, motion_of
+from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
@@ -131,9 +131,12 @@ class Problem:
 
     def motion(self, effects: at.Effects, width: int) -> Any:
         """The compiled motion of so many lanes with these effects (`rhs.motion_of`)."""
-        if self.linkage is None:
-            return motion_of(effects, width)
-        return compiled_motion(self.linkage.module(effects), effects, width)
+        return compiled_text(self.motion_text(effects, width))
+
+    def motion_text(self, effects: at.Effects, width: int) -> str:
+        """The name of the text that it is compiled from."""
+        module = written_by(effects) if self.linkage is None else self.linkage.module(effects)
+        return motion_text(module, effects, width)
 
     @property
     def tables(self) -> Array:

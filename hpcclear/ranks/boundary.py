@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+from hpcclear.base.cores import among_ranks
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Mail, Nap, Tag
@@ -47,6 +48,8 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
         ranks = Ranks(mail, stop)
+        if ranks.size > 1:
+            among_ranks()
         code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
         mail.finalize()
         return code

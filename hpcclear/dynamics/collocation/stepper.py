@@ -5,7 +5,6 @@ differs is the step itself, and that contacts which begin or end inside it are f
 """
 
 import math
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -14,7 +13,6 @@ from numba import njit
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
@@ -22,7 +20,13 @@ from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.settings import ATOL, MAX_STEPS, MOTION, PARAMETER_ROWS, RTOL
+from hpcclear.dynamics.stepping.settings import (
+    ATOL,
+    MAX_STEPS,
+    MOTION_OF_EIGHT,
+    PARAMETER_ROWS,
+    RTOL,
+)
 from hpcclear.dynamics.stepping.stops import integrate_gap, stop_free_crank, wrap_crank
 
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
@@ -276,8 +280,8 @@ def next_sample(n, block, queue, settings, m):
 
 
 @lane_function
-def advance(n, motion, special, implicit, rules, block, queue, method, record, m, budget):
-    """Take at most `budget` steps. Returns whether the lane holds a sample. None of the addresses is asked for."""
+def advance(n, rules, block, queue, method, record, m, budget):
+    """Take at most `budget` steps. Returns whether the lane holds a sample."""
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book
@@ -286,7 +290,7 @@ def advance(n, motion, special, implicit, rules, block, queue, method, record, m
     full = False
     while budget > 0 and work[at.RUNNING] > 0.0 and not full:
         budget -= 1
-        try_step(effects, method.numbers[MOTION], block, m, tables, settings, n)
+        try_step(effects, method.numbers[MOTION_OF_EIGHT], block, m, tables, settings, n)
         status = judge_end(effects, work, stages, m, settings, n)
         goes_on = status == OK
         if goes_on and work[at.ACCEPT] == 1.0:
@@ -307,11 +311,11 @@ def advance(n, motion, special, implicit, rules, block, queue, method, record, m
 
 
 @cache
-def make_collocation_stepper(n: int, *, recorded: bool = False) -> Callable[..., Any]:
+def make_collocation_stepper(n: int, *, recorded: bool = False) -> Any:
     """Return the compiled stepper of one response with n coordinates, whatever joints are open.
 
-    Its arguments are those of `stepper.make_stepper` with an implicit method, so that either serves `lanes.Lanes`; the
-    tableau is not read, and `memory` is what `lobatto.new_memory` makes.
+    Its arguments are those of `stepper.make_stepper` with an implicit method, but for the first two; the tableau is not read,
+    and `memory` is what `lobatto.new_memory` makes.
 
     Raises
     ------

@@ -62,10 +62,10 @@ def edge_excess(step, k, i, W):
 
 
 @lane_function
-def sense_stiffness(memory, step, W):
+def sense_stiffness(stiff, step, W):
     """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
     decaying count of rejections."""
-    if memory is not None:
+    if stiff is not None:
         work = step.work
         for i in range(W):
             work[at.EDGE_EXCESS * W + i] = -1e-300

@@ -43,7 +43,7 @@ from hpcclear.dynamics.stepping.settings import (
     ATOL,
     LANE,
     MEASURES,
-    MOTION,
+    MOTION_OF_EIGHT,
     NUMBERS,
     PARAMETER_ROWS,
     RTOL,
@@ -388,10 +388,13 @@ def implicit_steps(n, numbers, work, stages, par, settings, tables, measures, me
     W = of[WIDTH]
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
     block = at.Block(
-        carray(work, at.WORK * W), carray(stages, at.MAX_COORDINATES * W), carray(par, at.PARAMETERS * W), None
+        carray(work, at.WORK * W),
+        carray(stages, at.MAX_COORDINATES * W),
+        carray(par, at.PARAMETERS * W),
+        None,
     )
     implicit_step(
-        effects, of[MOTION], n, of[LANE], W, block, carray(tables, at.TABLES), carray(memory, (W, mem.MEMORY)),
+        effects, of[MOTION_OF_EIGHT], n, of[LANE], W, block, carray(tables, at.TABLES), carray(memory, (W, mem.MEMORY)),
         carray(settings, SETTINGS),
     )  # fmt: skip
 
@@ -402,7 +405,7 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
 
 @cache
 def implicit_code(n: int) -> Any:
-    """The compiled implicit step of n coordinates, whatever joints and lanes there are; its ``address`` is what steppers take."""
+    """The compiled implicit step of n coordinates, for any joints and lanes; its ``address`` is what steppers take."""
     text = one_text(implicit_steps, f"implicit_{n}", n=n)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 

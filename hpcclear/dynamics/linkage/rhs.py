@@ -12,7 +12,7 @@ from numba import carray, cfunc, types
 
 from hpcclear.base.bits import beyond, call_at
 from hpcclear.base.jit import FASTMATH, lane_function
-from hpcclear.base.one_text import one_text
+from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import slider_crank
 from hpcclear.dynamics.linkage.baumgarte import nine_coordinates
@@ -104,10 +104,21 @@ def motion_of(effects: at.Effects, W: int) -> Any:
     return compiled_motion(written_by(effects), effects, W)
 
 
-@cache
 def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
     """The compiled ``motion`` of a module, as `motion_of` has it."""
+    return compiled_text(motion_text(module, effects, W))
+
+
+def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
+    """The name of the text that ``motion`` of a module is compiled from."""
     text = one_text(module.motion, f"motion_{W}", effects=effects, W=W)
+    return str(text.__name__)
+
+
+@cache
+def compiled_text(name: str) -> Any:
+    """The compiled motion of a text by its name, which another process can be told."""
+    text = getattr(text_named(name), name)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 

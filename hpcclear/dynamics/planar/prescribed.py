@@ -1,7 +1,6 @@
 """Linkages without clearance whose drives prescribe everything: time series and outcomes, nothing integrated."""
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
@@ -43,6 +42,10 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     problem = problem_of(scene)
     revolutions = problem.transient + problem.averaged
     count = scene.output.instants_per_revolution or 720
+    from scipy.integrate import (
+        cumulative_simpson,
+    )  # a third of a second, for linkages without play only
+
     period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
     start = mechanism.body(mechanism.period.body).start_angle

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.revolutions import objective
@@ -108,12 +107,12 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
 
 def student(values: Array) -> tuple[float, float, float]:
     """Mean of independent values (n,), its standard error, and the half-width of its limits."""
+    # here, as it is loaded for a quarter of a second that a first result need not wait
+    from scipy.special import stdtrit
+
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    return (
-        float(np.mean(values)),
-        error,
-        float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(values) - 1)) * error,
-    )
+    quantile = float(stdtrit(len(values) - 1, 0.5 + 0.5 * LEVEL))
+    return float(np.mean(values)), error, quantile * error
 
 
 def projected(gaps: Array) -> Array:

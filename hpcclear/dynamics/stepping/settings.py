@@ -32,14 +32,14 @@ SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 COUNTERS = 4
 
 # ---- numbers by which a stepper asks for what is compiled apart from it
-(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION) = range(7)
-RULES = 7  # the first of them
+(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT) = range(8)
+RULES = 8  # the first of them
 NUMBERS = RULES + len(at.Rules._fields)
 
 
-def numbers_of(rules: at.Rules, width: int, n: int, measures: int, motion: int) -> Integers:
-    """Those of a stepper of `width` lanes; `motion`: the address of the motion of eight lanes."""
-    return np.array([0, 0, 0, width, n, measures, motion, *rules], np.int64)
+def numbers_of(rules: at.Rules, width: int, n: int, measures: int) -> Integers:
+    """Those of a stepper of `width` lanes, whose motions have no addresses yet."""
+    return np.array([0, 0, 0, width, n, measures, 0, 0, *rules], np.int64)
 
 
 @lane_function

@@ -1,7 +1,6 @@
-"""What happens to single lanes between steps: contacts, ends of revolutions, samples that end and begin. One function for all steppers.
+"""What happens to single lanes between steps: contacts, ends of revolutions, samples that end and begin.
 
-It is compiled once, for any number of lanes, coordinates and joints, and called by its address: a stepper is compiled
-without it.
+One function for all steppers: it is compiled once, for any number of lanes, coordinates and joints, and called by its address.
 """
 
 from functools import cache
@@ -114,7 +113,9 @@ SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 8, *[_COUNTS] * 2)
 @cache
 def special_code() -> Any:
     """The compiled `special`; its ``address`` is what steppers take."""
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(one_text(special, "special"))
+    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(
+        one_text(special, "special")
+    )
 
 
 @lane_function

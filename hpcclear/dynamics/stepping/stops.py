@@ -68,7 +68,9 @@ def stop_at_impacts(rules, lane, W, work, settings):
         cut(lane, W, work, first)
     elif first == 1.0:
         for p in range(rules.begin, rules.end):
-            if meet_impact(lane, W, work, settings, p) == 1.0:  # none at the start: nothing is latched by asking
+            if (
+                meet_impact(lane, W, work, settings, p) == 1.0
+            ):  # none at the start: nothing is latched by asking
                 latch(lane, W, work, settings, p)
 
 
