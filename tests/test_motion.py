@@ -187,18 +187,15 @@ def scale_of(reference):
 
 def check_rates(effects, mech, rates, v):
     """Gaps, forces and powers of the kernel against the dense model's."""
-    for name, flag, gap, friction in (
-        ("o12", "crank_rod", at.GAP_12, at.FRICTIONS),
-        ("o23", "rod_slider", at.GAP_23, at.FRICTIONS + 1),
-    ):
+    for name, flag, joint in (("o12", "crank_rod", at.O12), ("o23", "rod_slider", at.O23)):
         if flag in effects:
             seen = mech.seen[name]
-            np.testing.assert_allclose(rates[gap], seen["gap"], rtol=0, atol=1e-16)
-            np.testing.assert_allclose(rates[gap + 1], seen["normal"], rtol=1e-10, atol=1e-9)
-            np.testing.assert_allclose(rates[gap + 2], seen["rate"], rtol=1e-10, atol=1e-11)
+            np.testing.assert_allclose(rates[joint.gap], seen["gap"], rtol=0, atol=1e-16)
+            np.testing.assert_allclose(rates[joint.force], seen["normal"], rtol=1e-10, atol=1e-9)
+            np.testing.assert_allclose(rates[joint.rate], seen["rate"], rtol=1e-10, atol=1e-11)
             if "series" in effects:
                 np.testing.assert_allclose(
-                    rates[friction], seen["tangential"], rtol=1e-9, atol=1e-9
+                    rates[joint.friction], seen["tangential"], rtol=1e-9, atol=1e-9
                 )
     if "ledger" in effects:
         drive = mech.seen["drive"]
