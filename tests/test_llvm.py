@@ -77,6 +77,10 @@ MARKERS = {
         set(),
         {work(at.RATE_NOW + at.FOLLOWED_SQUARE), work(at.RATE_NOW + at.DRIVE_MOMENT)},
     ),
+    "wear": (
+        set(),
+        {work(at.RATE_NOW + joint.sliding_power) for joint in (at.O12, at.O23)},
+    ),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {

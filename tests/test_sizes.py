@@ -125,6 +125,9 @@ def test_what_is_measured_goes_by_the_effects():
         at.FORCE + k for k in range(3)
     ]
     assert len(at.measures_of(at.Effects(crank_rod=1, latched=1))) == 0
+    worn = at.Effects(rod_slider=1, wear=1)
+    assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
+    assert max(at.INTEGRATED_RATES) < 64  # `control.measure` keeps six bits
 
 
 def test_rules_are_numbers_of_one_kind():
@@ -167,8 +170,9 @@ def test_no_stepper_names_a_rate_of_its_own():
     rows = {one.rate for one in at.MEASURES}
     powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
     own = powers | {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FORCE_12", "FORCE_23"}
-    forces = {joint.force for joint in at.JOINTS}
-    assert {getattr(at, name) for name in own} | forces == rows
+    of_joints = {row for joint in at.JOINTS for row in (joint.force, joint.sliding_power)}
+    assert {getattr(at, name) for name in own} | of_joints == rows
+    own |= {"SLIDING_POWERS", "sliding_power"}
     room = Path(hpcclear.dynamics.__file__).parent
     for folder in ("explicit", "implicit", "collocation"):
         for path in (room / folder).glob("*.py"):

@@ -103,7 +103,7 @@ _REGIMES = {
 RESPONSES = ("mean_contact_force", "peak_crank_moment", "slider_acceleration_deviation")
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
-ON_REQUEST = (*RESPONSES, "energy_error")
+ON_REQUEST = (*RESPONSES, "sliding_work", "energy_error")
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
@@ -137,6 +137,7 @@ OUTCOME = np.dtype(
         ),  # N; NaN unless the study's objective asks for it,
         ("peak_crank_moment", np.float64),  # N m, likewise
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
+        ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
         ("kick_growth", np.float64),  # mean logarithm of the growth of a kick per revolution

@@ -120,7 +120,8 @@ class Evaluator:
         """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
-        records = outcome_records(labels, outcome, par, bool(self._problem.effects.responses))
+        effects = self._problem.effects
+        records = outcome_records(labels, outcome, par, bool(effects.responses), bool(effects.wear))
         if self._problem.linkage is not None and not self._problem.linkage.follow:
             records["slider_acceleration_deviation"] = np.nan  # nothing slides
         if self._starts and len(labels):
@@ -174,12 +175,12 @@ def joined(sample: int, group: Records) -> Records:
 
 
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, responses: bool = False
+    labels: Integers, outcome: Outcome, par: Array, responses: bool = False, worn: bool = False
 ) -> Records:
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `responses`, uncertainty and energy error until their makers fill them in.
+    `responses`, sliding work unless `worn`, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
@@ -201,6 +202,8 @@ def outcome_records(
         records[name] = np.nan
     for name in RESPONSES:
         records[name][~(valid & responses)] = np.nan
+    records["sliding_work"] = sliding_work(outcome) if worn else np.nan
+    records["sliding_work"][~valid] = np.nan
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1)
@@ -208,6 +211,15 @@ def outcome_records(
     flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)
     records["flags"] = np.where(valid, flags, 0)
     return records
+
+
+def sliding_work(outcome: Outcome) -> Array:
+    """Normal force times sliding distance in a revolution, J, shape (m, MAX_JOINTS).
+
+    Of the averaged revolutions; one of a crank that is free lasts as long as all do on average.
+    """
+    work: Array = outcome.sliding_power * (outcome.time / outcome.revolutions)[:, None]
+    return work
 
 
 def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:

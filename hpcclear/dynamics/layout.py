@@ -39,6 +39,7 @@ class Effects(NamedTuple):
     responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
     sliding: Any = None  # sliding speeds, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
+    wear: Any = None  # sliding work of the joints with clearance
 
 
 class Open(NamedTuple):
@@ -125,7 +126,8 @@ DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
 SLIDINGS = DRIVE_MOMENT + 1  # of each joint, for the implicit method only
 FOLLOWED_ACCELERATION = SLIDINGS + MAX_JOINTS  # of the slider; for responses only
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
-RATES = FOLLOWED_SQUARE + 1
+SLIDING_POWERS = FOLLOWED_SQUARE + 1  # of each joint, F_N |v_t|; for wear only
+RATES = SLIDING_POWERS + MAX_JOINTS
 
 
 class Integrated(NamedTuple):
@@ -143,6 +145,7 @@ GAPS = tuple(
     Integrated(GAP + k, f"joint_{k}", JOINT_BLOCKS + JOINT_ROWS * k + CLEARANCE) for k in _PLACES
 )
 _FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
+_SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
 MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
     Integrated(ABS_DRIVE_POWER, "ledger"),
@@ -151,6 +154,7 @@ MEASURES = (
     *_FORCES,
     Integrated(FOLLOWED_ACCELERATION, "responses"),
     Integrated(FOLLOWED_SQUARE, "responses"),
+    *_SLIDING,
 )
 INTEGRATED = (*GAPS, *MEASURES)
 """All that is integrated. The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
@@ -161,7 +165,10 @@ INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
     closed = {
-        force.rate for force, flag in zip(_FORCES, open_of(effects), strict=True) if flag is None
+        one.rate
+        for of_joints in (_FORCES, _SLIDING)
+        for one, flag in zip(of_joints, open_of(effects), strict=True)
+        if flag is None
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
     return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
@@ -293,6 +300,7 @@ class Joint(NamedTuple):
     rate: int
     friction: int
     sliding: int
+    sliding_power: int
     active: int  # rows of `work`
     inverse_impact: int
     peak: int
@@ -305,7 +313,8 @@ class Joint(NamedTuple):
 JOINTS = tuple(
     Joint(
         JOINT_BLOCKS + JOINT_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
-        ACTIVE + k, INVERSE_IMPACT + k, PEAK + k, DEEPEST + k, ENDED + k, LATCHED + k, f"joint_{k}",
+        SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k, PEAK + k, DEEPEST + k, ENDED + k, LATCHED + k,
+        f"joint_{k}",
     )
     for k in _PLACES
 )  # fmt: skip

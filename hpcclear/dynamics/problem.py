@@ -195,6 +195,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         ledger=_flag(scene.numerics.energy if ledger is None else ledger),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
+        wear=_flag(bool(scene.worn_joints())),
     )
 
 

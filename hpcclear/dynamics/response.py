@@ -85,7 +85,13 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
         rows[:, s + n : s + 2 * n],
         rows[:, s + 2 * n :],
     )
-    return steps, outcome_records(labels, out, finished, bool(problem.effects.responses)), par[0]
+    return (
+        steps,
+        outcome_records(
+            labels, out, finished, bool(problem.effects.responses), bool(problem.effects.wear)
+        ),
+        par[0],
+    )
 
 
 def _first_row(problem: Problem, par: Array, start: Start, n: int) -> Array:
@@ -276,7 +282,9 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     lanes = ClosedForm(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(*lanes.collect(), bool(problem.effects.responses))
+    record = outcome_records(
+        *lanes.collect(), bool(problem.effects.responses), bool(problem.effects.wear)
+    )
     found = prescribed_series(scene) if scene.is_planar else ideal_series(scene)
     return *found, record
 

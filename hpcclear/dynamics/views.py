@@ -129,6 +129,8 @@ class Outcome(View):
     attempts = Column(at.OUT_ATTEMPTS)
     stiff_steps = Column(at.OUT_STIFF_STEPS)
     mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_12))  # N
+    sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
+    sliding_work = _of_joints(at.OUT_TOTAL + at.place(at.SLIDING_POWERS))  # J
     peak_moment = Column(at.OUT_MOMENT)  # N m
     acceleration_deviation = Column(at.OUT_ACCELERATION)  # m/s^2
     moving = Column(slice(at.OUT_STATE, at.OUT))  # all places of coordinates and velocities

@@ -81,6 +81,7 @@ def _outcome(*per_sample: str) -> Columns:
         "peak_crank_moment": number(per_sample, "N m", "largest size of the moment of the drive on the crank"),
         "slider_acceleration_deviation": number(per_sample, "m/s^2",
         "standard deviation of the slider acceleration in time"),
+        "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
         "energy_error": number(per_sample, "1", "what the energy balance leaves unexplained, relative"),
         "latched": flag(per_joint, "whole revolutions in contact, impact speed frozen"),
         "rhs_evaluations": count(per_sample, "number of evaluations of the equations of motion", required=True),

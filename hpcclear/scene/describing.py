@@ -24,6 +24,8 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         clearance = scene.number(f"{scene.joint_key(name)}.clearance")
         size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
         yield f"clearance {size} in joint {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
+    for name in scene.worn_joints():
+        yield f"wear of joint {name}"
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"

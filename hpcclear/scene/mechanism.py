@@ -16,6 +16,7 @@ from hpcclear.scene.fields import (
     Table,
     invalid,
 )
+from hpcclear.scene.wear import Wear
 
 
 class Link(Table):
@@ -133,6 +134,8 @@ class ClearanceJoint(Table):
     journal: Material
     start_eccentricity: tuple[Length, Length] = (0.0, 0.0)
     """Journal centre minus bearing centre (x, y) at the start, m; centred unless said otherwise."""
+    wear: Wear | None = None
+    """How its surfaces wear; left out, they do not."""
 
     @property
     def journal_radius(self) -> float:

@@ -21,6 +21,7 @@ from hpcclear.scene.fields import (
     nearest,
 )
 from hpcclear.scene.mechanism import Material, check_journal
+from hpcclear.scene.wear import Wear
 
 Angle = Annotated[float, Quantity("rad")]
 Rows = NamedRows()
@@ -160,6 +161,8 @@ class PlanarClearance(Table):
     materials: Materials
     start_eccentricity: Place = NOWHERE
     """Journal centre minus bearing centre at the start, m."""
+    wear: Wear | None = None
+    """How its surfaces wear; left out, they do not."""
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":

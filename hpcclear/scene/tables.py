@@ -149,6 +149,12 @@ class SceneTables(Table):
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
         return self.numerics.responses or self.objective.name.replace("-", "_") in RESPONSES
 
+    def worn_joints(self) -> tuple[str, ...]:
+        """Labels of the joints that wear, in the order of `clearance_joints`."""
+        return tuple(
+            name for name in self.clearance_joints() if self.clearance_joint(name).wear is not None
+        )
+
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""
         if isinstance(self.mechanism, Planar):

@@ -154,6 +154,7 @@ def joint_force(effects, work, par, joint, relative, i, W):
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
+    store_rate(effects.wear, work, joint.sliding_power, normal * abs(sliding), i, W)
     return fx, fy, moment_bearing, -moment_journal, loss
 
 

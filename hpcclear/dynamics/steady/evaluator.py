@@ -101,9 +101,8 @@ class SteadyEvaluator:
         contact = scene.effects.contact
         self._latched = contact is not None and contact.latched
         self._free = scene.drive is not None and scene.drive.kind == "torque"
-        self._responses = bool(
-            self._lanes_of(1e-4, 1).problem.effects.responses
-        )  # refuses what cannot be simulated
+        effects = self._lanes_of(1e-4, 1).problem.effects  # refuses what cannot be simulated
+        self._responses, self._worn = bool(effects.responses), bool(effects.wear)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
         """The lanes for stretches of this kind."""
@@ -173,7 +172,7 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                yield record_of(sample, ask.par, mean, self._responses)
+                yield record_of(sample, ask.par, mean, self._responses, self._worn)
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)
@@ -186,7 +185,7 @@ def _labels(ask: _Ask) -> Integers:
     return ask.sample * _MOST_COPIES + np.arange(len(ask.stretch.start))
 
 
-def record_of(sample: int, par: Array, mean: Mean, responses: bool) -> Records:
+def record_of(sample: int, par: Array, mean: Mean, responses: bool, worn: bool = False) -> Records:
     """What was found as a record (1,): means over stretches and copies, of the peaks too unless the motion is regular.
 
     Parameters
@@ -194,14 +193,18 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool) -> Records:
     sample : int
     par : ndarray, shape (1, PARAMETERS)
     mean : Mean
-    responses : bool
-        Whether further responses were asked for.
+    responses, worn : bool
+        Whether further responses were asked for, and whether a joint wears.
     """
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:
         return failed(sample, mean.status, int(mean.evaluations))
     each = outcome_records(
-        np.zeros(len(rows), np.int64), Outcome(rows), np.repeat(par, len(rows), axis=0), responses
+        np.zeros(len(rows), np.int64),
+        Outcome(rows),
+        np.repeat(par, len(rows), axis=0),
+        responses,
+        worn,
     )
     record = each[:1].copy()
     for name in (
@@ -209,6 +212,7 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool) -> Records:
         "peak_contact_force",
         "peak_crank_moment",
         "slider_acceleration_deviation",
+        "sliding_work",
     ):
         record[name] = each[name].mean(axis=0)
     if mean.stretch == 1:

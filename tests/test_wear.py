@@ -1,0 +1,126 @@
+"""Sliding work of worn joints, through every stepper, against closed forms and an integration of its own."""
+
+import math
+
+import numpy as np
+import pytest
+from oracle import SliderCrank
+from running import HUNT_CROSSLEY, run, scene_with
+
+import hpcclear
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.problem import effects_of
+from hpcclear.scene import load_scene
+
+WEAR = {"length": "20 mm", "bearing": {"coefficient": 1e-15}}
+WORN = {
+    "effects.contact": HUNT_CROSSLEY,
+    "joints.crank_rod.wear": WEAR,
+    "joints.rod_slider.wear": {"length": 0.02, "journal": {"dimensionless": 1e-6, "hardness": "2 GPa"}},
+}  # fmt: skip
+
+
+class Sliding(SliderCrank):
+    """The oracle, with normal force times sliding speed in the place of the gaps."""
+
+    def derivative(self, t, y):
+        powers = []
+        for joint, (journal, bearing, speeds, spins) in zip(
+            self.joints, self.ends(t, y), strict=True
+        ):
+            force, point = joint.forces(journal, bearing, speeds, spins)
+            n = (journal - bearing) / max(abs(journal - bearing), 1e-300)
+            slip = speeds[0] + 1j * spins[0] * (point - journal)
+            slip -= speeds[1] + 1j * spins[1] * (point - bearing)
+            powers.append(-(force * n.conjugate()).real * abs((slip * (1j * n).conjugate()).real))
+        return [*super().derivative(t, y)[:8], *powers]
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """Sliding work of O12 and O23 over one revolution, J."""
+    y, _ = Sliding(scene_with(WORN).resolved()).run(0, 1, "DOP853", 1e-13)
+    return y[8:]
+
+
+@pytest.mark.parametrize("method", ["dormand-prince", "radau", "lobatto"])
+def test_sliding_work_is_that_of_an_independent_integration(method, reference):
+    scene = scene_with({**WORN, "numerics.method": method}, rtol=1e-12)
+    found = run(scene, single=method == "lobatto").out.sliding_work
+    np.testing.assert_allclose(found[:2], reference, rtol=1e-8)
+    assert (found[2:] == 0.0).all()
+
+
+ROTOR = {
+    "format_version": 2,
+    "mechanism": {
+        "kind": "planar",
+        "bodies": {"shaft": {"mass": 1.0, "inertia": 1e-3, "points": {"o": [0.0, 0.0]}}},
+        "joints": {
+            "main": {
+                "kind": "clearance", "journal": "shaft.o", "bearing": "ground.o", "clearance": 1e-4,
+                "bearing_radius": 0.02, "wear": WEAR,
+                "materials": {
+                    name: {"youngs_modulus": 2e11, "poisson_ratio": 0.3} for name in ("bearing", "journal")
+                },
+            }
+        },
+        "drives": {"motor": {"kind": "constant-speed", "body": "shaft", "speed": 100.0, "period": True}},
+        "loads": {"weight": {"kind": "force", "place": "shaft.o", "force": [0.0, -500.0]}},
+    },
+    "effects": {"contact": {"law": "hunt-crossley", "damping": 1.0}},
+    "numerics": {"rtol": 1e-12, "transient_revolutions": 40, "averaged_revolutions": 10},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("revolutions", [10, 20])
+def test_a_journal_that_turns_under_a_constant_load_does_linear_work(revolutions):
+    """F omega (R_J - d/2) for all the time; d is what Hertz's law says."""
+    scene = load_scene(ROTOR).with_({"numerics.averaged_revolutions": revolutions})
+    found = run(scene)
+    c, radius, force = 1e-4, 0.02, 500.0
+    softness = 2.0 * (1.0 - 0.3**2) / 2e11
+    stiffness = 4.0 / (3.0 * softness) * math.sqrt(radius * (radius - c) / c)
+    depth = (force / stiffness) ** (2.0 / 3.0)
+    power = force * 100.0 * (radius - c - 0.5 * depth)
+    assert float(found.out.sliding_power[0]) == pytest.approx(power, rel=1e-10)
+
+
+def test_sliding_work_is_told_where_a_joint_wears_and_nothing_else_changes():
+    plain = hpcclear.evaluate(scene_with({"effects.contact": HUNT_CROSSLEY}), {"m3": [0.14]})
+    worn = hpcclear.evaluate(scene_with(WORN), {"m3": [0.14]})
+    assert "sliding_work" not in plain
+    assert float(worn.objective[0]) == float(plain.objective[0])
+    assert (worn.sliding_work.values > 1.0).all()
+
+
+def test_wear_is_an_effect_of_scenes_with_a_worn_joint():
+    assert effects_of(scene_with(WORN)).wear == 1
+    assert effects_of(scene_with()).wear is None
+    ideal = scene_with({**WORN, "joints.crank_rod": {"kind": "ideal"}})
+    assert ideal.worn_joints() == ("rod_slider",)
+    assert "wear of joint rod_slider" in ideal.effects_on()
+    assert len(at.measures_of(effects_of(ideal))) == 1
+
+
+@pytest.mark.parametrize(
+    ("entry", "key"),
+    [
+        ({"length": 0.02, "bearing": {"coefficient": -1e-15}}, "bearing.coefficient"),
+        ({"length": 0.02, "journal": {"dimensionless": 1e-6}}, "journal.hardness"),
+        ({"length": 0.02, "journal": {"hardness": 1e9}}, "journal.coefficient"),
+        (
+            {"length": 0.02, "journal": {"coefficient": 1e-15, "dimensionless": 1e-6}},
+            "journal.coefficient",
+        ),
+        ({"length": 0.02}, "bearing"),
+        ({"length": 0.0, "bearing": {"coefficient": 1e-15}}, "length"),
+        ({"bearing": {"coefficient": 1e-15}}, "length"),
+    ],
+)
+def test_what_is_no_wear_is_refused(entry, key):
+    with pytest.raises(InputError) as error:
+        scene_with({"joints.crank_rod.wear": entry})
+    assert error.value.key == f"joints.crank_rod.wear.{key}"
+    assert error.value.remedy
