@@ -6,13 +6,17 @@ from dense_mechanism import PHI, THETA2, X2, X3, Y2, admissible, assembled
 from running import scene_with
 from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_of_parameters
 
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import periodic_cells, problem_of
+from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome
+from hpcclear.scene.points import Points
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
 ZERO = np.zeros(2)
@@ -211,3 +215,32 @@ def test_series_of_a_scene_without_clearance_keep_the_energy_balance():
     assert np.abs(series["energy_residual"]).max() < 1e-6 * np.abs(series["driving_work"]).max()
     speed = np.gradient(series["slider_position"], times, edge_order=2)
     assert np.abs(speed - series["slider_velocity"]).max() < 1e-3 * np.abs(speed).max()
+
+
+@pytest.mark.parametrize("drive", ["prescribed", "torque"])
+@pytest.mark.parametrize("longer", [1e-6, 1e-9])
+def test_a_rod_hardly_longer_than_the_crank_is_told(drive, longer):
+    """Energy closes where numbers are given, and where they are not the status says why."""
+    changes = {
+        "joints.crank_rod": {"kind": "ideal"},
+        "joints.rod_slider": {"kind": "ideal"},
+        "effects.friction": {"law": "none"},
+        "mechanism.rod.length": 0.05 + longer,
+        "mechanism.rod.mass_center": 0.02,
+    }
+    if drive == "torque":
+        changes["drive"] = {
+            "kind": "torque", "torque": 5.0, "initial_speed": 520.0, "flywheel_inertia": 0.01
+        }  # fmt: skip
+    scene = scene_with(changes)
+    found = simulate(scene)
+    records = evaluate_records(scene, Points((), np.empty((1, 0)), ()))
+    if longer < 1e-7:
+        assert int(found["status"]) == records["status"][0] == Status.NEAR_SINGULAR
+        assert "play" in Status.NEAR_SINGULAR.message
+        assert np.isnan(float(found["objective"]))
+        assert np.isnan(records["objective"][0])
+    else:
+        assert int(found["status"]) == records["status"][0] == Status.OK
+        off = np.abs(found["energy_residual"]).max() / np.abs(found["kinetic_energy"]).max()
+        assert off < 1e-4

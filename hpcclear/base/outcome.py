@@ -23,6 +23,7 @@ class Status(IntEnum):
     NOT_FINITE = 3
     STALLED = 4
     AVERAGE_CAP = 5
+    NEAR_SINGULAR = 6
 
     @property
     def valid(self) -> bool:
@@ -61,6 +62,10 @@ _TEXT = {
     Status.AVERAGE_CAP: (
         "the standard error of the objective was still above its target at the last revolution allowed",
         "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
+    ),
+    Status.NEAR_SINGULAR: (
+        "the rod is hardly longer than the crank and no joint has play, so that at a dead centre forces grow without bound",
+        'lengthen the rod, or give a joint kind = "clearance"',
     ),
 }
 

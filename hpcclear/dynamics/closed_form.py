@@ -47,7 +47,8 @@ class ClosedForm:
         p = self._problem
         if p.linkage is not None:
             return Outcome(outcomes(p, par))
-        return Outcome(ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged))
+        rows = ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged)
+        return p.mark_near_singular(Outcome(rows), par)
 
 
 def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:

@@ -165,7 +165,7 @@ class Lanes:
         while self.step(NO_LIMIT):
             pass
         self.counters[FINISHED] = 0
-        return Outcome(self._queue.out)
+        return self.problem.mark_near_singular(Outcome(self._queue.out), par)
 
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), m starts, labels (m,).
@@ -238,4 +238,6 @@ class Lanes:
         count = int(self.counters[FINISHED])
         slots = self._queue.finished[:count].copy()
         self.counters[FINISHED] = 0
-        return self._labels[slots], Outcome(self._queue.out[slots]), self._queue.par[slots]
+        par = self._queue.par[slots]
+        outcome = self.problem.mark_near_singular(Outcome(self._queue.out[slots]), par)
+        return self._labels[slots], outcome, par
