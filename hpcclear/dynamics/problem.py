@@ -40,8 +40,8 @@ STIFF_DAMPING = 10.0
 """Fixed damping factor in s/m, or coefficient of a law with restitution, from which it does."""
 
 LEAST_RISE = 5e-3
-"""Cosine of the rod's steepest angle below which a crank without play is not simulated: the inertia that it feels changes within
-so small a part of a turn, 2 LEAST_RISE rad, that steps pass over it. With 6e-3 the energy still closes to 1e-4, with 2e-3 to 0.15."""
+"""Cosine of the rod's steepest angle below which a crank without play is not simulated: the inertia that it feels changes
+within so small a part of a turn that steps pass over it. With 6e-3 the energy still closes to 1e-4, with 2e-3 to 0.15."""
 
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""
