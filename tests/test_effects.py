@@ -1,9 +1,8 @@
 """Effects together: every pair once, on-at-zero equals off, torque drives, joints removed, contradictions."""
 
-import itertools
-
 import numpy as np
 import pytest
+from pairwise import all_pairs, pairs_of, pairwise_table
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
 
 from hpcclear.base.errors import InputError
@@ -50,43 +49,7 @@ def allowed(row):
     return True
 
 
-def pairs_of(row):
-    names = [name for name in FACTORS if name in row]
-    for a, b in itertools.combinations(names, 2):
-        yield a, FACTORS[a].index(row[a]), b, FACTORS[b].index(row[b])
-
-
-def all_pairs():
-    for a, b in itertools.combinations(FACTORS, 2):
-        for x, y in itertools.product(FACTORS[a], FACTORS[b]):
-            if allowed({a: x, b: y}):
-                yield a, FACTORS[a].index(x), b, FACTORS[b].index(y)
-
-
-def pairwise_table():
-    """Rows that hold every allowed pair of levels at least once; greedy, the same at every call."""
-    left = dict.fromkeys(all_pairs())
-    rng = np.random.default_rng(1)
-    rows = []
-    while left:
-        a, i, b, j = next(iter(left))
-        best, most = {}, -1
-        for _ in range(60):
-            row = {a: FACTORS[a][i], b: FACTORS[b][j]}
-            for name in rng.permutation([n for n in FACTORS if n not in row]):
-                levels = [x for x in FACTORS[name] if allowed({**row, name: x})]
-                gains = [sum(p in left for p in pairs_of({**row, name: x})) for x in levels]
-                row[name] = levels[int(np.argmax(gains))]
-            gain = sum(p in left for p in pairs_of(row))
-            if gain > most and allowed(row):
-                best, most = row, gain
-        rows.append({name: best[name] for name in FACTORS})
-        for pair in pairs_of(best):
-            left.pop(pair, None)
-    return rows
-
-
-TABLE = pairwise_table()
+TABLE = pairwise_table(FACTORS, allowed)
 
 
 def name_of(row):
@@ -122,8 +85,8 @@ def scene_of(row, **more):
 
 
 def test_the_table_holds_every_pair():
-    met = {pair for row in TABLE for pair in pairs_of(row)}
-    assert met == set(all_pairs())
+    met = {pair for row in TABLE for pair in pairs_of(FACTORS, row)}
+    assert met == set(all_pairs(FACTORS, allowed))
     assert all(allowed(row) for row in TABLE)
     assert len(TABLE) <= 20
 
