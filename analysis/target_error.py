@@ -2,6 +2,7 @@
 
 python analysis/target_error.py --scenes 200      (two hours on one core: most of it for the means to compare with)
 python analysis/target_error.py --first 40 --scenes 10 -o results/some.jsonl
+python analysis/target_error.py --linkages --scenes 60      (four-bars and six-bars)
 
 Results are kept scene by scene, a line of JSON each; the same command goes on from there.
 """
@@ -10,6 +11,7 @@ import argparse
 import json
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import tables_of
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
@@ -30,6 +33,7 @@ from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
 TARGETS = (1e-2, 1e-3, 1e-4)
+LINKAGES = {"four-bar": "crank_rocker", "six-bar": "press"}
 KINDS = ("two clearances", "one clearance", "latched", "torque drive", "guide friction")
 NOTHING = Points((), np.empty((1, 0)), ())
 
@@ -86,12 +90,54 @@ def random_scene(number: int) -> tuple[str, Scene]:
     return kind, load_scene(JOB.parent / "hunt_crossley.toml").with_(changes)
 
 
+def random_linkage(number: int) -> tuple[str, Scene]:
+    """A four-bar or a six-bar of ordinary size that closes, with play in two joints."""
+    kind = tuple(LINKAGES)[number % len(LINKAGES)]
+    scene = load_scene(JOB.parent / "linkages" / f"{LINKAGES[kind]}.toml").with_({"study": None})
+    for attempt in range(100):
+        rng = np.random.default_rng([2027, number, attempt])
+        try:
+            made = scene.with_(linkage_changes(scene, rng))
+            start_states(made, parameters(made))
+        except InputError:
+            continue  # does not close, or does not turn round
+        return kind, made
+    raise InputError("scene", number, "no linkage found that closes", "widen what is drawn")
+
+
+def linkage_changes(scene: Scene, rng: np.random.Generator) -> dict[str, object]:
+    """Lengths 10 % about those of the scene, masses and inertias up to threefold, play, speed, contact and friction."""
+    tables = tables_of(scene)
+    changes: dict[str, object] = {
+        "numerics.target_error": None,
+        "effects.contact": {"law": "hunt-crossley", "damping": 10.0 ** rng.uniform(-1.3, 0.7)},
+        "effects.friction": {
+            "law": "coulomb",
+            "coefficient": float(rng.choice([0.005, 0.02, 0.1])),
+            "ramp_speed": 0.01,
+        },
+        "mechanism.drives.motor.speed": 10.0 ** rng.uniform(np.log10(200.0), np.log10(2000.0)) * np.pi / 30.0,
+    }  # fmt: skip
+    for body in tables.bodies:
+        path = f"mechanism.bodies.{body.name}"
+        if body.length is not None:
+            changes[f"{path}.length"] = body.length * rng.uniform(0.9, 1.1)
+        weight = 10.0 ** rng.uniform(-0.5, 0.5)
+        changes[f"{path}.mass"] = body.mass * weight
+        if body.inertia:
+            changes[f"{path}.inertia"] = body.inertia * weight
+    for joint in scene.clearance_joints():
+        changes[f"{scene.joint_key(joint)}.clearance"] = 10.0 ** rng.uniform(-5.0, -3.5)
+    return changes
+
+
 def truth(scene: Scene, rtol: float) -> tuple[float, float, int]:
     """Mean of f after a long spin-up, its relative standard error, copies it is made of.
 
     Eight copies over twice 64 revolutions where these all agree to 1e-6, else 64 copies over 300.
     """
-    spin_up = 1000 if scene.drive.kind == "torque" else 200
+    torque = scene.drive is not None and scene.drive.kind == "torque"
+    spin_up = 1000 if torque else 200
     first, start = _long(scene, rtol, 8, spin_up, 64)
     second, _ = _long(scene, rtol, 8, 0, 64, start)
     f = np.concatenate([first, second])
@@ -133,10 +179,15 @@ def _long(
     return objective(outcome.mean_gap), outcome.end()
 
 
-def measured(number: int, rtol: float, known: dict[str, Any] | None) -> dict[str, Any]:
+def measured(
+    number: int,
+    rtol: float,
+    known: dict[str, Any] | None,
+    drawn: Callable[[int], tuple[str, Scene]] = random_scene,
+) -> dict[str, Any]:
     """What three targets come to on one scene; its truth is taken from earlier results, if there are any."""
     try:
-        kind, scene = random_scene(number)
+        kind, scene = drawn(number)
     except InputError as error:
         return {"scene": number, "refused": str(error)}
     began = time.process_time()
@@ -190,22 +241,26 @@ def main() -> None:
     parser.add_argument(
         "--truth", type=Path, help="earlier results whose means to compare with are taken"
     )
-    parser.add_argument("-o", "--output", type=Path, default=Path("results/target_error.jsonl"))
+    parser.add_argument("--linkages", action="store_true", help="four-bars and six-bars")
+    parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
+    drawn = random_linkage if options.linkages else random_scene
+    name = "target_error_linkages" if options.linkages else "target_error"
+    options.output = options.output or Path(f"results/{name}.jsonl")
     options.output.parent.mkdir(exist_ok=True)
     options.output.touch()
     known, earlier = read(options.output), read(options.truth)
     scenes = []
     for number in range(options.first, options.first + options.scenes):
         if number not in known:
-            known[number] = measured(number, options.rtol, earlier.get(number))
+            known[number] = measured(number, options.rtol, earlier.get(number), drawn)
             with options.output.open("a") as file:
                 file.write(json.dumps(known[number]) + "\n")
         scenes.append(known[number])
         print(told(known[number]), flush=True)
     rows = [row for found in scenes for row in found.get("targets", [])]
     summary(rows, "all")
-    for kind in KINDS:
+    for kind in LINKAGES if options.linkages else KINDS:
         summary(
             [row for found in scenes if found.get("kind") == kind for row in found["targets"]], kind
         )
