@@ -110,6 +110,7 @@ def linkage_changes(scene: Scene, rng: np.random.Generator) -> dict[str, object]
     tables = tables_of(scene)
     changes: dict[str, object] = {
         "numerics.target_error": None,
+        "numerics.max_steps": 10**9,
         "effects.contact": {"law": "hunt-crossley", "damping": 10.0 ** rng.uniform(-1.3, 0.7)},
         "effects.friction": {
             "law": "coulomb",

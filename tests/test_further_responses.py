@@ -101,8 +101,11 @@ def test_ranks_know_what_a_study_asks_for(how):
     assert all(np.isfinite(records[name]).all() for name in RESPONSES)
 
 
+WORN = {"joints.crank_rod.wear": {"length": 0.02, "journal": {"coefficient": 1e-15}}}
+
+
 def test_what_is_asked_for_is_in_the_file():
-    records = evaluate_records(asking({"numerics.energy": True}), NOTHING, lanes=1)
+    records = evaluate_records(asking({"numerics.energy": True, **WORN}), NOTHING, lanes=1)
     content = dataset.samples_dataset((), np.empty((1, 0)), {}, records)
     assert set(ON_REQUEST) <= set(content.data_vars) <= set(KINDS["samples"].data)
     assert dataset.records(content).tobytes() == records.tobytes()

@@ -57,6 +57,12 @@ def measure(
             "mechanism.kind", "planar", "what accuracy costs is measured on slider-cranks alone so far",
             "Compare numerics.rtol by hand with simulate, or set numerics.uncertainty = true",
         )  # fmt: skip
+    if scene.objective.joints:
+        raise InputError(
+            "numerics.objective_joints", scene.numerics.objective_joints,
+            "what accuracy costs is measured for all joints together",
+            "Leave the joints out for this command",
+        )  # fmt: skip
     if not scene.clearance_joints():
         raise InputError(
             "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"

@@ -4,7 +4,7 @@ The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` 
 place, on the rank that simulated it, and everybody after that reads ``objective``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,27 +14,40 @@ from hpcclear.base.outcome import OUTCOME
 
 
 class Objective(NamedTuple):
-    """One objective: `name` in a scene file, SI `unit`, `words` for people, and its value `of` records (n,)."""
+    """One objective: `name` in a scene file, SI `unit`, `words` for people, and its value `of` records (n,).
+
+    `joints`: places of those that count, which the field `by_joint` of a record goes by; none for all.
+    """
 
     name: str
     unit: str
     words: str
     of: Callable[[Records], Array]
+    by_joint: str | None = None
+    joints: tuple[int, ...] = ()
 
 
 _ALL = (
-    Objective("mean-gap", "m", "mean distance from the clearance circle", lambda r: r["objective"]),
+    Objective(
+        "mean-gap",
+        "m",
+        "mean distance from the clearance circle",
+        lambda r: r["objective"],
+        "mean_gap",
+    ),
     Objective(
         "mean-contact-force",
         "N",
         "mean contact force, of the joint where it is larger",
         lambda r: r["mean_contact_force"].max(axis=1),
+        "mean_contact_force",
     ),
     Objective(
         "peak-contact-force",
         "N",
         "peak contact force, of the joint where it is larger",
         lambda r: r["peak_contact_force"].max(axis=1),
+        "peak_contact_force",
     ),
     Objective(
         "peak-crank-moment",
@@ -55,6 +68,22 @@ OBJECTIVES = {one.name: one for one in _ALL}
 MEAN_GAP = OBJECTIVES["mean-gap"]
 """f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
 
+
+def of_joints(objective: Objective, places: Sequence[int], labels: Sequence[str]) -> Objective:
+    """The same of chosen joints only, by their places in a record and by their labels."""
+    field = objective.by_joint
+    words = f"{objective.words.partition(', of the joint')[0]}, of {' and '.join(labels)}"
+    if len(places) > 1 and objective.name != MEAN_GAP.name:
+        words += ", the larger"
+
+    def largest(records: Records) -> Array:
+        found: Array = records[field][:, list(places)].max(axis=1)
+        return found
+
+    of = objective.of if objective.name == MEAN_GAP.name else largest
+    return objective._replace(words=words, of=of, joints=tuple(places))
+
+
 _OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("objective_"))
 
 
@@ -63,7 +92,7 @@ def asked(records: Records, objective: Objective) -> Records:
 
     How far f scatters between revolutions and copies says nothing of another objective, so that is NaN then.
     """
-    if objective is MEAN_GAP:
+    if objective.name == MEAN_GAP.name:  # of whichever joints, the kernel has it
         return records
     found = records.copy()
     found["objective"] = objective.of(records)

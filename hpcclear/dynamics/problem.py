@@ -79,6 +79,8 @@ class Problem:
         Whose motion it is; without one, a slider-crank's by its effects.
     curves : tuple of numpy.ndarray
         Cubic cells of a linkage's tables.
+    chosen : tuple of int
+        Places of the joints whose gaps count for f; none for all.
 
     Raises
     ------
@@ -105,6 +107,7 @@ class Problem:
     parameter_rows: int = at.OWN
     linkage: Linkage | None = None
     curves: tuple[Array, ...] = ()
+    chosen: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.coordinates
@@ -130,7 +133,9 @@ class Problem:
         s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
-        s.cycle, s.parameter_rows, s.chosen = self.cycle, self.parameter_rows, 1.0
+        s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
+        s.chosen = 0.0 if self.chosen else 1.0
+        s.chosen[list(self.chosen)] = 1.0
         s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
         return s
 
@@ -368,6 +373,7 @@ def problem_of(
         parameter_rows=at.OWN if linkage is None else linkage.parameter_rows,
         linkage=linkage,
         curves=curves,
+        chosen=scene.objective.joints,
     )
 
 

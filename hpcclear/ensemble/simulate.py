@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from hpcclear.base.objectives import OBJECTIVES, Objective, asked
+from hpcclear.base.objectives import Objective, asked
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks, Task
@@ -38,8 +38,8 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     content.pop("study", None)
     content["numerics"]["responses"] = scene.responses_asked()
     return {
-        "objective": scene.objective.name,
         "scene": content,
+        "objective": scene.objective.name,
         "names": points.names,
         "paths": points.paths,
         "lanes": DEFAULT_LANES,
@@ -72,8 +72,9 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
 
     nothing = np.empty((0, len(payload["names"])))
     columns = Points(payload["names"], nothing, payload["paths"])
-    evaluator = evaluator_of(load_scene(payload["scene"]), columns, payload["lanes"])
-    return Judge(first_compiled(evaluator, ranks), OBJECTIVES[payload["objective"]])
+    scene = load_scene(payload["scene"])
+    evaluator = evaluator_of(scene, columns, payload["lanes"])
+    return Judge(first_compiled(evaluator, ranks), scene.objective_named(payload["objective"]))
 
 
 def first_compiled(worker: Compiled, ranks: Ranks) -> Compiled:

@@ -99,7 +99,7 @@ def dataset(
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
-    if objective is not MEAN_GAP:
+    if objective != MEAN_GAP:
         fixed["objective"] = objective.words
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 

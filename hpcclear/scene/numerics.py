@@ -39,6 +39,8 @@ class Numerics(Table):
     """For "auto": relative standard error of the objective at which averaging ends."""
     max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
     """For "auto": the cap."""
+    objective_joints: tuple[str, ...] = ()
+    """Joints with clearance whose gaps or contact forces count for the objective; all, where none is named."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
     """Accepted and rejected steps of one sample together; beyond it the sample ends with status
     STEP_CAP."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective
+from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, of_joints
 from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
@@ -122,6 +122,34 @@ class SceneTables(Table):
             )
         return self
 
+    @model_validator(mode="after")
+    def _objective_s_joints_are_there(self) -> Self:
+        chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
+        clearance = self.clearance_joints()
+        for joint in chosen:
+            if joint not in clearance:
+                raise invalid(
+                    f"{joint} is no joint with clearance of this scene",
+                    nearest(joint, clearance),
+                    key=key,
+                )
+        if len(set(chosen)) < len(chosen):
+            raise invalid("a joint is named twice", "Name each once", key=key)
+        asked = MEAN_GAP.name if self.study is None else self.study.objective
+        if chosen and OBJECTIVES[asked].by_joint is None:
+            raise invalid(
+                f'study.objective = "{asked}" is of no joint',
+                "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
+                key=key,
+            )
+        if chosen and self.numerics.target_error is not None:
+            raise invalid(
+                "limits of a steady mean are known for the gaps of all joints only",
+                "Leave out the joints, or numerics.target_error",
+                key=key,
+            )
+        return self
+
     @property
     def required_study(self) -> Study:
         """The study of a scene that needs one.
@@ -143,7 +171,13 @@ class SceneTables(Table):
     @property
     def objective(self) -> Objective:
         """What each sample is judged by: the study's objective, f where there is no study."""
-        return MEAN_GAP if self.study is None else OBJECTIVES[self.study.objective]
+        return self.objective_named(MEAN_GAP.name if self.study is None else self.study.objective)
+
+    def objective_named(self, name: str) -> Objective:
+        """An objective, of the joints that count here."""
+        chosen = self.numerics.objective_joints
+        places = [self.joint_labels.index(joint) for joint in chosen]
+        return of_joints(OBJECTIVES[name], places, chosen) if chosen else OBJECTIVES[name]
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""

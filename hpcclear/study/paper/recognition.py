@@ -8,6 +8,7 @@ variables are free.
 
 import math
 
+from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import JOINTS
 from hpcclear.scene import Scene
 from hpcclear.scene.citation import TITLE
@@ -36,6 +37,6 @@ def is_the_papers(scene: Scene) -> bool:
         and scene.clearance_joints() == JOINTS
         and scene.drive.kind == "constant-speed"
         and math.isclose(scene.number("drive.speed"), _SPEED, rel_tol=1e-9)
-        and scene.required_study.objective == "mean-gap"
+        and scene.objective == MEAN_GAP
         and {"m2", "m3", "u2", "I2", "C"} <= own_names(scene).keys()
     )
