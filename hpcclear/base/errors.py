@@ -1,6 +1,14 @@
 """Errors a user can mend: one message with key, value, reason and remedy."""
 
+import errno
 import os
+import resource
+from collections.abc import Iterator
+
+LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
+
+_NO_HANDLES = (errno.EMFILE, errno.ENFILE)
+_BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
 
 
 class InputError(ValueError):
@@ -30,6 +38,8 @@ class InputError(ValueError):
         # a file's place is of use only whole
         if len(shown) > 80 and os.sep not in shown:
             shown = shown[:77] + "..."
+        elif len(shown) > LONGEST_SHOWN:
+            shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
         return f"{self.key} = {shown}: {self.reason}. {self.remedy}"
 
 
@@ -54,3 +64,53 @@ class StorageError(RuntimeError):
 
     def __str__(self) -> str:
         return f"cannot write {self.path}: {self.reason}. {self.remedy}"
+
+
+class LimitError(RuntimeError):
+    """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
+
+
+def mendable(error: BaseException) -> InputError | LimitError | None:
+    """What a user can do about an error that is no fault of the program; None if it may be one.
+
+    Too little memory shows itself in many ways under a limit of address space (``ulimit -v``): libraries that cannot
+    be mapped, errors from inside an import. Paths may be too long, or lead where nobody may look, for any call.
+    """
+    chain = list(_chain(error))
+    for one in chain:
+        number = one.errno if isinstance(one, OSError) else None
+        if number in _NO_HANDLES:
+            return LimitError(
+                "too few file handles. Raise the limit (ulimit -n), then run the same command again"
+            )
+        if isinstance(one, OSError) and number in _BAD_NAMES and one.filename is not None:
+            name = (
+                os.fsdecode(one.filename) if isinstance(one.filename, bytes) else str(one.filename)
+            )
+            return InputError(
+                "file", name, os.strerror(number or 0), "Choose another name or place"
+            )
+        if isinstance(one, MemoryError) or number == errno.ENOMEM:
+            return _out_of_memory(str(one))
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and any(
+        isinstance(one, ImportError | SystemError | OSError) for one in chain
+    ):
+        return _out_of_memory(f"the limit of address space is {limit // 2**20} MB")
+    return None
+
+
+def _out_of_memory(why: str) -> LimitError:
+    known = f" ({why})" if why else ""
+    return LimitError(
+        f"out of memory{known}. Give the job more memory, or fewer ranks a node, and run the same command again"
+    )
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """An error, and those that it came of."""
+    seen: list[BaseException] = []
+    while error is not None and error not in seen:
+        yield error
+        seen.append(error)
+        error = error.__cause__ or error.__context__

@@ -6,9 +6,10 @@ known to the target error.
 
 import contextlib
 import functools
+import io
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +17,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcclear import __version__
-from hpcclear.base.errors import InputError, StorageError
-from hpcclear.ranks.launcher import launched_rank, pin_threads
+from hpcclear.base.errors import InputError, StorageError, mendable
+from hpcclear.ranks.launcher import is_launched, launched_rank, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
+
+_ROOT_ALONE = ("init", "check", "simulate", "report", "schema")
+"""Commands for which no rank goes into MPI: the others have left when root begins."""
 
 _FILE = click.argument("file", type=click.Path(path_type=Path))
 _SET = click.option(
@@ -212,10 +216,10 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
-    from hpcclear.results import dataset, files
+    from hpcclear.results import dataset, files, netcdf
 
     scene = _scene(file, overrides)
-    files.probe(_place(output))
+    files.probe(_place(output), netcdf.SEAL)
     began = time.perf_counter()
     response = simulate_scene(scene)
     dataset.write(response, output)
@@ -275,6 +279,7 @@ def sample(
     """
 
     def program(ranks: "Ranks") -> None:
+        _check_kind(points, statistics, raw)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.session import Options
@@ -288,7 +293,6 @@ def sample(
         else:
             describe_samples(run_sample(scene, place, ranks, table=points, options=options))
 
-    _check_kind(points, statistics, raw)
     return _on_ranks(program, how.time_limit)
 
 
@@ -461,6 +465,27 @@ def schema() -> int:
     return Exit.DONE
 
 
+def _check_words(words: Sequence[str]) -> None:
+    """Raise UsageError where a word is no text: it would have to stand in result files, which hold text only."""
+    for word in words:
+        if not word.isascii() and word != word.encode("utf-8", "replace").decode():
+            raise click.UsageError(f"{word!r} is no text in UTF-8. Choose another name")
+
+
+def _refused(error: click.ClickException) -> int:
+    """Say what is wrong with the words of a command; ranks that got other words do not wait for this one."""
+    context = getattr(error, "ctx", None)
+    if is_launched() and (context is None or context.command.name not in _ROOT_ALONE):
+        from hpcclear.ranks.boundary import refuse_together
+
+        text = io.StringIO()
+        error.show(text)
+        return refuse_together(text.getvalue().rstrip())
+    if _is_root():
+        error.show()
+    return Exit.BAD_INPUT
+
+
 def _say(text: str) -> None:
     """An error message, from root only."""
     if _is_root():
@@ -472,11 +497,10 @@ def main(arguments: list[str] | None = None) -> None:
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:
+            _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
         except click.ClickException as error:
-            if _is_root():
-                error.show()
-            code = Exit.BAD_INPUT
+            code = _refused(error)
         except (click.Abort, KeyboardInterrupt):
             code = Exit.STOPPED
         except InputError as error:
@@ -488,4 +512,10 @@ def main(arguments: list[str] | None = None) -> None:
         except BrokenPipeError:  # the reader of a pipe has seen enough
             sys.stderr.close()
             code = Exit.DONE
+        except (MemoryError, OSError, ImportError, SystemError) as error:
+            known = mendable(error)
+            if known is None:
+                raise
+            _say(f"Error: {known}")
+            code = Exit.BAD_INPUT if isinstance(known, InputError) else Exit.FAILED
     sys.exit(int(code or 0))

@@ -20,7 +20,7 @@ import xarray as xr
 from hpcclear.base.outcome import JOINTS
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import COLUMNS, Ranks
-from hpcclear.results import dataset, files
+from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard, key_attribute
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
@@ -80,10 +80,13 @@ class Place:
         InputError, StorageError
             Nothing can be written there.
         """
-        files.probe(output)
+        if not (fresh and output.is_file()):  # which stays as it is
+            files.refuse_foreign(output, netcdf.SEAL)
         if fresh and any(os.path.lexists(path) for path in (output, parts_of(output))):
             output = fresh_sibling(output)
+        files.probe(output, netcdf.SEAL)
         parent = output.parent
+        files.refuse_foreign(parent / "timing.nc", netcdf.SEAL)
         lock = parent / f".{output.name}.lock"
         return cls(output, parts_of(output), parent / "timing.nc", lock, (parent,))
 

@@ -6,6 +6,8 @@ the same exit code, within seconds. Without a launcher there is one process and 
 """
 
 import contextlib
+import faulthandler
+import os
 import sys
 import time
 import traceback
@@ -14,11 +16,17 @@ from collections.abc import Callable
 from typing import Any
 
 from hpcclear.base.cores import among_ranks
-from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.errors import InputError, StorageError, mendable
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Mail, Nap, Tag
 from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
 from hpcclear.ranks.team import Leave, RankFailed, Ranks
+
+PATIENCE = 600.0
+"""Seconds that a rank waits for all others to come into MPI: a cold start of many nodes takes some minutes."""
+
+COMPLAINT_PATIENCE = 30.0
+"""Seconds that a rank which cannot begin waits for them: they may be at something that needs no MPI."""
 
 
 def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None = None) -> int:
@@ -47,12 +55,53 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
+        if _refused(mail, ""):
+            return Exit.BAD_INPUT
         ranks = Ranks(mail, stop)
         if ranks.size > 1:
             among_ranks()
         code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
         mail.finalize()
         return code
+
+
+def refuse_together(complaint: str) -> int:
+    """End all ranks because this one cannot begin: the others wait for it in MPI; exit code 2.
+
+    Parameters
+    ----------
+    complaint : str
+        What is wrong, as it is to be shown once, by root.
+    """
+    try:
+        mail = _open_mail(COMPLAINT_PATIENCE)
+    except InputError:
+        if launcher.launched_rank() in (0, None):
+            _say(complaint)
+    else:
+        _refused(mail, complaint)
+    return Exit.BAD_INPUT
+
+
+def _refused(mail: Mail, complaint: str) -> bool:
+    """Whether the ranks cannot begin together, which root says; every rank calls it and hears the same."""
+    said = mail.everyone((complaint, os.environ.get("HPCCLEAR_LANES", "")))
+    complaints = [(rank, text) for rank, (text, _) in enumerate(said) if text]
+    lanes = sorted({asked for _, asked in said})
+    if complaints:
+        rank, text = complaints[0]
+        text = text if rank == 0 else f"rank {rank} of {mail.size}: {text}"
+    elif len(lanes) > 1:
+        shown = ", ".join(asked or "nothing" for asked in lanes)
+        reason = "it differs from rank to rank"
+        remedy = "Set the same for all, or for none"
+        text = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}"
+    else:
+        return False
+    if mail.rank == 0:
+        _say(text)
+    mail.finalize()
+    return True
 
 
 def alone() -> Ranks:
@@ -90,7 +139,7 @@ def _load_mpi() -> Any:
     return MPI
 
 
-def _open_mail() -> Mail:
+def _open_mail(patience: float = PATIENCE) -> Mail:
     if not launcher.is_launched() and "mpi4py.MPI" not in sys.modules:
         return Mail()
     mpi = _load_mpi()
@@ -98,7 +147,10 @@ def _open_mail() -> Mail:
     if begins:
         with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
             warnings.filterwarnings("ignore", "suspicious MPI execution environment")
+            # it holds the interpreter while others are missing: only this clock runs on
+            faulthandler.dump_traceback_later(patience, exit=True)
             mpi.Init_thread()
+            faulthandler.cancel_dump_traceback_later()
     variable, copies = launcher.launched_size()
     if copies > 1 and mpi.COMM_WORLD.size == 1:
         raise InputError(
@@ -128,8 +180,11 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
     except BaseException as error:  # noqa: BLE001 - the rank boundary
-        code, text = Exit.FAILED, _report(ranks, error)
+        user_error = isinstance(mendable(error), InputError)
+        code = Exit.BAD_INPUT if user_error else Exit.FAILED
+        text = _report(ranks, error)
     if text:
+        ranks.stop_switch.told = True
         _say(text)
     return _dismiss(ranks, int(code))
 
@@ -185,13 +240,12 @@ def _tell_root(ranks: Ranks, error: BaseException) -> int:
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:
-    """Where a program error happened, and its traceback; for want of memory, what to do about it."""
-    if isinstance(error, MemoryError):
-        why = f" ({error})" if str(error) else ""
-        return (
-            f"Error: out of memory on {ranks.where}{why}. Give the job more memory, or fewer ranks a "
-            "node, and run the same command again; what was finished is saved"
-        )
+    """Where a program error happened, and its traceback; for want of memory and the like, what to do about it."""
+    known = mendable(error)
+    if isinstance(known, InputError):
+        return f"Error: {known}"
+    if known is not None:
+        return f"Error: {ranks.where}: {known}; what was finished is saved"
     trace = "".join(traceback.format_exception(error)).rstrip()
     return f"hpcclear failed on {ranks.where}\n{trace}"
 

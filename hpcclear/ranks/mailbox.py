@@ -86,6 +86,10 @@ class Mail:
         self.node_rank, self.node_size = self._node.rank, self._node.size
         self.node_cores = len(set().union(*self._node.allgather(set(cores))))
 
+    def everyone(self, word: object) -> list[Any]:
+        """What every rank has to say, by rank; all must call it at the same time, before any work."""
+        return [word] if self._mpi is None else self._comm.allgather(word)
+
     def send(self, to: int, tag: Tag, body: object = None) -> None:
         """Post a message."""
         if self._mpi is not None:

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from enum import IntEnum
 from types import FrameType, TracebackType
 
+from hpcclear.ranks.launcher import launched_rank
+
 STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
 """What batch systems and people send to end a job."""
 
@@ -60,6 +62,8 @@ class StopSwitch:
         self._previous: dict[int, object] = {}
         self._mouth: socket.socket | None = None
         self.last_resort: Callable[[int], object] = os._exit
+        self._is_first = launched_rank() in (0, None)  # one of all copies tells how it ended
+        self.told = not self._is_first
 
     @property
     def reason(self) -> str:
@@ -85,7 +89,8 @@ class StopSwitch:
 
     def leave_within(self, seconds: float, code: int) -> None:
         """Make sure that the process ends in time with `code`, come what may."""
-        due = time.monotonic() + seconds
+        # an abort by another rank must not overtake the first one's last word
+        due = time.monotonic() + seconds + (0.0 if self._is_first else 0.5)
         self._leave_at = due if self._leave_at is None else min(due, self._leave_at)
         self._code = code
         self._rouse()
@@ -153,6 +158,11 @@ class StopSwitch:
         self.request(f"{signal.Signals(number).name} was received")
 
     def _end(self, code: int) -> None:
+        if code == Exit.STOPPED and not self.told:
+            self.told = True
+            text = f"Stopped early: {self.reason}, in the midst of something. The same command goes on from what is saved.\n"
+            os.write(2, text.encode())  # the main thread may hold what sys.stderr needs
+            time.sleep(0.2)  # the launcher passes it on
         threading.Thread(target=self.last_resort, args=(code,), daemon=True).start()
         time.sleep(0.5)  # the last resort may be an MPI call, and hang
         os._exit(code)

@@ -5,12 +5,15 @@ import errno
 import os
 import re
 import secrets
+import stat
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, StorageError
 
 TEMPORARY = re.compile(r"\.hpcclear-[0-9a-f]{16}\.tmp")
 """Names of files that were being written; what is left of them after a kill is rubbish."""
+
+_LOOK = 4096  # bytes at each end of a file in which the mark of its kind stands
 
 _ATTEMPTS = 5  # of writing a file whose temporary a run that starts takes for such a leftover
 
@@ -27,14 +30,20 @@ _USER_ERRORS = {
     errno.ENAMETOOLONG: "choose a shorter name",
 }
 _DISK_ERRORS = {
-    errno.ENOSPC: "Free some space, then run the same command again",
+    errno.ENOSPC: "Free some space (or remove files, where there may be only so many), then run the same command again",
     errno.EDQUOT: "Your quota is used up: free some space, then run the same command again",
+    errno.EMFILE: "Raise the limit of open files (ulimit -n), then run the same command again",
     errno.EFBIG: "Raise the file size limit (ulimit -f), then run the same command again",
 }
 
 
-def refused(path: Path, error: OSError) -> InputError | StorageError:
-    """What to raise for an `OSError` met while writing `path`: a wrong place or a failing disk."""
+def refused(path: Path, error: OSError | ValueError) -> InputError | StorageError:
+    """What to raise for an error met while writing `path`: a wrong place or a failing disk.
+
+    A `ValueError` (a NUL character, text that no file name can be) is a wrong place.
+    """
+    if isinstance(error, ValueError):
+        return InputError("output", str(path), "no file can be called so", "Choose another name")
     reason = os.strerror(error.errno) if error.errno else str(error)
     if error.errno in _USER_ERRORS:
         return InputError("output", str(path), reason, _USER_ERRORS[error.errno].capitalize())
@@ -42,19 +51,76 @@ def refused(path: Path, error: OSError) -> InputError | StorageError:
     return StorageError(str(path), reason, remedy + "; results written earlier are intact")
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Put `content` at `path` whole: temporary name beside it, fsync, rename, fsync of the parent.
+def refuse_foreign(path: Path, mark: bytes) -> None:
+    """Refuse to replace what this program did not write: devices, pipes, and files without its mark.
 
-    A symbolic link at `path` is replaced, never followed. The temporary is removed when anything
-    goes wrong.
+    Parameters
+    ----------
+    path : Path
+        Where something is to be written; what is not there is nobody's. A symbolic link to a file may
+        be replaced, since what it leads to stays.
+    mark : bytes
+        What every file of the kind to be written holds near one of its ends; empty: none may be there.
 
     Raises
     ------
     InputError
-        The place cannot be written to (permission, missing directory, directory in the way).
+        Something of somebody else's is in the way.
+    """
+    try:
+        about = path.lstat()
+        if stat.S_ISLNK(about.st_mode) and not _among_devices(path):
+            about = path.stat()
+            ours = stat.S_ISREG(about.st_mode)
+        else:
+            ours = stat.S_ISREG(about.st_mode) and _is_marked(path, mark)
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as error:
+        raise refused(path, error) from None
+    if stat.S_ISDIR(about.st_mode):
+        raise refused(path, OSError(errno.EISDIR, ""))
+    if not ours:
+        regular = stat.S_ISREG(about.st_mode)
+        reason = (
+            "hpcclear did not write what is there, or it was cut off"
+            if regular
+            else "it is no regular file"
+        )
+        remedy = "Choose another name" + (", or move that file away" if regular else "")
+        raise InputError("output", str(path), reason, remedy)
+
+
+def _among_devices(path: Path) -> bool:
+    """Whether a name belongs to the system: /dev/stdout is a link, at times to a file."""
+    return path.parent.resolve() == Path("/dev")
+
+
+def _is_marked(path: Path, mark: bytes) -> bool:
+    """Whether a regular file holds the mark near an end."""
+    if not mark:
+        return False
+    with path.open("rb") as file:
+        begin = file.read(_LOOK)
+        file.seek(max(0, os.fstat(file.fileno()).st_size - _LOOK))
+        return mark in begin or mark in file.read(_LOOK)
+
+
+def write_bytes(path: Path, content: bytes, mark: bytes = b"") -> None:
+    """Put `content` at `path` whole: temporary name beside it, fsync, rename, fsync of the parent.
+
+    A symbolic link at `path` is replaced, never followed; a file is, if it holds `mark` near an end
+    (`refuse_foreign`). The temporary is removed when anything goes wrong.
+
+    Raises
+    ------
+    InputError
+        The place cannot be written to (permission, missing directory, directory in the way), or holds
+        what this program did not write.
     StorageError
         The disk is full or fails, or a file size limit is met.
     """
+    refuse_foreign(path, mark)
     try:
         directory = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
@@ -135,16 +201,17 @@ def make_directory(path: Path) -> None:
         raise refused(path, error) from None
 
 
-def probe(path: Path) -> None:
+def probe(path: Path, mark: bytes = b"") -> None:
     """Refuse a place that `path` could not be written to, before hours are spent computing for it.
+
+    `mark`: of the kind of file, as for `write_bytes`.
 
     Raises
     ------
     InputError, StorageError
         As `write_bytes`.
     """
-    if path.is_dir() and not path.is_symlink():
-        raise refused(path, OSError(errno.EISDIR, ""))
+    refuse_foreign(path, mark)
     trial = path.with_name(f".hpcclear-{secrets.token_hex(8)}.tmp")
-    write_bytes(trial, b"")
+    write_bytes(trial, b"", mark)
     trial.unlink(missing_ok=True)

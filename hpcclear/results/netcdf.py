@@ -24,8 +24,10 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.results.files import write_bytes
 
-_SEAL = b"\nhpcclear seal sha256:"
-_SEAL_LENGTH = len(_SEAL) + 64 + 1
+SEAL = b"\nhpcclear seal sha256:"
+"""Begin of what is put behind the content of every file."""
+
+_SEAL_LENGTH = len(SEAL) + 64 + 1
 _DTYPES = ("<f8", "<f4", "|i1", "<i2", "<i4", "<i8", "|u1", "<u2", "<u4", "<u8")
 _NO_VARIABLE = (
     "This is a netCDF dimension but not a netCDF variable. %9d"  # wording fixed by NetCDF-4
@@ -60,7 +62,7 @@ def read_bytes(path: Path) -> bytes:
             file.seek(about.st_size - _SEAL_LENGTH)
             found = file.read(_SEAL_LENGTH)
             # looked at first, so that a foreign giant is not read into memory
-            if not found.startswith(_SEAL):
+            if not found.startswith(SEAL):
                 raise bad(
                     "hpcclear did not write it, or it was cut off or changed afterwards", again
                 )
@@ -75,13 +77,13 @@ def read_bytes(path: Path) -> bytes:
 
 def seal(content: bytes) -> bytes:
     """What is put behind the content of a file."""
-    return _SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a sealed NetCDF-4 file (see `write_bytes`, `encode`)."""
     image = encode(dataset)
-    write_bytes(path, image + seal(image))
+    write_bytes(path, image + seal(image), SEAL)
 
 
 def load(path: Path) -> xr.Dataset:

@@ -40,7 +40,7 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
         text, content = None, dict(source)
     else:
         text = _read(Path(source))
-        content = _parse(text, str(source))
+        content = parse(text, str(source))
     for override in overrides:
         content = replace(content, *_override(override))
     scene = validated(Scene, content)
@@ -61,7 +61,8 @@ def _read(path: Path) -> str:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("scene file", name, f"cannot be read ({error})", remedy) from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError("scene file", name, f"cannot be read ({reason})", remedy) from None
     if len(data) > LARGEST_FILE:
         raise InputError(
             "scene file",
@@ -77,8 +78,22 @@ def _read(path: Path) -> str:
         ) from None
 
 
-def _parse(text: str, name: str) -> dict[str, Any]:
+def parse(text: str, name: str) -> dict[str, Any]:
+    """The tables of a TOML text, whatever it holds; `name` says in errors where it stands.
+
+    Raises
+    ------
+    InputError
+        If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
+    """
     remedy = "Mend the TOML syntax there"
+    if len(text) > LARGEST_FILE:
+        raise InputError(
+            "scene file",
+            name,
+            f"is larger than {LARGEST_FILE} bytes",
+            "A scene needs a few thousand",
+        )
     if _DOTTED.search(text):
         raise InputError(
             "scene file", name, "a key has too many dots", f"Nest at most {DEEPEST} tables"

@@ -2,8 +2,10 @@
 
 import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.units import UnitError, decimal, factor, to_si
 from hpcclear.scene.variables import SHORT_NAMES
+
+LONGEST_LINE = 100_000
+"""Characters of a line of a table; a design has some ten numbers."""
 
 
 def read_points(path: str | Path, scene: Scene) -> Points:
@@ -73,16 +78,29 @@ def _csv_lines(path: Path) -> list[tuple[int, list[str]]]:
         if not path.is_file():
             raise InputError("table of points", str(path), "there is no such regular file", remedy)
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream, strict=True)
-            lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+            reader = csv.reader(_short_lines(stream, path), strict=True)
+            lines = [
+                (reader.line_num, [cell.strip() for cell in cells])
+                for cells in reader
+                if any(cells) and not cells[0].lstrip().startswith("#")
+            ]
     except (OSError, UnicodeError, csv.Error) as error:
-        reason = f"cannot be read ({error})"
+        reason = f"cannot be read ({getattr(error, 'strerror', None) or error})"
         raise InputError("table of points", str(path), reason, remedy) from None
-    lines = [(line, cells) for line, cells in lines if any(cells) and cells[0][:1] != "#"]
+    lines = [(line, cells) for line, cells in lines if any(cells)]  # not of blanks alone
     if len(lines) < 2:
         remedy = "Write a row of names, then a row for each point"
         raise InputError("table of points", str(path), "holds no points", remedy)
     return lines
+
+
+def _short_lines(stream: TextIO, path: Path) -> Iterator[str]:
+    """The lines of a file, none of them long enough to fill the memory."""
+    while line := stream.readline(LONGEST_LINE + 1):
+        if len(line) > LONGEST_LINE:
+            reason = f"a line has more than {LONGEST_LINE} characters"
+            raise InputError("table of points", str(path), reason, "Write a line for each point")
+        yield line
 
 
 @dataclass(frozen=True)

@@ -267,6 +267,12 @@ class Case(Table):
     random: tuple[str, ...]
 
     @model_validator(mode="after")
+    def _named(self) -> "Case":
+        if not _NAME.fullmatch(self.name):  # it stands in names of files, figures and pages
+            raise invalid("is not a name", "Use a letter, then letters, digits or _", key="name")
+        return self
+
+    @model_validator(mode="after")
     def _some_random(self) -> "Case":
         if not self.random:
             raise invalid(

@@ -1,7 +1,8 @@
 """Every figure that a directory of results allows, with its caption."""
 
 import base64
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ from hpcclear.report.figures import (
     timing,
 )
 from hpcclear.report.html.content import Content
+from hpcclear.report.html.guard import attempt
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,39 +76,60 @@ _RESPONSE = (
 )
 
 
-def figures(content: Content) -> list[dict[str, str]] | None:
-    """All figures: their pictures (PNG, base64) and captions."""
-    made = [
-        {"png": base64.b64encode(style.render(figure, dpi=220)).decode("ascii"), "caption": caption}
-        for figure, caption in _drawn(content)
-    ]
-    return made or None
+def figures(content: Content, troubles: list[str]) -> list[dict[str, str]] | None:
+    """All figures: their pictures (PNG, base64) and captions; in `troubles`, why one was left out."""
+    made = [attempt(f"The figure “{what}”", draw, troubles) for what, draw in _drawings(content)]
+    return [figure for figure in made if figure is not None] or None
 
 
-def _drawn(content: Content) -> "Iterator[tuple[Figure, str]]":
+Maker = Callable[[], dict[str, str] | None]
+
+
+def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
+    """Every figure that there may be: what it shows, and what makes its picture and caption."""
     for kind, draw, caption in _RESULTS:
-        yield from _tried(draw, content.get(kind), caption)
+        yield from _of_file(draw, content.get(kind), caption)
     front = content.get("front")
     if front is not None:
+        verified = content.get("verification")
         caption = "Pareto fronts of all runs, and the designs simulated directly."
-        yield designs.front_figure(front, content.get("verification")), caption
+        yield caption, lambda: _shown(designs.front_figure(front, verified), caption)
     costs = content.get("accuracy")
-    if costs is not None:
-        for name, draw in accuracy.FIGURES.items():
-            yield from _tried(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
+    for name, draw in accuracy.FIGURES.items() if costs is not None else ():
+        yield from _of_file(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
     found = content.responses
     if len(found) > 1:
-        caption = f"Responses of the designs, two revolutions{_plays(*found.values())}."
-        yield designs.comparison_figure(found), caption
+        yield "responses of the designs", lambda: _comparison(found)
     if found:
         name = "original" if "original" in found else next(iter(found))
         if len(found) == 1:
-            yield (
-                response.response_figure(found[name]),
-                f"{name}: response, two revolutions{_plays(found[name])}.",
-            )
+            yield f"{name}: response", lambda: _response_alone(name, found[name])
         for draw, what in _RESPONSE:
-            yield from _tried(draw, found[name], f"{name}: {what}.")
+            yield from _of_file(draw, found[name], f"{name}: {what}.")
+
+
+def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    caption = f"Responses of the designs, two revolutions{_plays(*found.values())}."
+    return _shown(designs.comparison_figure(found), caption)
+
+
+def _response_alone(name: str, found: xr.Dataset) -> dict[str, str]:
+    caption = f"{name}: response, two revolutions{_plays(found)}."
+    return _shown(response.response_figure(found), caption)
+
+
+def _shown(figure: "Figure", caption: str) -> dict[str, str]:
+    """A picture with its caption, for the template."""
+    picture = base64.b64encode(style.render(figure, dpi=220)).decode("ascii")
+    return {"png": picture, "caption": caption}
+
+
+def _of_file(
+    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset | None, caption: str
+) -> Iterator[tuple[str, Maker]]:
+    """A figure of one file, unless that is missing."""
+    if found is not None:
+        yield caption, functools.partial(_tried, draw, found, caption)
 
 
 def _plays(*responses: xr.Dataset) -> str:
@@ -121,15 +144,13 @@ def _plays(*responses: xr.Dataset) -> str:
 
 
 def _tried(
-    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset | None, caption: str
-) -> "Iterator[tuple[Figure, str]]":
-    """The figure, unless the file is missing or has not what it needs (no Sobol indices, say)."""
-    if found is None:
-        return
+    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
+) -> dict[str, str] | None:
+    """The figure, unless the file has not what it needs (no Sobol indices, say)."""
     try:
         made = draw(found)
     except InputError as error:
         if error.key == "matplotlib":
             raise
-        return
-    yield made, caption
+        return None
+    return _shown(made, caption)

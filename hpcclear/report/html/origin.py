@@ -1,11 +1,12 @@
 """The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from hpcclear.base.errors import InputError
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, preformatted
+from hpcclear.scene.loading import parse
 
 
 def effects(content: Content) -> list[object] | None:
@@ -14,8 +15,8 @@ def effects(content: Content) -> list[object] | None:
     if not scene:
         return None
     try:
-        entries = tomllib.loads(scene)
-    except tomllib.TOMLDecodeError:
+        entries = parse(scene, "scene")
+    except InputError:
         first: list[object] = [
             "The scene stored with the results is not readable as TOML; it is shown as it is."
         ]

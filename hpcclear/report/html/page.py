@@ -1,18 +1,23 @@
 """One HTML file about a directory of results: works offline, asks nothing of the network, prints and tabs well."""
 
 import base64
+import functools
 import hashlib
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from hpcclear.report.answer import answer
 from hpcclear.report.html import costs, gallery, origin, picture, sections
 from hpcclear.report.html.content import Content, read
+from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import Section, render
 from hpcclear.results import files
 
 NAME = "report.html"
+_MARK = b'<meta name="generator" content="hpcclear">'  # also stands in the template
 
 _MISSING = {
     "samples": "samples.nc: no design was sampled (`hpcclear sample` or `run`)",
@@ -47,22 +52,39 @@ def write_report(directory: str | Path) -> Path:
     """
     content = read(directory)
     path = Path(directory) / NAME
-    files.write_bytes(path, _page(content).encode())
+    files.write_bytes(path, _page(content).encode(), _MARK)
     return path
 
 
 def _page(content: Content) -> str:
     """The whole document."""
+    troubles = list(content.troubles)
+    nothing = Content(content.directory, {}, {})
+    shown = attempt("What the page's script draws", lambda: _picture(content), troubles)
     return render(
         "page.html",
-        title=f"Report on {content.directory.resolve().name}",
+        title=f"Report on {_readable(content.directory.resolve().name)}",
         policy=_policy(),
         style=_asset("page.css"),
         script=_asset("page.js"),
-        picture=picture.picture(content),
+        picture=picture.picture(nothing) if shown is None else shown,
         source=content.attribute("source") or "hpcclear",
-        sections=[section for section in _sections(content) if section.content is not None],
+        sections=[
+            section for section in _sections(content, troubles) if section.content is not None
+        ],
     )
+
+
+def _readable(name: str) -> str:
+    """A file name as text, also one that is no text in this system's encoding."""
+    return name.encode("utf-8", "replace").decode()
+
+
+def _picture(content: Content) -> dict[str, Any]:
+    """What the script draws, if JSON can say it: it knows no NaN."""
+    made = picture.picture(content)
+    json.dumps(made, allow_nan=False)
+    return made
 
 
 def _asset(name: str) -> str:
@@ -83,35 +105,53 @@ def _policy() -> str:
     return "; ".join(rules)
 
 
-def _sections(content: Content) -> Iterator[Section]:
-    """All sections in the page's order, those with nothing to show among them."""
+def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
+    """All sections in the page's order, those with nothing to show among them.
+
+    One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
+    """
     beside = " beside the paper's" if content.is_compared else ""
-    lines = answer(content.files, "")
-    yield Section("answer", "The answer", "answer.html", lines or None)
-    yield Section("summary", "Summary", "summary.html", sections.summary(content))
-    yield Section(
-        "designs", f"Optimised designs{beside}", "designs.html", sections.designs(content)
+    drawn = functools.partial(gallery.figures, troubles=troubles)
+    makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
+        ("answer", "The answer", "answer.html", lambda one: answer(one.files, "") or None),
+        ("summary", "Summary", "summary.html", sections.summary),
+        ("designs", f"Optimised designs{beside}", "designs.html", sections.designs),
+        ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
+        ("claims", "Claims of the paper", "parts.html", sections.claims),
+        ("readings", "How the paper can be read", "parts.html", sections.readings),
+        ("motion", "The mechanism in motion", "motion.html", lambda one: one.responses or None),
+        ("accuracy", "What accuracy cost", "parts.html", costs.accuracy),
+        ("figures", "Figures", "figures.html", drawn),
+        ("trust", "Which samples to trust", "parts.html", sections.trust),
+        ("time", "How the ranks spent their time", "parts.html", origin.timing),
+        ("effects", "Effects and settings", "parts.html", origin.effects),
+        ("reproduce", "How to reproduce", "parts.html", origin.reproduce),
     )
-    front = picture.front(content)["points"] or None
-    yield Section("pareto", "Pareto front", "pareto.html", front)
-    yield Section("claims", "Claims of the paper", "parts.html", sections.claims(content))
-    yield Section("readings", "How the paper can be read", "parts.html", sections.readings(content))
-    yield Section("motion", "The mechanism in motion", "motion.html", content.responses or None)
-    yield Section("accuracy", "What accuracy cost", "parts.html", costs.accuracy(content))
-    yield Section("figures", "Figures", "figures.html", gallery.figures(content))
-    yield Section("trust", "Which samples to trust", "parts.html", sections.trust(content))
-    yield Section("time", "How the ranks spent their time", "parts.html", origin.timing(content))
-    yield Section("effects", "Effects and settings", "parts.html", origin.effects(content))
-    yield Section("reproduce", "How to reproduce", "parts.html", origin.reproduce(content))
-    yield Section("missing", "What is not here", "list.html", _missing(content))
+    for name, title, template, make in makers:
+        # figures are limited one by one
+        section = functools.partial(_section, name, title, template, make, content)
+        made = section() if name == "figures" else attempt(f"“{title}”", section, troubles)
+        if made is not None:
+            yield made
+    yield Section("missing", "What is not here", "list.html", _missing(content, troubles))
 
 
-def _missing(content: Content) -> list[str] | None:
+def _section(
+    name: str, title: str, template: str, make: Callable[[Content], object], content: Content
+) -> Section:
+    """A section whose content its template can show, which is tried."""
+    section = Section(name, title, template, make(content))
+    if section.content is not None:
+        render(template, content=section.content)
+    return section
+
+
+def _missing(content: Content, troubles: list[str]) -> list[str] | None:
     if set(content.files) <= {"accuracy", "timing"} and "accuracy" in content.files:
-        return list(content.troubles) or None  # a directory of `accuracy` lacks nothing
+        return troubles or None  # a directory of `accuracy` lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]
     if not content.responses:
         words.append(
             "responses/: no response was stored, so there is no animation (`hpcclear simulate` or `run`)"
         )
-    return [*content.troubles, *words] or None
+    return [*troubles, *words] or None

@@ -1,0 +1,61 @@
+"""Parts of the page that cannot be made are left out, each with a sentence on why.
+
+A file's seal says that it is as it was written, not that its numbers make a picture: a limit may be NaN,
+an axis 1e308 long, a scene's text nested a thousand levels deep.
+"""
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import TypeVar
+
+from hpcclear.base.errors import InputError, StorageError
+
+LONGEST = 25.0
+"""Seconds that a part may take: an honest one takes less than one, also of millions of samples some."""
+
+Made = TypeVar("Made")
+
+
+def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | None:
+    """What `make` returns; None if it fails or takes too long, and why as a sentence in `troubles`.
+
+    Raises
+    ------
+    InputError, StorageError, OSError
+        What the user can mend, and what the machine refuses: that is not the content's fault.
+    """
+    try:
+        with _limited(LONGEST):
+            return make()
+    except (InputError, StorageError):
+        raise
+    except OSError as error:
+        if not isinstance(error, TimeoutError):
+            raise
+        reason = f"it takes longer than {LONGEST:g} s"
+    except Exception as error:  # noqa: BLE001 - whatever strange numbers do, one panel must not cost the page
+        reason = f"{type(error).__name__}: {error}"[:200]
+    troubles.append(f"{what} was left out: the content cannot be shown ({reason}).")
+    return None
+
+
+@contextlib.contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError in what takes longer, in the main thread of a process."""
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

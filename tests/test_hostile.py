@@ -1,0 +1,348 @@
+"""Files, limits and words that no one means well with: a message and a documented exit code, never harm or a hang."""
+
+import contextlib
+import os
+import random
+import resource
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_data as data
+from commands import CHEAP, MPIEXEC, ROOT, SCENE, finish, overrides, run, sample, start
+
+from hpcclear.base.errors import InputError, LimitError, mendable
+from hpcclear.report.html import guard
+from hpcclear.report.html.page import write_report
+from hpcclear.results import files, netcdf
+from hpcclear.scene import load_scene
+from hpcclear.scene.table import read_points
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def refused(answer: tuple[int, str]) -> bool:
+    """Whether a command ended with exit code 2 and without a traceback."""
+    return answer[0] == 2 and "Error: " in answer[1] and "Traceback" not in answer[1]
+
+
+# -- places -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def thesis(tmp_path) -> Path:
+    path = tmp_path / "thesis.nc"
+    path.write_bytes(b"three years of work" * 1000)
+    return path
+
+
+@pytest.mark.parametrize("words", [["simulate", str(SCENE)], ["sample", str(SCENE), "--fresh"]])
+def test_results_never_replace_what_this_program_did_not_write(thesis, words):
+    before = thesis.read_bytes()
+    code, output = run([*words, "-o", str(thesis), *overrides(*CHEAP, "study.samples=40")], 0)
+    assert thesis.read_bytes() == before
+    if "--fresh" in words:
+        assert code == 0, output
+    else:
+        assert refused((code, output)), output
+        assert "did not write" in output
+
+
+def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):
+    (tmp_path / "timing.nc").write_text("mine")
+    assert refused(run(sample(tmp_path / "samples.nc", 40), 0))
+    assert (tmp_path / "timing.nc").read_text() == "mine"
+
+
+def test_our_own_files_are_replaced_and_a_link_is_not_followed(thesis, tmp_path):
+    output = tmp_path / "out.nc"
+    netcdf.save(data.timing(), output)
+    netcdf.save(data.claims(), output)
+    link = tmp_path / "link.nc"
+    link.symlink_to(thesis)
+    netcdf.save(data.timing(), link)
+    assert not link.is_symlink()
+    assert thesis.read_bytes().startswith(b"three years")
+
+
+def test_devices_and_pipes_are_refused(tmp_path):
+    pipe, device = tmp_path / "pipe.nc", tmp_path / "full.nc"
+    os.mkfifo(pipe)
+    places = [pipe, Path("/dev/stdout")]
+    if os.geteuid() == 0:
+        os.mknod(device, 0o666 | stat.S_IFCHR, os.makedev(1, 7))
+        places.append(device)
+    for place in places:
+        with pytest.raises(InputError, match="regular file"):
+            files.probe(place, netcdf.SEAL)
+        assert refused(run(["simulate", str(SCENE), "-o", str(place)], 0))
+    assert stat.S_ISFIFO(pipe.lstat().st_mode)
+
+
+def test_figures_and_pages_replace_only_figures_and_pages_of_ours(tmp_path):
+    sketch = tmp_path / "sketch.png"
+    words = ["check", str(SCENE), "--no-cost", "--sketch", str(sketch)]
+    for ending in ("png", "svg", "pdf"):
+        sketch = sketch.with_suffix(f".{ending}")
+        words[-1] = str(sketch)
+        assert run(words, 0)[0] == 0
+        first = sketch.read_bytes()
+        assert run(words, 0)[0] == 0
+        assert sketch.read_bytes() == first
+        sketch.write_bytes(b"a photograph")
+        assert refused(run(words, 0))
+        assert sketch.read_bytes() == b"a photograph"
+    study = data.write_study(tmp_path)
+    write_report(study)
+    write_report(study)
+    (study / "report.html").write_text("<p>my own words</p>")
+    with pytest.raises(InputError):
+        write_report(study)
+
+
+LONG = "x" * 300
+DEEP = "/tmp/" + "x/" * 3000
+NO_TEXT = "bad\udcff"
+
+
+@pytest.mark.parametrize("place", [LONG, DEEP + "x", NO_TEXT], ids=["long", "deep", "no text"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["init", "{}.toml"],
+        ["check", "{}.toml", "--no-cost"],
+        ["simulate", str(SCENE), "-o", "{}.nc"],
+        ["sample", str(SCENE), "-o", "{}.nc"],
+        ["sample", str(SCENE), "-o", "x.nc", "--points", "{}.csv"],
+        ["run", str(SCENE), "-o", "{}"],
+        ["report", "{}"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_paths_that_cannot_be_are_refused(place, words):
+    answer = run([word.format(place) for word in words], 0)
+    assert refused(answer), answer
+    assert len(answer[1]) < 1500
+
+
+# -- limits of the machine ----------------------------------------------------------------------
+
+
+def limited(words: list[str], limit: int, amount: int) -> tuple[int, str]:
+    """Exit code and output of a command under a resource limit."""
+    done = subprocess.run(
+        [sys.executable, "-m", "hpcclear", *words],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        preexec_fn=lambda: resource.setrlimit(limit, (amount, amount)),
+        timeout=300,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("megabytes", [150, 250, 400, 550])
+def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
+    words = sample(tmp_path / "x.nc", 40)
+    code, output = limited(words, resource.RLIMIT_AS, megabytes * 2**20)
+    assert "Traceback" not in output, output
+    assert code == 0 or (code == 1 and "memory" in output), output
+
+
+def test_too_few_file_handles_end_in_a_message(tmp_path):
+    study = data.write_study(tmp_path)
+    for words in (["report", str(study)], sample(tmp_path / "x.nc", 40)):
+        code, output = limited(words, resource.RLIMIT_NOFILE, 6)
+        assert code == 1, output
+        assert "ulimit -n" in output, output
+        assert "Traceback" not in output
+
+
+def test_what_a_user_can_mend_is_told_from_program_errors():
+    crash = SystemError("error return without exception set")
+    crash.__context__ = MemoryError()
+    assert isinstance(mendable(crash), LimitError)
+    assert isinstance(mendable(OSError(36, "File name too long", "x")), InputError)
+    for error in (SystemError("a bug"), OSError("a bug"), ValueError(), ImportError("a bug")):
+        assert mendable(error) is None
+
+
+# -- words and rank -----------------------------------------------------------------------------
+
+
+def on_two_ranks(first: list[str], second: list[str], *settings: str) -> tuple[int, str]:
+    """A job whose ranks get different words, the second rank an environment of its own."""
+    program = [sys.executable, "-m", "hpcclear"]
+    environment = [word for setting in settings for word in ("-env", *setting.split("="))]
+    done = subprocess.run(
+        [MPIEXEC, "-n", "1", *program, *first, ":", "-n", "1", *environment, *program, *second],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        timeout=200,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("alone", [0, 1])
+@pytest.mark.parametrize("bad", [["--bogus"], ["--time-limit", "-3"]], ids=lambda bad: bad[0])
+def test_a_rank_that_alone_gets_a_bad_option_does_not_leave_the_others_waiting(
+    tmp_path, bad, alone
+):
+    words = sample(tmp_path / "x.nc", 40)
+    both = [words, words]
+    both[alone] = [*words, *bad]
+    answer = on_two_ranks(*both)
+    assert refused(answer), answer
+    assert answer[1].count(bad[0]) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.mpi
+def test_lanes_that_differ_from_rank_to_rank_are_refused(tmp_path):
+    words = sample(tmp_path / "x.nc", 40)
+    answer = on_two_ranks(words, words, "HPCCLEAR_LANES=8")
+    assert refused(answer), answer
+    assert "HPCCLEAR_LANES" in answer[1]
+
+
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.mpi)])
+def test_a_time_limit_is_told_even_when_root_hears_nothing(tmp_path, ranks):
+    words = [*sample(tmp_path / "x.nc", 40), "--time-limit", "0.5"]
+    deaf = {"TEST_FAIL": "sleep hpcclear.ensemble.samples:design"}
+    code, output = finish(start(words, ranks, **deaf), 60)
+    assert code == 3, output
+    assert output.count("Stopped early: the time limit was reached") == 1, output
+
+
+# -- scenes and tables --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["../../x", "<script>", "", "a b", "1st", "x" * 41, "a\nb"])
+def test_names_of_cases_are_identifiers(name):
+    scene = load_scene(SCENE)
+    content = scene.resolved()
+    cases = content["study"]["cases"]
+    content["study"]["cases"] = {name: next(iter(cases.values()))}
+    with pytest.raises(InputError, match="not a name"):
+        load_scene(content)
+
+
+def test_a_table_of_newlines_takes_no_memory(tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_bytes(b"\n" * 8_000_000)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(InputError, match="holds no points"):
+        read_points(table, load_scene(SCENE))
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000  # kB
+    table.write_bytes(b"C\n" + b"," * 1_000_000)
+    with pytest.raises(InputError, match="characters"):
+        read_points(table, load_scene(SCENE))
+
+
+def test_blank_lines_and_comments_between_points_are_left_out(tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_text('\n# mine\n"C [mm]"\n\n0.3\n , \n #x\n\n0.4\n')
+    points = read_points(table, load_scene(SCENE))
+    np.testing.assert_allclose(points.values, [[3e-4], [4e-4]])
+
+
+# -- forged results -----------------------------------------------------------------------------
+
+DEEPLY = "a = " + "[" * 900 + "]" * 900
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Path:
+    return data.write_study(tmp_path_factory.mktemp("study"))
+
+
+def forged(path: Path, name: str, value: object) -> None:
+    """Change a variable, or a global attribute, of a file and seal it again."""
+    content = netcdf.load(path)
+    if name in content.variables:
+        values = content[name].to_numpy().copy()
+        values.flat[::2] = value
+        content[name] = (content[name].dims, values, content[name].attrs)
+    else:
+        content.attrs[name] = value
+    netcdf.save(content, path)
+
+
+FORGERIES = (
+    ("samples", "objective", 1e308),
+    ("samples", "objective", -np.inf),
+    ("samples", "objective_spread", -1e300),
+    ("samples", "scene", DEEPLY),
+    ("samples", "scene", ".".join("x" * 20_000) + " = 1"),
+    ("samples", "scene", "[" * 100_000),
+    ("samples", "C", 1e300),
+    ("kriging", "prediction", np.inf),
+    ("sensitivity", "uncertainty", np.nan),
+    ("front", "mean", 1e308),
+    ("verification", "mean_true_lower", np.nan),
+    ("verification", "mean_true", -1e308),
+    ("claims", "verdict", "x"),
+    ("timing", "busy", -1e308),
+    ("responses/original", "eccentricity_y", -np.inf),
+    ("responses/original", "time", 1e300),
+    ("responses/robust_alpha", "joint", "x"),
+)
+
+
+@pytest.mark.parametrize(("file", "name", "value"), FORGERIES, ids=lambda part: str(part)[:18])
+def test_forged_results_are_refused_or_left_out(study, tmp_path, file, name, value):
+    path = tmp_path / f"{file}.nc"
+    path.parent.mkdir(exist_ok=True)
+    shutil.copy(study / f"{file}.nc", path)
+    forged(path, name, value)
+    assert "</html>" in write_report(tmp_path).read_text()
+
+
+def test_an_honest_page_lacks_nothing_and_a_panel_that_fails_is_said(study, monkeypatch):
+    assert "was left out" not in write_report(study).read_text()
+    path = study / "responses" / "robust_alpha.nc"
+    honest = path.read_bytes()
+    forged(path, "joint", "x")
+    try:
+        page = write_report(study).read_text()
+    finally:
+        path.write_bytes(honest)
+    assert "responses of the designs” was left out" in page
+
+
+def test_what_takes_too_long_is_left_out(monkeypatch):
+    monkeypatch.setattr(guard, "LONGEST", 0.2)
+    troubles: list[str] = []
+
+    def endless() -> None:
+        while True:
+            pass
+
+    assert guard.attempt("It", endless, troubles) is None
+    assert "takes longer" in troubles[0]
+    assert guard.attempt("It", lambda: 3, troubles) == 3
+
+
+@pytest.mark.full
+@pytest.mark.timeout(7200)
+def test_five_hundred_forged_files_make_a_page_or_a_refusal(study):
+    odd = (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e-320, 0.0, -1.0, 1e18, -1e-300)
+    paths = sorted(study.rglob("*.nc"))
+    for number in range(500):
+        dice = random.Random(number)
+        path = dice.choice(paths)
+        honest, content = path.read_bytes(), netcdf.load(path)
+        names = [str(n) for n, v in content.variables.items() if v.dtype.kind == "f"]
+        try:
+            for name in dice.choices([*names, "scene"], k=dice.choice((1, 1, 3))):
+                forged(path, name, DEEPLY if name == "scene" else dice.choice(odd))
+            with contextlib.suppress(InputError):
+                assert "</html>" in write_report(study).read_text()
+        finally:
+            path.write_bytes(honest)
