@@ -8,6 +8,7 @@ the same exit code, within seconds. Without a launcher there is one process and 
 import contextlib
 import faulthandler
 import os
+import socket
 import sys
 import time
 import traceback
@@ -18,12 +19,16 @@ from typing import Any
 from hpcclear.base.cores import among_ranks
 from hpcclear.base.errors import InputError, StorageError, mendable
 from hpcclear.ranks import launcher
-from hpcclear.ranks.mailbox import Mail, Nap, Tag
+from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
 from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
 from hpcclear.ranks.team import Leave, RankFailed, Ranks
+from hpcclear.ranks.watch import Watch, silence
 
 PATIENCE = 600.0
 """Seconds that a rank waits for all others to come into MPI: a cold start of many nodes takes some minutes."""
+
+LAST_WAIT = 60.0
+"""Seconds that a rank which is done waits for the others to leave MPI with it."""
 
 COMPLAINT_PATIENCE = 30.0
 """Seconds that a rank which cannot begin waits for them: they may be at something that needs no MPI."""
@@ -60,9 +65,39 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
         ranks = Ranks(mail, stop)
         if ranks.size > 1:
             among_ranks()
-        code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
+        with _watch(ranks):
+            code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
+        if ranks.size > 1:
+            stop.leave_within(LAST_WAIT, code)  # for others that died on their way out
         mail.finalize()
         return code
+
+
+def _watch(ranks: Ranks) -> Watch:
+    """Who lives is watched: root fails when a rank is lost, the others end when root is, and say so."""
+    mail, stop = ranks.mail, ranks.stop_switch
+    seconds = mail.everyone(silence())[0]  # root's word counts
+
+    def give_up(rank: int) -> None:
+        text = (
+            f"Error: nothing was heard of rank {rank} for {seconds:g} s (HPCCLEAR_SILENCE): its process, its node "
+            f"or the network is gone"
+        )
+        if ranks.is_root:
+            mail.tell_itself(
+                Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", None))
+            )
+            return
+        if rank == ranks.mail.neighbours[0]:  # root, or the way to it
+            _say(f"{text}. Rank {ranks.rank} on {socket.gethostname()} ends")
+            stop.leave_within(0.0, Exit.FAILED)
+        else:
+            mail.send(0, Tag.ERROR, (f"{text}. What was finished is saved", None))
+
+    def orphaned() -> None:
+        stop.request("the process that started it is gone")
+
+    return Watch(mail, seconds, give_up, orphaned)
 
 
 def refuse_together(complaint: str) -> int:
@@ -258,5 +293,6 @@ def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
 
 
 def _say(text: str) -> None:
-    sys.stderr.write(text + "\n")
-    sys.stderr.flush()
+    with contextlib.suppress(OSError):  # a launcher that is gone reads no more
+        sys.stderr.write(text + "\n")
+        sys.stderr.flush()

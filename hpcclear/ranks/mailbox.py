@@ -1,11 +1,14 @@
 """Messages between ranks that never block; in one process there is nobody to write to.
 
+Two threads use it: the main one for messages, and the `watch` for pulses. A lock keeps them out of MPI at the same time.
 Knows MPI only as an object that is handed in, so that it loads without an MPI library.
 """
 
 import os
 import sys
+import threading
 import time
+from collections import deque
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -69,12 +72,18 @@ class Mail:
         This process, and how many there are.
     node_rank, node_size, node_cores : int
         The same within this node, and the cores its ranks may use together.
+    neighbours : list of int
+        Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
     """
 
     def __init__(self, mpi: Any = None, finalizes: bool = True) -> None:
         self._mpi = mpi
         self._finalizes = finalizes
         self._sent: list[tuple[Any, bytes]] = []
+        self._pulsed: list[Any] = []
+        self._lock = threading.Lock()
+        self._news: deque[Message] = deque()  # what this rank has to tell itself
+        self.neighbours: list[int] = []
         cores = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
         if mpi is None:
             self.rank, self.size = 0, 1
@@ -82,9 +91,21 @@ class Mail:
             return
         self._comm = mpi.COMM_WORLD.Dup()  # messages of our own, whatever else the process does
         self.rank, self.size = self._comm.rank, self._comm.size
+        self._pulses = mpi.COMM_WORLD.Dup()
         self._node = self._comm.Split_type(mpi.COMM_TYPE_SHARED)
         self.node_rank, self.node_size = self._node.rank, self._node.size
         self.node_cores = len(set().union(*self._node.allgather(set(cores))))
+        if mpi.Query_thread() >= mpi.THREAD_SERIALIZED:
+            self.neighbours = self._find_neighbours()
+
+    def _find_neighbours(self) -> list[int]:
+        """Root: the first rank of every other node, and all of its own; the first of a node: root and its others."""
+        here = self._node.allgather(self.rank)
+        first = here[0]
+        firsts = sorted(set(self._comm.allgather(first)) - {0})
+        if self.rank != first:
+            return [first]
+        return [*(firsts if first == 0 else [0]), *here[1:]]
 
     def everyone(self, word: object) -> list[Any]:
         """What every rank has to say, by rank; all must call it at the same time, before any work."""
@@ -104,26 +125,54 @@ class Mail:
                     self._post(other, tag, data)
 
     def _post(self, to: int, tag: Tag, data: bytes) -> None:
-        # MPI reads the bytes until the request is complete: hold on to them
-        self._sent = [(request, held) for request, held in self._sent if not request.Test()]
-        self._sent.append((self._comm.Isend([data, self._mpi.BYTE], to, tag), data))
+        with self._lock:
+            # MPI reads the bytes until the request is complete: hold on to them
+            self._sent = [(request, held) for request, held in self._sent if not request.Test()]
+            self._sent.append((self._comm.Isend([data, self._mpi.BYTE], to, tag), data))
 
     def poll(self) -> Message | None:
         """Next message, if one is there."""
+        if self._news:
+            return self._news.popleft()
         if self._mpi is None:
             return None
-        status = self._mpi.Status()
-        message = self._comm.improbe(status=status)
-        if message is None:
-            return None
-        return Message(status.source, status.tag, message.recv())
+        with self._lock:
+            status = self._mpi.Status()
+            message = self._comm.improbe(status=status)
+            if message is None:
+                return None
+            return Message(status.source, status.tag, message.recv())
+
+    def tell_itself(self, message: Message) -> None:
+        """Let `poll` return a message that nobody sent; for the other thread."""
+        self._news.append(message)
+
+    def pulse(self, to: int, tag: int) -> None:
+        """Send a sign of life."""
+        with self._lock:
+            self._pulsed = [request for request in self._pulsed if not request.Test()]
+            self._pulsed.append(self._pulses.Isend([b"", self._mpi.BYTE], to, tag))
+
+    def pulses(self) -> list[tuple[int, int]]:
+        """Rank and tag of each sign of life that came since the last call."""
+        found = []
+        with self._lock:
+            status = self._mpi.Status()
+            while (message := self._pulses.Improbe(status=status)) is not None:
+                message.Recv([bytearray(), self._mpi.BYTE])
+                found.append((status.source, status.tag))
+        return found
 
     def meet_on_node(self) -> None:
         """Wait until every rank of this node is here."""
         if self._mpi is not None:
             request, nap = self._node.Ibarrier(), Nap()
-            while not request.Test():
+            while not self._is_complete(request):
                 nap.take()
+
+    def _is_complete(self, request: Any) -> bool:
+        with self._lock:
+            return bool(request.Test())
 
     def finalize(self) -> None:
         """Leave MPI; every rank must come."""

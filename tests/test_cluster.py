@@ -1,0 +1,170 @@
+"""Jobs on several nodes: the same bytes as one process; and whatever dies, nothing of a job is left or hangs.
+
+Nodes are namespaces (`tests/cluster/box.py`), which need root; the launcher is MPICH's, started as it starts ssh.
+"""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from cluster.box import Box, refusal
+from commands import CHEAP, SCENE, overrides, run, sample
+from patience import crowded
+
+from hpcclear.ranks.watch import BEATS, Watch, silence
+
+REFUSAL = refusal()
+pytestmark = pytest.mark.timeout(900)
+FULL = pytest.mark.full
+SILENCE = 6.0
+DOCUMENTED = {0, 1, 2, 3}
+
+
+@pytest.fixture
+def box(tmp_path, request) -> Iterator[Box]:
+    if REFUSAL:
+        pytest.skip(REFUSAL)
+    with Box(getattr(request, "param", 2), tmp_path) as made:
+        yield made
+
+
+def ended(box: Box, job: subprocess.Popen, seconds: float = 60.0) -> tuple[int, str]:
+    """Exit code and output of a job that is about to end; none of its processes may be left after a minute."""
+    assert box.wait_until_empty(crowded(seconds)) < float("inf"), box.left()
+    try:
+        output, _ = job.communicate(timeout=crowded(30.0))
+    except subprocess.TimeoutExpired:
+        job.kill()
+        pytest.fail("the launcher hangs")
+    return job.returncode, output
+
+
+@pytest.mark.parametrize("box", [2, pytest.param(4, marks=FULL)], indirect=True)
+def test_samples_of_several_nodes_are_those_of_one_process(box, tmp_path):
+    here, there = (tmp_path / name / "samples.nc" for name in ("here", "there"))
+    for place in (here, there):
+        place.parent.mkdir()
+    assert run(sample(here, 400), 0)[0] == 0
+    job = box.start(sample(there, 400))
+    code, output = ended(box, job, 200.0)
+    assert code == 0, output
+    assert there.read_bytes() == here.read_bytes()
+
+
+@FULL
+def test_a_study_on_two_nodes_is_that_of_one_process(box, tmp_path):
+    words = ["run", str(SCENE), *overrides(*CHEAP, "study.samples=60"), "-o"]
+    assert run([*words, str(tmp_path / "here")], 0)[0] == 0
+    code, output = ended(box, box.start([*words, str(tmp_path / "there")]), 600.0)
+    assert code == 0, output
+    names = {path.name for path in (tmp_path / "here").glob("*.nc")} - {"timing.nc"}
+    assert "front.nc" in names
+    for name in names:
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+
+
+def working(box: Box, output: Path, ranks: int = 2) -> subprocess.Popen:
+    """A long job that has begun to save samples on all nodes."""
+    job = box.start(
+        sample(output, 2_000_000, "--checkpoint-interval", "1"),
+        ranks,
+        HPCCLEAR_SILENCE=str(SILENCE),
+    )
+    parts = output.with_name(f".{output.name}.parts")
+    patience = time.monotonic() + crowded(120.0)
+    while not list(parts.glob("part-*.nc")):
+        assert job.poll() is None, job.communicate()[0]
+        assert time.monotonic() < patience, "the job does not begin"
+        time.sleep(0.1)
+    return job
+
+
+@pytest.mark.parametrize(
+    ("what", "codes"),
+    [
+        ("cut", {1}),
+        pytest.param("root", DOCUMENTED | {9, 137, 255}, marks=FULL),  # the launcher's own
+        pytest.param("remote", DOCUMENTED | {9, 137, 255}, marks=FULL),
+        pytest.param("node", DOCUMENTED | {9, 137, 255}, marks=FULL),
+        pytest.param("frozen", {1}, marks=FULL),
+        pytest.param("term", {3}, marks=FULL),
+        pytest.param("launcher", {-9}, marks=FULL),
+    ],
+)
+def test_whatever_dies_nothing_is_left_and_the_same_command_goes_on(box, tmp_path, what, codes):
+    output = tmp_path / "samples.nc"
+    job = working(box, output)
+    first, second = box.nodes
+    if what == "cut":
+        box.cut(second)
+    elif what == "node":
+        second.kill()
+    elif what == "frozen":
+        for process in second.processes(""):
+            os.kill(process, signal.SIGSTOP)
+    elif what == "launcher":
+        job.kill()
+    else:
+        victim = second.ranks()[3] if what == "remote" else first.ranks()[0]
+        os.kill(victim, signal.SIGTERM if what == "term" else signal.SIGKILL)
+    if what == "frozen":  # they are what is left: nothing on the other node may be
+        patience = time.monotonic() + crowded(60.0)
+        while first.processes() and time.monotonic() < patience:
+            time.sleep(0.2)
+        second.kill()
+    code, text = ended(box, job)
+    assert code in codes, (code, text)
+    if what in ("cut", "frozen"):
+        assert "nothing was heard of rank" in text
+    parts = list(tmp_path.glob(".samples.nc.parts/part-*.nc"))
+    assert parts  # for the same command to go on from
+    assert run([*sample(output, 2_000_000), "--time-limit", "2"], 0)[0] == 3
+
+
+class Silent:
+    """A mailbox whose neighbour sends so many pulses, then a goodbye or nothing."""
+
+    neighbours = (1,)
+
+    def __init__(self, beats: int, goodbye: bool = False) -> None:
+        self._left, self._goodbye = beats, goodbye
+        self.sent: list[int] = []
+        self.listened = 0
+
+    def pulse(self, to: int, tag: int) -> None:
+        self.sent.append(tag)
+
+    def pulses(self) -> list[tuple[int, int]]:
+        self.listened += 1
+        self._left -= 1
+        if self._left == 0 and self._goodbye:
+            return [(1, 2)]
+        return [(1, 1)] if self._left > 0 else []
+
+
+def test_a_neighbour_is_given_up_once_and_not_when_it_said_goodbye():
+    for mail, losses, last in (
+        (Silent(50), [1], 2),
+        (Silent(50, goodbye=True), [], 1),  # no goodbye of ours to who is gone
+        (Silent(10**9), [], 2),
+    ):
+        lost: list[int] = []
+        with Watch(mail, 0.06, lost.append, lambda: None):
+            patience = time.monotonic() + crowded(10.0)
+            while mail.listened < 80 * BEATS and time.monotonic() < patience:
+                time.sleep(0.01)
+        assert mail.listened >= 80 * BEATS
+        assert lost == losses
+        assert mail.sent[-1] == last
+
+
+def test_the_silence_can_be_set_and_a_slip_does_not_count():
+    assert silence({}) == 30.0
+    assert silence({"HPCCLEAR_SILENCE": "5"}) == 5.0
+    assert silence({"HPCCLEAR_SILENCE": "0"}) == 0.0
+    assert silence({"HPCCLEAR_SILENCE": "soon"}) == 30.0
+    assert silence({"HPCCLEAR_SILENCE": "nan"}) == 30.0
