@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
-_ROOT_ALONE = ("init", "check", "simulate", "report", "schema")
+_ROOT_ALONE = ("init", "check", "simulate", "merge", "report", "schema")
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 
 _FILE = click.argument("file", type=click.Path(path_type=Path))
@@ -62,6 +62,11 @@ _INTERVAL = click.option(
     show_default=True,
     metavar="SECONDS",
     help="Save finished samples this often: what a crash costs at most.",
+)
+_POINTS = click.option(
+    "--points",
+    type=click.Path(path_type=Path),
+    help="CSV table of designs instead of the study's sampling.",
 )
 _PROGRESS = click.option(
     "--progress",
@@ -234,8 +239,13 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     return Exit.FAILED
 
 
-def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None:
+def _check_kind(
+    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool
+) -> None:
     """Raise InputError where options name two kinds of sampling at once."""
+    if part is not None and (statistics or fresh):
+        reason = "parts of samples are merged, under the names they were given"
+        raise InputError("--part", part, reason, "Drop --statistics and --fresh")
     if statistics and points is not None:
         reason = "--statistics makes the study's Monte Carlo points on demand"
         raise InputError("--points", str(points), reason, "Drop one of the two")
@@ -248,11 +258,7 @@ def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None
 @_FILE
 @_SET
 @_output("NetCDF file to write.")
-@click.option(
-    "--points",
-    type=click.Path(path_type=Path),
-    help="CSV table of designs instead of the study's sampling.",
-)
+@_POINTS
 @click.option(
     "--statistics",
     is_flag=True,
@@ -263,6 +269,11 @@ def _check_kind(points: Path | None, statistics: bool, raw: Path | None) -> None
     type=click.Path(path_type=Path),
     help="With --statistics: directory for the samples themselves.",
 )
+@click.option(
+    "--part",
+    metavar="K/N",
+    help="Only part K of N, into a file of its own beside the output: for job arrays; see merge.",
+)
 @_with_how
 def sample(
     file: Path,
@@ -271,6 +282,7 @@ def sample(
     points: Path | None,
     statistics: bool,
     raw: Path | None,
+    part: str | None,
     how: _How,
 ) -> int:
     """Send the study's points, or a table of yours, through the dynamics.
@@ -279,21 +291,48 @@ def sample(
     """
 
     def program(ranks: "Ranks") -> None:
-        _check_kind(points, statistics, raw)
+        _check_kind(points, statistics, raw, part, how.fresh)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.session import Options
+        from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
 
+        chosen = None if part is None else Part.parse(part)
         scene, place = _scene(file, overrides), _place(output)
         options = Options(how.fresh, how.interval, how.progress)
         if statistics:
             kept = None if raw is None else _place(raw)
             describe_statistics(run_statistics(scene, place, ranks, raw=kept, options=options))
         else:
-            describe_samples(run_sample(scene, place, ranks, table=points, options=options))
+            found = run_sample(scene, place, ranks, table=points, part=chosen, options=options)
+            describe_samples(found)
 
     return _on_ranks(program, how.time_limit)
+
+
+@cli.command(short_help="Put parts of a design together.")
+@_FILE
+@_SET
+@_output("NetCDF file to write: the name that was given with each part.")
+@_POINTS
+def merge(file: Path, overrides: tuple[str, ...], output: Path, points: Path | None) -> int:
+    """Write what sample --part 1/N to N/N made as one file: the bytes that a single run would have written.
+
+    Scene, --set and --points are those of the parts, which stay; parts that are missing are named.
+
+    Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
+    """
+    if not _is_root():
+        return Exit.DONE
+    from hpcclear.cli.printing import describe_samples
+    from hpcclear.ensemble.samples import design
+    from hpcclear.ensemble.split import run_merge
+    from hpcclear.ranks.boundary import alone
+
+    scene = _scene(file, overrides)
+    describe_samples(run_merge(scene, design(scene, points), output, alone()))
+    return Exit.DONE
 
 
 @cli.command("map", short_help="Show where the motion does what.")

@@ -337,7 +337,8 @@ def describe_samples(found: "Finished") -> None:
         )
     out.print(table("Samples", rows + _load(found)))
     for what, path in (("samples", found.output), ("timing", found.timing)):
-        out.print(f"{what:8} {path}")
+        if path.exists():  # what was merged has its times beside the parts
+            out.print(f"{what:8} {path}")
 
 
 def describe_map(found: "Finished") -> None:

@@ -10,6 +10,7 @@ from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points, saving
+from hpcclear.ensemble.split import Part
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -44,6 +45,7 @@ def run_sample(
     ranks: Ranks,
     *,
     table: Path | None = None,
+    part: Part | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> Finished:
     """Simulate a design on all ranks and write it; on root.
@@ -56,6 +58,8 @@ def run_sample(
     ranks : Ranks
     table : Path, optional
         CSV of designs.
+    part : Part, optional
+        Only these samples, into a file of their own beside `output`.
     options : Options
 
     Returns
@@ -68,23 +72,31 @@ def run_sample(
     InputError, StorageError, Stopped, RankFailed
     """
     began = time.perf_counter()
-    place = Place.of_file(output, options.fresh)
     points = design(scene, table)
-    with Session(place, sample_key(scene, points), ranks, options) as session:
+    if part is None:
+        rows, key = range(len(points)), sample_key(scene, points)
+        place = Place.of_file(output, options.fresh)
+    else:
+        rows, key = part.rows(len(points)), part.key(scene, points)
+        place = Place.of_part(part.place(output))
+    with Session(place, key, ranks, options) as session:
         samples = session.found("samples")
         if samples is None:
-            samples = _simulate(scene, points, session)
+            samples = _simulate(
+                scene, points.take(slice(rows.start, rows.stop)), session, rows.start
+            )
         session.close()
     return session.finished(samples, began)
 
 
-def _simulate(scene: Scene, points: Points, session: Session) -> xr.Dataset:
-    """Simulate what is not finished yet, and write the dataset."""
+def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.Dataset:
+    """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
     units = dict(zip(points.names, points.units, strict=True))
     session.describe(scene)
     checkpoint = session.opened(points.names, units)
     progress = Progress("samples", session.options.style)
-    records = sample_points(scene, points, session.ranks, checkpoint, progress)
+    records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)
+    records["sample"] += first
     attributes = session.attributes | recorded(scene, records)
     with saving(checkpoint.flush):  # what came since the last save, if the file cannot be written
         return session.write(

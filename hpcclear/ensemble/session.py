@@ -9,7 +9,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -89,6 +89,12 @@ class Place:
         files.refuse_foreign(parent / "timing.nc", netcdf.SEAL)
         lock = parent / f".{output.name}.lock"
         return cls(output, parts_of(output), parent / "timing.nc", lock, (parent,))
+
+    @classmethod
+    def of_part(cls, output: Path) -> Self:
+        """The file of a part, with times of its own: others are written beside it at the same time."""
+        place = cls.of_file(output, fresh=False)
+        return replace(place, timing=output.with_name(f"{output.stem}.timing.nc"))
 
     @classmethod
     def of_directory(cls, directory: Path, fresh: bool, folders: Sequence[str] = ()) -> Self:

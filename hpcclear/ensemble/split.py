@@ -1,0 +1,157 @@
+"""A design in parts that know nothing of each other, one a job of an array, and the parts put together again.
+
+A part is a stretch of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the bytes
+that one run would have written.
+"""
+
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.dynamics.steady.telling import recorded
+from hpcclear.ensemble.identity import sample_key
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import check_key
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+MOST_PARTS = 100_000
+_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
+
+
+@dataclass(frozen=True)
+class Part:
+    """Part `number` of `count`, counted from 1."""
+
+    number: int
+    count: int
+
+    @classmethod
+    def parse(cls, words: str) -> Self:
+        """From "3/20"; raises InputError."""
+        found = _FORM.fullmatch(words.strip())
+        number, count = (int(group) for group in found.groups()) if found else (0, 0)
+        if not 1 <= number <= count <= MOST_PARTS:
+            reason = "a part is its number and how many there are, as in 3/20"
+            raise InputError("--part", words, reason, f"Write 1/N to N/N, N at most {MOST_PARTS}")
+        return cls(number, count)
+
+    def rows(self, samples: int) -> range:
+        """Numbers of its samples, of so many; raises InputError if there are more parts than samples."""
+        if samples < self.count:
+            reason = f"the design has {samples} samples only"
+            raise InputError("--part", str(self), reason, "Ask for fewer parts")
+        return range(samples * (self.number - 1) // self.count, samples * self.number // self.count)
+
+    def place(self, output: Path) -> Path:
+        """Its file: beside the whole one, such as ``samples.part-03-of-20.nc``."""
+        digits = len(str(self.count))
+        number = f"part-{self.number:0{digits}}-of-{self.count}"
+        return output.with_name(f"{output.stem}.{number}{output.suffix}")
+
+    def key(self, scene: Scene, points: Points) -> dict[str, str]:
+        """What makes a run of it what it is."""
+        return {**sample_key(scene, points), "part": str(self)}
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+
+def whole(output: Path) -> list[Part]:
+    """All parts of a result, by the names of the files that are there.
+
+    Raises
+    ------
+    InputError
+        There is none, some are missing, or they are of different divisions.
+    """
+    escaped = (re.escape(word) for word in (output.stem, output.suffix))
+    form = re.compile(r"{}\.part-(\d+)-of-(\d+){}".format(*escaped))
+    there = [
+        found.groups() for path in output.parent.glob("*") if (found := form.fullmatch(path.name))
+    ]
+    counts = sorted({int(count) for _, count in there})
+    if not counts:
+        reason = f"no part of it is there, such as {Part(1, 20).place(output).name}"
+        raise InputError(
+            "output", str(output), reason, "Run hpcclear sample with --part 1/20 and on"
+        )
+    if len(counts) > 1:
+        reason = f"parts of different divisions are there, by {' and by '.join(map(str, counts))}"
+        raise InputError("output", str(output), reason, "Move those of one of them away")
+    every = [Part(number, counts[0]) for number in range(1, counts[0] + 1)]
+    missing = [part for part in every if not part.place(output).exists()]
+    if missing:
+        shown = ", ".join(map(str, missing[:20])) + (", ..." if len(missing) > 20 else "")
+        reason = f"of {counts[0]} parts {len(missing)} are missing"
+        raise InputError(
+            "--part", shown, reason, "Run hpcclear sample with each of these, then merge again"
+        )
+    return every
+
+
+def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:
+    """Write the result of all parts of a design, as one run would have written it; the parts stay.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : Points
+        The whole design.
+    output : Path
+        The name that was given with each part.
+    ranks : Ranks
+
+    Raises
+    ------
+    InputError
+        Parts are missing, damaged, or another run's.
+    StorageError
+        The disk refuses.
+    """
+    began = time.perf_counter()
+    place = Place.of_file(output, False)
+    with Session(place, sample_key(scene, points), ranks, DEFAULT_OPTIONS) as session:
+        samples = session.found("samples")
+        if samples is None:
+            records = np.concatenate(
+                [_records(part, scene, points, output) for part in whole(output)]
+            )
+            session.describe(scene)
+            samples = session.write(
+                dataset.samples_dataset(
+                    points.names,
+                    points.values,
+                    dict(zip(points.names, points.units, strict=True)),
+                    records,
+                    session.attributes | recorded(scene, records),
+                    scene.objective,
+                    points.words,
+                    session.joints,
+                )
+            )
+    return session.finished(samples, began)
+
+
+def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarray:
+    """The records of one part, all of them."""
+    path = part.place(output)
+    content = dataset.read(path, "samples")
+    check_key(content, part.key(scene, points), path)
+    records = dataset.records(content)
+    if not np.array_equal(records["sample"], part.rows(len(points))):
+        raise InputError(
+            "file",
+            str(path),
+            "it does not hold the samples of its part",
+            "Remove it, and run that part again",
+        )
+    return records.astype(OUTCOME)
