@@ -22,6 +22,7 @@ NOT_RUN = [
     ("README.md", "it runs these tests"),
     ("docs/how-to/cluster.md", "installs Slurm on this machine"),
     ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
+    ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
     ("docs/how-to/cluster.md", "needs a cluster"),
     ("docs/how-to/cluster.md", "needs a cluster"),
     ("docs/how-to/cluster.md", "the end of a batch script"),

@@ -101,6 +101,35 @@ def array() -> None:
         expect(f"array: scene {k} has a result of its own", count == 200 + k, "array.log")
 
 
+def parts(samples: int, expected: bytes) -> None:
+    """A design in four parts, one of them cancelled and submitted again, then merged."""
+    output, log = FOLDER / "parts" / "samples.nc", "parts.log"
+    words = (SCENE, str(output), *study(samples))
+    options = ("--ntasks-per-node=1",)
+    job = submit("sample_array.slurm", log, *words, options=(*options, "--array=1-4"))
+    subprocess.run(["scancel", f"{job}_3"], check=True)
+    for k in (1, 2, 4):
+        end = wait(f"{job}_{k}", *ENDS, seconds=600.0)
+        expect(f"parts: part {k} of 4 is done", end["JobState"] == "COMPLETED", log)
+    merge = [
+        "hpcclear",
+        "merge",
+        SCENE,
+        "-o",
+        str(output),
+        "--set",
+        f"study.samples={samples}",
+        *CHEAP[:2],
+    ]
+    short = subprocess.run(merge, cwd=ROOT, capture_output=True, text=True, check=False)
+    expect("parts: merge names the one that is missing", "'3/4'" in short.stderr, log)
+    options = (*options, "--array=3", "--export=ALL,PARTS=4")
+    job = submit("sample_array.slurm", log, *words, options=options)
+    wait(f"{job}_3", *ENDS, seconds=600.0)
+    subprocess.run(merge, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    expect("parts: same bytes as without Slurm", output.read_bytes() == expected, log)
+
+
 def requeued(samples: int, expected: bytes) -> None:
     """A job whose wall time is cut while it runs: it requeues itself and goes on to the end."""
     output, log = FOLDER / "requeued" / "samples.nc", "requeued.log"
@@ -157,6 +186,7 @@ def main() -> None:
     same = output.read_bytes() == undisturbed(2000)
     expect("srun: same bytes as without Slurm", same, "finished.log")
     array()
+    parts(2000, output.read_bytes())
     # a minute and a half of work for two ranks: the wall time is cut to one minute, of which half is left
     samples = int(3 * rate * 60.0)
     expected = undisturbed(samples)
