@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from cluster import slurm
 from cluster.box import Box, refusal
 from commands import CHEAP, SCENE, overrides, run, sample
 from patience import crowded
@@ -55,6 +56,40 @@ def test_samples_of_several_nodes_are_those_of_one_process(box, tmp_path):
     assert there.read_bytes() == here.read_bytes()
 
 
+@pytest.fixture
+def slurmed(box) -> Iterator[slurm.Slurm]:
+    if slurm.refusal():
+        pytest.skip(slurm.refusal())
+    with slurm.Slurm(box) as made:
+        yield made
+
+
+@FULL
+@pytest.mark.parametrize("box", [2, 4], indirect=True)
+def test_samples_of_a_slurm_job_are_those_of_one_process(box, slurmed, tmp_path):
+    here, there = (tmp_path / name / "samples.nc" for name in ("here", "there"))
+    for place in (here, there):
+        place.parent.mkdir()
+    assert run(sample(here, 400), 0)[0] == 0
+    code, output = ended(box, slurmed.job(sample(there, 400), 1), 200.0)
+    assert code == 0, output
+    assert there.read_bytes() == here.read_bytes()
+
+
+@FULL
+@pytest.mark.parametrize("what", ["cut", "root", "remote", "node", "term"])
+def test_whatever_dies_under_slurm_nothing_is_left(box, slurmed, tmp_path, what):
+    output = tmp_path / "samples.nc"
+    words = sample(output, 2_000_000, "--checkpoint-interval", "1")
+    job = slurmed.job(words, 2, HPCCLEAR_SILENCE=str(SILENCE))
+    until_it_saves(job, output)
+    strike(box, what)
+    code, text = ended(box, job)
+    assert code != 0, text  # often srun's own: MPICH may crash when it writes to who is dead
+    assert code == 3 or what != "term", text
+    assert list(tmp_path.glob(".samples.nc.parts/part-*.nc"))
+
+
 @FULL
 def test_a_study_on_two_nodes_is_that_of_one_process(box, tmp_path):
     words = ["run", str(SCENE), *overrides(*CHEAP, "study.samples=60"), "-o"]
@@ -74,13 +109,33 @@ def working(box: Box, output: Path, ranks: int = 2) -> subprocess.Popen:
         ranks,
         HPCCLEAR_SILENCE=str(SILENCE),
     )
+    until_it_saves(job, output)
+    return job
+
+
+def until_it_saves(job: subprocess.Popen, output: Path) -> None:
+    """Wait until samples of a job are on disk."""
     parts = output.with_name(f".{output.name}.parts")
     patience = time.monotonic() + crowded(120.0)
     while not list(parts.glob("part-*.nc")):
         assert job.poll() is None, job.communicate()[0]
         assert time.monotonic() < patience, "the job does not begin"
         time.sleep(0.1)
-    return job
+
+
+def strike(box: Box, what: str) -> None:
+    """What may happen to a job on two nodes of two ranks."""
+    first, second = box.nodes
+    if what == "cut":
+        box.cut(second)
+    elif what == "node":
+        second.kill()
+    elif what == "frozen":
+        for process in second.processes(""):
+            os.kill(process, signal.SIGSTOP)
+    else:
+        victim = second.ranks()[3] if what == "remote" else first.ranks()[0]
+        os.kill(victim, signal.SIGTERM if what == "term" else signal.SIGKILL)
 
 
 @pytest.mark.parametrize(
@@ -98,21 +153,13 @@ def working(box: Box, output: Path, ranks: int = 2) -> subprocess.Popen:
 def test_whatever_dies_nothing_is_left_and_the_same_command_goes_on(box, tmp_path, what, codes):
     output = tmp_path / "samples.nc"
     job = working(box, output)
-    first, second = box.nodes
-    if what == "cut":
-        box.cut(second)
-    elif what == "node":
-        second.kill()
-    elif what == "frozen":
-        for process in second.processes(""):
-            os.kill(process, signal.SIGSTOP)
-    elif what == "launcher":
+    if what == "launcher":
         job.kill()
     else:
-        victim = second.ranks()[3] if what == "remote" else first.ranks()[0]
-        os.kill(victim, signal.SIGTERM if what == "term" else signal.SIGKILL)
+        strike(box, what)
     if what == "frozen":  # they are what is left: nothing on the other node may be
         patience = time.monotonic() + crowded(60.0)
+        first, second = box.nodes
         while first.processes() and time.monotonic() < patience:
             time.sleep(0.2)
         second.kill()

@@ -183,6 +183,9 @@ class Mail:
         """End all ranks now; does not return."""
         sys.stderr.flush()
         if self._mpi is not None:
+            self._lock.acquire(
+                timeout=0.2
+            )  # not while another thread is inside MPI, unless it is stuck there
             # from a duplicate, or a plain exit, mpiexec at times returns 9, the code of the killed
             self._mpi.COMM_WORLD.Abort(code)
         os._exit(code)
