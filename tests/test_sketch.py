@@ -1,6 +1,7 @@
 """The drawing of a mechanism, and the scene to start from."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +10,13 @@ from own_engine import engine
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
+from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import sketch_figure
+from hpcclear.report.figures.linkage_sketch import Placed
 from hpcclear.report.figures.sketch import ANGLE
 from hpcclear.scene import load_scene
 
+ROOT = Path(__file__).parents[1]
 SCENES = {
     "engine": (),
     "short crank": ("mechanism.crank.length=8 mm",),
@@ -24,10 +28,12 @@ SCENES = {
     ),
 }
 
+LINKAGES = {path.stem: path for path in (ROOT / "jobs" / "linkages").glob("*.toml")}
+
 
 def drawn(scene):
     """Figure, its axes and its texts, laid out."""
-    figure = sketch_figure(scene)
+    figure = sketch_figure(scene, poses_at_start(scene) if scene.is_planar else None)
     figure.canvas.draw()
     return (
         figure,
@@ -36,9 +42,10 @@ def drawn(scene):
     )
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*SCENES, *LINKAGES])
 def test_no_word_of_the_drawing_covers_another_or_leaves_the_page(name):
-    figure, _, texts = drawn(engine(*SCENES[name], study=False))
+    scene = load_scene(LINKAGES[name]) if name in LINKAGES else engine(*SCENES[name], study=False)
+    figure, _, texts = drawn(scene)
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts]
     page = figure.bbox
     for word, box in boxes:
@@ -91,3 +98,21 @@ def test_check_draws_and_init_writes_what_check_accepts(tmp_path):
     again = CliRunner().invoke(cli, ["init", str(file)])
     assert isinstance(again.exception, InputError)
     assert file.read_bytes() == before
+
+
+def test_a_linkage_is_drawn_where_it_was_put_together():
+    """Every joint's two places coincide, and every name is there."""
+    scene = load_scene(LINKAGES["press"])
+    placed = Placed(scene.mechanism, poses_at_start(scene))
+    for joint in scene.mechanism.joints:
+        if joint.kind in ("revolute", "clearance"):
+            np.testing.assert_allclose(
+                placed.at(joint.journal), placed.at(joint.bearing), atol=1e-9
+            )
+    _, axes, texts = drawn(scene)
+    said = {text.get_text() for text in texts}
+    mechanism = scene.mechanism
+    for rows in (mechanism.bodies, mechanism.joints, mechanism.drives, mechanism.loads):
+        assert {row.name for row in rows} <= said
+    assert "300 rpm" in "\n".join(said)
+    assert axes.get_aspect() == 1.0

@@ -199,7 +199,12 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
     if sketch is not None:
         from hpcclear.report import save, sketch_figure
 
-        click.echo(f"sketch   {save(sketch_figure(scene), _place(sketch))}")
+        poses = None
+        if scene.is_planar:
+            from hpcclear.dynamics.planar.problem import poses_at_start
+
+            poses = poses_at_start(scene)
+        click.echo(f"sketch   {save(sketch_figure(scene, poses), _place(sketch))}")
     return Exit.DONE
 
 

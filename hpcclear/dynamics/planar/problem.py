@@ -223,6 +223,18 @@ def put_together(mechanism: Mechanism) -> Assembly:
         ) from None
 
 
+def poses_at_start(scene: Scene) -> dict[str, tuple[float, float, float]]:
+    """Mass centre (x, y in m) and angle (rad) of each body of a linkage as it was put together."""
+    made = put_together(mechanism_of(tables_of(scene)))
+    forest = made.loops.forest
+    found = {}
+    for body in made.loops.mechanism.bodies:
+        rows = [forest.index(kind, body.name) for kind in ("x", "y", "angle")]
+        x, y, angle = (0.0 if row is None else float(made.q[row]) for row in rows)
+        found[body.name] = (x, y, angle)
+    return found
+
+
 def _start_contacts(scene: Scene, linkage: Linkage, par: Array, start: Start) -> None:
     """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
     law = scene.effects.contact

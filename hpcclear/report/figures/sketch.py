@@ -1,13 +1,14 @@
 """A drawing of the mechanism that a scene describes: to scale, with names, axes, the crank's angle and signs."""
 
 import textwrap
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
-from hpcclear.report.figures import labels, style
+from hpcclear.report.figures import labels, linkage_sketch, style
+from hpcclear.report.figures.linkage_sketch import arrow, word
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import ClearanceJoint, Link
 
@@ -18,33 +19,34 @@ if TYPE_CHECKING:
 ANGLE = np.radians(50.0)
 """Crank angle that is drawn."""
 
-_DRAWING, _LINE = 38.0, 3.7  # mm of the drawing, and of a line of the key
+_DRAWING, _LINKAGE, _LINE = (
+    38.0,
+    75.0,
+    3.7,
+)  # mm of a drawing, of a linkage's, and of a line of the key
 _COLUMNS = 58  # letters of a line
 Pair = tuple[float, float]
 
 
 @style.drawn
-def sketch_figure(scene: Scene) -> "Figure":
-    """The mechanism at a crank angle of 50 degrees, and a key with every number's place.
+def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose] | None = None) -> "Figure":
+    """The mechanism at a crank angle of 50 degrees, a linkage at its start; and a key with every number's place.
 
-    Lengths are to scale; plays are not, they would be invisible.
-
-    Raises
-    ------
-    InputError
-        If the scene has another mechanism than a slider-crank.
+    Lengths are to scale; plays are not, they would be invisible. `poses`: of a linkage, where its bodies are
+    (`hpcclear.dynamics.planar.problem.poses_at_start`).
     """
-    if scene.is_planar:
-        raise InputError(
-            "mechanism.kind", "planar", "sketches are of slider-cranks alone so far",
-            "Simulate, and look at the report, which draws it in motion",
-        )  # fmt: skip
-    lines = [part for line in _key(scene) for part in textwrap.wrap(line, _COLUMNS)]
-    height = _DRAWING + _LINE * len(lines)
+    key = linkage_sketch.key(scene, poses) if poses is not None else _key(scene)
+    lines = [part for line in key for part in textwrap.wrap(line, _COLUMNS)]
+    drawing = _DRAWING if poses is None else _LINKAGE
+    height = drawing + _LINE * len(lines)
     figure = style.page(height)
     figure.set_layout_engine("none")
     below = _LINE * len(lines) / height
-    _mechanism(figure.add_axes((0.0, below, 1.0, 1.0 - below)), scene)
+    axes = figure.add_axes((0.0, below, 1.0, 1.0 - below))
+    if poses is not None:
+        linkage_sketch.draw(axes, scene, poses)
+    else:
+        _mechanism(axes, scene)
     text = "\n".join(labels.literal(line) for line in lines)
     figure.text(0.02, below, text, va="top", fontsize=style.SMALL, linespacing=1.35)
     return figure
@@ -61,20 +63,20 @@ def _mechanism(axes: "Axes", scene: Scene) -> None:
     box = 0.55 * size * np.array([-1, 1, 1, -1, -1]), 0.35 * size * np.array([-1, -1, 1, 1, -1])
     axes.fill(slider[0] + box[0], box[1], facecolor="white", edgecolor="black", lw=1.0, zorder=1)
     axes.plot([0.0], [0.0], "k^", ms=6.0, zorder=4)
-    _word(axes, (0.0, 0.0), "O", "black", (-9, -7))
+    word(axes, (0.0, 0.0), "O", "black", (-9, -7))
     for end, name, offset in (((2.4, 0.0), "x", (6, 0)), ((0.0, 2.4), "y", (0, 6))):
         end = (end[0] * size, end[1] * size)
-        _arrow(axes, (0.0, 0.0), end, "#555555")
-        _word(axes, end, name, "#555555", offset)
+        arrow(axes, (0.0, 0.0), end, "#555555")
+        word(axes, end, name, "#555555", offset)
     turn = np.linspace(0.0, ANGLE, 40)
     axes.plot(*0.55 * crank.length * np.array([np.cos(turn), np.sin(turn)]), color="black", lw=0.8)
     middle = 0.55 * crank.length * np.array([np.cos(0.5 * ANGLE), np.sin(0.5 * ANGLE)])
-    _word(axes, middle, r"$\varphi$", "black", (7, 2))
+    word(axes, middle, r"$\varphi$", "black", (7, 2))
     _link(axes, np.zeros(2), pin, crank, style.CYCLE[1])
     _link(axes, pin, slider, rod, style.CYCLE[0])
-    _word(axes, 0.5 * pin, "crank", style.CYCLE[1], (-33, 3))
-    _word(axes, pin + 0.5 * (slider - pin), "rod", style.CYCLE[0], (4, 9))
-    _word(axes, slider - [0.0, 0.42 * size], "slider", "black", (0, -8))
+    word(axes, 0.5 * pin, "crank", style.CYCLE[1], (-33, 3))
+    word(axes, pin + 0.5 * (slider - pin), "rod", style.CYCLE[0], (4, 9))
+    word(axes, slider - [0.0, 0.42 * size], "slider", "black", (0, -8))
     for place, joint, name in (
         (pin, scene.joints.crank_rod, "O12"),
         (slider, scene.joints.rod_slider, "O23"),
@@ -82,7 +84,7 @@ def _mechanism(axes: "Axes", scene: Scene) -> None:
         axes.plot(*place, "o", color="black", ms=3.2, zorder=6)
         if isinstance(joint, ClearanceJoint):
             axes.plot(*place, "o", mfc="none", mec="black", mew=0.8, ms=8.5, zorder=6)
-        _word(axes, place, name, "black", (0, 14))
+        word(axes, place, name, "black", (0, 14))
     _actions(axes, scene, slider, size)
     right = slider[0] + (3.0 if scene.effects.slider_load is not None else 1.6) * size
     axes.set(
@@ -108,29 +110,17 @@ def _actions(axes: "Axes", scene: Scene, slider: Array, size: float) -> None:
     options["connectionstyle"] = "arc3,rad=0.45"
     start, end = (-1.5 * size, -0.9 * size), (1.5 * size, -0.9 * size)
     axes.annotate("", end, start, arrowprops=options)
-    _word(axes, (0.0, -1.6 * size), r"$M,\ \dot\varphi$", green, (0, -10))
+    word(axes, (0.0, -1.6 * size), r"$M,\ \dot\varphi$", green, (0, -10))
     if scene.effects.slider_load is not None:
         first = (slider[0] + 0.7 * size, slider[1])
         second = (slider[0] + 2.4 * size, slider[1])
-        _arrow(axes, first, second, green)
-        _word(axes, second, "$F$", green, (6, 0))
+        arrow(axes, first, second, green)
+        word(axes, second, "$F$", green, (6, 0))
     if scene.effects.gravity > 0.0:
         first = (0.6 * slider[0], -0.9 * size)
         second = (0.6 * slider[0], -2.4 * size)
-        _arrow(axes, first, second, green)
-        _word(axes, second, "$g$", green, (8, 4))
-
-
-def _arrow(axes: "Axes", start: Pair, end: Pair, colour: str) -> None:
-    options = {"arrowstyle": "->", "color": colour, "lw": 1.0, "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.annotate("", end, start, arrowprops=options)
-
-
-def _word(axes: "Axes", place: Any, text: str, colour: str, offset: tuple[int, int]) -> None:
-    """A word beside a place, so many points off, whatever the scale."""
-    options: dict[str, Any] = {"color": colour, "ha": "center", "va": "center"}
-    options |= {"textcoords": "offset points", "fontsize": style.NORMAL, "zorder": 7}
-    axes.annotate(text, (float(place[0]), float(place[1])), offset, **options)
+        arrow(axes, first, second, green)
+        word(axes, second, "$g$", green, (8, 4))
 
 
 def _key(scene: Scene) -> list[str]:
