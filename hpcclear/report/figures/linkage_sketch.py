@@ -19,7 +19,7 @@ Pose = tuple[float, float, float]
 
 
 def points_of(body: PlanarBody) -> dict[str, Array]:
-    """Points of a body in its own axes, m; those of a bar are a and b besides."""
+    """Points (2,) of a body in its own axes, m; those of a bar are a and b besides."""
     found = {point.name: np.array([point.x, point.y]) for point in body.points}
     if body.length is not None:
         found = {"a": np.zeros(2), "b": np.array([body.length, 0.0])} | found
@@ -27,7 +27,7 @@ def points_of(body: PlanarBody) -> dict[str, Array]:
 
 
 def centre_of(body: PlanarBody) -> Array:
-    """Its mass centre in its own axes, m."""
+    """Its mass centre (2,) in its own axes, m."""
     if body.length is None:
         return np.array([body.center.x, body.center.y])
     along = 0.5 * body.length if body.mass_center is None else body.mass_center
@@ -54,7 +54,7 @@ class Placed:
         }
 
     def at(self, place: str) -> Array:
-        """A place, ``"body.point"``."""
+        """A place (2,), ``"body.point"``, m."""
         owner, name = place.split(".")
         return self.ground[name] if owner == "ground" else self.bodies[owner][name]
 
