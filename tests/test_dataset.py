@@ -99,6 +99,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "objective_smallest mean deviation",
         "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
         "timing": "busy idle compile write command",
+        "wear": "clearance bearing_depth objective lifetime survival survival_lower exceedance ending",
         "accuracy": "error seconds evaluations averaging_error r2 moment_error strong_seconds lost_seconds",
     }
     dims = {
@@ -113,6 +114,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "reading design",
         "statistics": "joint bin edge",
         "timing": "rank stage",
+        "wear": "life joint cycle quantile",
         "accuracy": "integrator rung quantity",
     }
     assert set(KINDS) == set(contract)

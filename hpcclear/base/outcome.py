@@ -24,6 +24,8 @@ class Status(IntEnum):
     STALLED = 4
     AVERAGE_CAP = 5
     NEAR_SINGULAR = 6
+    WORN_THROUGH = 7
+    JUMP_TOO_SHORT = 8
 
     @property
     def valid(self) -> bool:
@@ -66,6 +68,14 @@ _TEXT = {
     Status.NEAR_SINGULAR: (
         "the rod is hardly longer than the crank and no joint has play, so that at a dead centre forces grow without bound",
         'lengthen the rod, or give a joint kind = "clearance"',
+    ),
+    Status.WORN_THROUGH: (
+        "a clearance has grown to the radius of its bearing",
+        "lower wear.cycles, or check wear coefficients and lengths of bearings",
+    ),
+    Status.JUMP_TOO_SHORT: (
+        "no jump of as many revolutions as are averaged meets wear.tolerance",
+        "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
     ),
 }
 

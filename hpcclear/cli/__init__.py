@@ -370,6 +370,31 @@ def map_command(
     return _on_ranks(program, how.time_limit)
 
 
+@cli.command(short_help="Follow lives of joints that wear.")
+@_FILE
+@_SET
+@_output("NetCDF file to write.")
+@_with_how
+def wear(file: Path, overrides: tuple[str, ...], output: Path, how: _How) -> int:
+    """Follow lives of a mechanism whose joints wear: clearance, f and peak force against revolutions, how long lives last and
+    how sure that is.
+
+    Exit code 1 if every life failed; what there is of them is written.
+
+    Example: mpiexec -n 2 hpcclear wear jobs/wear.toml -o results/wear.nc --set wear.lives=8
+    """
+
+    def program(ranks: "Ranks") -> int:
+        from hpcclear.cli.wear import describe
+        from hpcclear.ensemble.session import Options
+        from hpcclear.ensemble.wear import run_wear
+
+        options = Options(how.fresh, how.interval, how.progress)
+        return describe(run_wear(_scene(file, overrides), _place(output), ranks, options))
+
+    return _on_ranks(program, how.time_limit)
+
+
 @cli.command(short_help="Carry a whole study.")
 @_FILE
 @_SET

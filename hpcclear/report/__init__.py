@@ -28,11 +28,13 @@ from hpcclear.report.figures.surrogates import (
     surfaces_figure,
 )
 from hpcclear.report.figures.timing import timing_figure
+from hpcclear.report.figures.wear import fan_figure, survival_figure
 
 __all__ = [
     "bifurcation_figure",
     "comparison_figure",
     "energy_figure",
+    "fan_figure",
     "fit_figure",
     "force_polar_figure",
     "front_figure",
@@ -49,5 +51,6 @@ __all__ = [
     "sobol_figure",
     "spectrum_figure",
     "surfaces_figure",
+    "survival_figure",
     "timing_figure",
 ]

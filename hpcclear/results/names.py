@@ -41,6 +41,10 @@ FURTHER: dict[str, dict[str, object]] = {
         "flag_values": np.array([int(status) for status in Status], np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     },
+    "ending": {
+        "flag_values": np.array([int(status) for status in Status], np.int8),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
+    },
     "outcome": {
         "flag_values": np.array([int(status) for status in Status], np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
@@ -100,6 +104,7 @@ KINDS = {
     "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples, streamed", columns.STATISTICS),
+    "wear": _kind("Lives of a mechanism whose joints wear", columns.WEAR, ("life",)),
     "timing": _kind("Where the time went", columns.TIMING),
     "accuracy": _kind("What accuracy costs in time", columns.ACCURACY),
 }

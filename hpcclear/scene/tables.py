@@ -18,6 +18,7 @@ from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.scene.wear import Lives
 
 
 class SceneTables(Table):
@@ -32,6 +33,7 @@ class SceneTables(Table):
     numerics: Numerics = Numerics()
     output: Output = Output()
     study: Study | None = None
+    wear: Lives | None = None
 
     elsewhere: ClassVar = {
         key: (f"belongs to [{part}]", f"Write {part}.{key}")

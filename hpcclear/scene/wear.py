@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import model_validator
 
-from hpcclear.scene.fields import PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, invalid
 
 
 class WornSurface(Table):
@@ -52,5 +52,50 @@ class Wear(Table):
                 "Give one of them a coefficient",
                 "bearing",
                 None,
+            )
+        return self
+
+
+class Limits(Table):
+    """What ends a life, whichever is passed first."""
+
+    clearance: PositiveLength | None = None
+    """Of any worn joint, m."""
+    peak_contact_force: Annotated[float, Quantity("N", above=0)] | None = None
+    """At any joint, N."""
+    objective: Annotated[float, Quantity("", above=0)] | None = None
+    """f, SI."""
+
+    def given(self) -> dict[str, float]:
+        """Those that are set, by name."""
+        every = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: value for name, value in every.items() if value is not None}
+
+
+class Lives(Table):
+    """What `hpcclear wear` follows: lives of so many revolutions, each with its own random inputs."""
+
+    cycles: Annotated[float, Quantity("", above=0)] = 1e6
+    """Revolutions of a life."""
+    lives: Annotated[int, Count(1, 10**6)] = 1
+    """Each with values of its own of all random inputs of the study; a single one is the scene as it stands."""
+    tolerance: Annotated[float, Quantity("", above=0, most=0.2)] = 0.01
+    """Of a jump in each clearance and in f, relative."""
+    copies: Annotated[int, Count(2, 1024)] = 4
+    """Simulations at a state of wear, kicked by 1e-9 of the clearance: where motion is chaotic they part."""
+    most_copies: Annotated[int, Count(2, 1024)] = 32
+    """Where the limits of rate and f are wider than the tolerance allows."""
+    points: Annotated[int, Count(2, 10**4)] = 41
+    """Revolutions that curves are told at."""
+    limit: Limits = Limits()
+
+    @model_validator(mode="after")
+    def _copies_in_order(self) -> "Lives":
+        if self.most_copies < self.copies:
+            raise invalid(
+                "there are more copies at first than at most",
+                "Raise most_copies, or lower copies",
+                "most_copies",
+                self.most_copies,
             )
         return self

@@ -20,6 +20,7 @@ from hpcclear.report.figures import (
     style,
     surrogates,
     timing,
+    wear,
 )
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
@@ -60,6 +61,16 @@ _RESULTS: tuple[Drawing, ...] = (
         "kriging",
         surrogates.parity_figure,
         "Surrogate against dynamics: each point predicted without itself; R² on test points.",
+    ),
+    (
+        "wear",
+        wear.fan_figure,
+        "Clearance and objective over the life: median, half and nine tenths of the lives; single lives in grey.",
+    ),
+    (
+        "wear",
+        wear.survival_figure,
+        "Lives that have passed no limit, with 95 % limits (Clopper and Pearson).",
     ),
     ("timing", timing.timing_figure, "Where the ranks' time went, by rank and by stage."),
 )

@@ -147,8 +147,9 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    if set(content.files) <= {"accuracy", "timing"} and "accuracy" in content.files:
-        return troubles or None  # a directory of `accuracy` lacks nothing
+    for kind in ("accuracy", "wear"):
+        if set(content.files) <= {kind, "timing"} and kind in content.files:
+            return troubles or None  # a directory of that command lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]
     if not content.responses:
         words.append(

@@ -1,0 +1,1 @@
+"""Wear over many revolutions: what worn surfaces come to, and one life from jump to jump."""

@@ -1,0 +1,75 @@
+"""Archard's law: from sliding work to worn depths and clearance.
+
+The worn volume of a surface is V = k W, W the integral of F_N |v_t| dt in J and k in m2/N (J. F. Archard, "Contact and
+rubbing of flat surfaces", J. Appl. Phys. 24 (1953), doi:10.1063/1.1721448; k = K/H with a dimensionless K and the
+hardness H). It is spread evenly over the whole surface as it was when new: the depth is V / (2 pi R L), R_B for the
+bearing and R_J for the journal. The true depth of a uniform layer differs from that by its share h / (2 R) of itself.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics.parameters import Numbers
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Worn joints of one life, or of several; arrays of shape (..., joints).
+
+    Attributes
+    ----------
+    clearance, bearing_radius : ndarray
+        When new, m.
+    bearing, journal : ndarray
+        Depth of wear for each joule of sliding work, m/J.
+    """
+
+    clearance: Array
+    bearing_radius: Array
+    bearing: Array
+    journal: Array
+
+    def __getitem__(self, life: Any) -> "Joints":
+        return Joints(*(array[life] for array in vars(self).values()))
+
+    @property
+    def slope(self) -> Array:
+        """Growth of the clearance for each joule, m/J."""
+        return self.bearing + self.journal
+
+    def worn(self, work: Array) -> tuple[Array, Array]:
+        """Clearance and bearing radius after so much sliding work (J), each of the shape of `work`, m."""
+        return self.clearance + self.slope * work, self.bearing_radius + self.bearing * work
+
+
+def joints_of(scene: Scene, points: Points | None) -> Joints:
+    """The worn joints of a scene, for each of its points; arrays of shape (points, joints)."""
+    get = Numbers(scene, points)
+    columns = []
+    for name in scene.worn_joints():
+        key = scene.joint_key(name)
+        clearance, radius = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+        around = 2.0 * math.pi * get(f"{key}.wear.length")
+        depths = [
+            _coefficient(scene, get, name, surface) / (around * size)
+            for surface, size in (("bearing", radius), ("journal", radius - clearance))
+        ]
+        columns.append((clearance, radius, *depths))
+    return Joints(*(np.stack(parts, axis=-1) for parts in zip(*columns, strict=True)))
+
+
+def _coefficient(scene: Scene, get: Numbers, joint: str, surface: str) -> Array:
+    """k of a surface for each point, m2/N; 0 of one that does not wear."""
+    wear: Any = scene.clearance_joint(joint).wear
+    table, key = getattr(wear, surface), f"{scene.joint_key(joint)}.wear.{surface}"
+    if table is None:
+        return np.zeros(get.size)
+    if table.coefficient is not None:
+        return get(f"{key}.coefficient")
+    return get(f"{key}.dimensionless") / get(f"{key}.hardness")

@@ -1,0 +1,232 @@
+"""One life: dynamics at a state of wear, a jump of many revolutions at the rate found there, dynamics again.
+
+The state is the sliding work that each worn joint has done, w; a revolution adds E(w) to it, which copies of a
+simulation tell with Student's limits. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves, w + n/2
+E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). What is gone on from is twice the one less the other, w + n E_half,
+whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
+how far it is, half-way, from the middle between both ends. What limits of E and f leave open is not held against a jump.
+"""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.wear.law import Joints
+from hpcclear.statistics.random.replicates import student
+
+FIRST_GROWTH = 0.1
+"""Of the clearance, relative, by the first jump."""
+
+MOST_GROWTH = 0.5
+"""By any jump."""
+
+_SHRINK, _GROW, _SAFETY = 0.2, 4.0, 0.9
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How lives are followed.
+
+    Attributes
+    ----------
+    cycles : float
+        Revolutions of a life.
+    tolerance : float
+        Of a jump in each clearance and in f, relative.
+    shortest : float
+        Revolutions of a jump, at least.
+    copies, most_copies : int
+        Simulations at a state of wear: at first, and where limits are wider than the tolerance allows.
+    """
+
+    cycles: float
+    tolerance: float
+    shortest: float
+    copies: int
+    most_copies: int
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What simulations at a state of wear came to.
+
+    `work`: sliding work in a revolution of worn joints (copies, joints), J; `objective`: f (copies,); `peak`: peak forces
+    of all joints of the scene (copies, joints), N; `status` (copies,).
+    """
+
+    work: Array
+    objective: Array
+    peak: Array
+    status: Integers
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies."""
+
+    work: Array
+    copies: range
+
+
+@dataclass(frozen=True)
+class Node:
+    """What is known at a state of wear; limits are 95 % half-widths.
+
+    `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
+    joint of the scene, N.
+    """
+
+    cycle: float
+    work: Array
+    rate: Array
+    rate_limit: Array
+    objective: float
+    objective_limit: float
+    peak: Array
+
+
+@dataclass
+class Life:
+    """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
+
+    `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m.
+    """
+
+    nodes: list[Node]
+    halves: list[Node] = field(default_factory=list)
+    status: Status = Status.OK
+    ended: float = math.nan
+    limit: Array = field(default_factory=lambda: np.zeros(0))
+    certain: bool = True
+    simulations: int = 0
+
+
+class _EndedError(Exception):
+    """A life that cannot go on, and why."""
+
+    def __init__(self, status: Status) -> None:
+        self.status = status
+
+
+Asking = Generator[Asked, Seen, Life]
+
+
+def life(joints: Joints, plan: Plan) -> Asking:
+    """Follow one life; yields what is to be simulated, is sent what came of it, returns the `Life`.
+
+    Parameters
+    ----------
+    joints : Joints, arrays (joints,)
+    plan : Plan
+    """
+    found = Life(nodes=[], limit=np.zeros(len(joints.clearance)))
+    variance = np.zeros(len(joints.clearance))
+    try:
+        here = yield from _look(found, joints, plan, 0.0, np.zeros(len(variance)), None)
+        found.nodes.append(here)
+        asked = _growing(joints, here, FIRST_GROWTH)
+        while here.cycle < plan.cycles:
+            asked = min(asked, _growing(joints, here, MOST_GROWTH))
+            length = min(asked, plan.cycles - here.cycle)
+            if length < min(plan.shortest, plan.cycles - here.cycle):
+                raise _EndedError(Status.JUMP_TOO_SHORT)
+            half, end, error = yield from _jump(found, joints, plan, here, length)
+            asked = length * min(max(_SAFETY / math.sqrt(max(error, 1e-9)), _SHRINK), _GROW)
+            if end is not None:
+                found.halves.append(half)
+                found.nodes.append(end)
+                variance += (joints.slope * length * half.rate_limit) ** 2
+                here = end
+    except _EndedError as stop:
+        found.status = stop.status
+    found.limit = np.sqrt(variance)
+    found.ended = found.nodes[-1].cycle if found.nodes else 0.0
+    return found
+
+
+def _growing(joints: Joints, here: Node, growth: float) -> float:
+    """Revolutions in which a clearance grows by that much, relative; no end where nothing wears."""
+    speed = joints.slope * here.rate / joints.worn(here.work)[0]
+    return growth / float(speed.max()) if speed.max() > 0.0 else math.inf
+
+
+def _jump(
+    found: Life, joints: Joints, plan: Plan, here: Node, length: float
+) -> Generator[Asked, Seen, tuple[Node, Node | None, float]]:
+    """Half-way, the end unless the jump is refused, and its error over the tolerance."""
+    work = here.work + 0.5 * length * here.rate
+    half = yield from _look(found, joints, plan, here.cycle + 0.5 * length, work, length)
+    gone = here.work + length * half.rate
+    clearance = joints.worn(gone)[0]
+    allowed = plan.tolerance * clearance
+    half_slope = 0.5 * length * joints.slope
+    apart = half_slope * np.abs(half.rate - here.rate)
+    open_ = half_slope * np.hypot(half.rate_limit, here.rate_limit)
+    error = float((np.maximum(apart - open_, 0.0) / allowed).max())
+    if error > 1.0:
+        return half, None, error
+    end = yield from _look(found, joints, plan, here.cycle + length, gone, length)
+    bent = abs(half.objective - 0.5 * (here.objective + end.objective))
+    known = math.sqrt(
+        half.objective_limit**2 + 0.25 * (here.objective_limit**2 + end.objective_limit**2)
+    )
+    bend = max(bent - known, 0.0) / (plan.tolerance * abs(end.objective))
+    grown = float(((clearance - joints.worn(here.work)[0]) / clearance).max())
+    # where f leaps, its curve is right once the leap is placed to within the tolerance of the clearance
+    if bend > 1.0 and grown > plan.tolerance:
+        return half, None, bend
+    return _placed(half, here, end, joints), end, max(error, min(bend, 1.0))
+
+
+def _placed(half: Node, here: Node, end: Node, joints: Joints) -> Node:
+    """The state half-way at the revolution at which it is passed: the half jump itself went at the rate of its start."""
+    done = float((joints.slope * (half.work - here.work)).sum())
+    whole = float((joints.slope * (end.work - here.work)).sum())
+    share = min(max(done / whole, 0.05), 0.95) if whole > 0.0 else 0.5
+    cycle = here.cycle + share * (end.cycle - here.cycle)
+    return Node(cycle, *list(vars(half).values())[1:])
+
+
+def _look(
+    found: Life, joints: Joints, plan: Plan, cycle: float, work: Array, length: float | None
+) -> Generator[Asked, Seen, Node]:
+    """Simulate a state of wear until its limits are within what a jump of that length may be off, or copies run out."""
+    clearance, radius = joints.worn(work)
+    if (clearance >= radius).any():
+        raise _EndedError(Status.WORN_THROUGH)
+    seen: list[Seen] = []
+    done, wanted = 0, plan.copies
+    while True:
+        answer = yield Asked(work, range(done, wanted))
+        found.simulations += wanted - done
+        failed = [s for s in answer.status.tolist() if not Status(s).valid]
+        if failed:
+            raise _EndedError(Status(failed[0]))
+        seen.append(answer)
+        done = wanted
+        node = _node(cycle, work, seen)
+        if length is None:
+            grown = FIRST_GROWTH * node.rate_limit / np.maximum(node.rate, 1e-300) * clearance
+        else:
+            grown = joints.slope * length * node.rate_limit
+        sure = (grown <= 0.5 * plan.tolerance * clearance).all()
+        sure &= node.objective_limit <= plan.tolerance * abs(node.objective)
+        if sure or done >= plan.most_copies:
+            found.certain &= bool(sure)
+            return node
+        wanted = min(2 * done, plan.most_copies)
+
+
+def _node(cycle: float, work: Array, seen: list[Seen]) -> Node:
+    rates = np.concatenate([one.work for one in seen])
+    values = np.concatenate([one.objective for one in seen])
+    peaks = np.concatenate([one.peak for one in seen])
+    scale = student(0.95, len(values) - 1) / math.sqrt(len(values))
+    return Node(
+        cycle, work, rates.mean(axis=0), scale * rates.std(axis=0, ddof=1), float(values.mean()),
+        scale * float(values.std(ddof=1)), peaks.mean(axis=0),
+    )  # fmt: skip

@@ -1,0 +1,289 @@
+"""Lives of worn joints: jumps against closed forms, what ends a life, statistics over lives, bytes over ranks and a kill."""
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import finish, kill, overrides, ranks_of, result_files, run, start
+from patience import crowded
+from running import scene_with
+from scipy.integrate import solve_ivp
+from scipy.stats import binom
+from test_wear import ROTOR, WORN
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.dynamics.wear.curves import curves, lifetime
+from hpcclear.dynamics.wear.law import Joints, joints_of
+from hpcclear.dynamics.wear.life import Plan, Seen, life
+from hpcclear.ensemble.wear import check_worn
+from hpcclear.report import fan_figure, survival_figure
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
+from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_limits
+
+SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
+PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
+ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12)))
+
+
+def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK):
+    """A life whose dynamics are functions of the clearances (joints,): rates (joints,), f; noise is relative."""
+    asking, rng = life(joints, plan), np.random.default_rng(3)
+    f = objective or (lambda c: float(c[0]))
+    asked = next(asking)
+    while True:
+        c, _ = joints.worn(asked.work)
+        n = len(asked.copies)
+        scatter = 1.0 + noise * rng.standard_normal((n, 1))
+        answer = Seen(
+            scatter * rate(c), np.full(n, f(c)) * scatter[:, 0], np.ones((n, len(c))),
+            np.full(n, int(status)),
+        )  # fmt: skip
+        try:
+            asked = asking.send(answer)
+        except StopIteration as end:
+            return end.value
+
+
+def test_a_constant_rate_makes_linear_progress():
+    found = followed(ONE, PLAN, lambda c: np.array([50.0]))
+    assert found.status is Status.OK
+    cycles = np.linspace(0.0, 1e6, 11)
+    clearance = curves(found, ONE, cycles).clearance[:, 0]
+    np.testing.assert_allclose(clearance, 3e-4 + 3e-12 * 50.0 * cycles, rtol=1e-10)
+    assert found.certain
+    assert found.limit[0] < 1e-15
+
+
+def exact(joints, power, coefficient, cycles):
+    """Clearances of joints whose rate is ``coefficient * (mean clearance / 0.3 mm)^power``, by a fine integration."""
+
+    def speed(_, c):
+        return joints.slope * coefficient * (c.mean() / 3e-4) ** power
+
+    return solve_ivp(
+        speed, (0.0, cycles), joints.clearance, method="DOP853", rtol=1e-12, atol=1e-18
+    ).y[:, -1]
+
+
+def test_errors_of_jumps_stay_within_their_tolerance():
+    """Of 40 lives with rates that grow or fall with wear, 95 % end within the tolerance of one jump of the truth."""
+    rng = np.random.default_rng(5)
+    within, off = 0, []
+    for _ in range(40):
+        joints = Joints(
+            rng.uniform(1e-4, 5e-4, 2), np.full(2, 0.02), rng.uniform(0.5e-12, 4e-12, 2), np.zeros(2)
+        )  # fmt: skip
+        power, coefficient = rng.uniform(-0.5, 1.5), rng.uniform(20.0, 80.0, 2)
+        found = followed(joints, PLAN, lambda c, p=power, k=coefficient: k * (c.mean() / 3e-4) ** p)
+        assert found.status is Status.OK
+        end = joints.worn(found.nodes[-1].work)[0]
+        truth = exact(joints, power, coefficient, 1e6)
+        off.append(float(np.abs(end / truth - 1.0).max()))
+        within += off[-1] <= PLAN.tolerance
+    assert within >= 38
+    assert max(off) > 1e-6  # there are errors to hold
+
+
+def test_tighter_jumps_are_more_and_better():
+    errors, jumps = [], []
+    for tolerance in (0.02, 0.0005):
+        plan = Plan(1e6, tolerance, 5.0, 4, 16)
+        found = followed(ONE, plan, lambda c: 100.0 * (c / 3e-4) ** 1.2)
+        truth = exact(ONE, 1.2, 100.0, 1e6)
+        errors.append(abs(float(ONE.worn(found.nodes[-1].work)[0][0] / truth[0]) - 1.0))
+        jumps.append(len(found.nodes))
+    assert jumps[1] > jumps[0]
+    assert errors[1] < 0.2 * errors[0]
+
+
+def test_a_leap_of_f_does_not_end_a_life():
+    found = followed(
+        ONE, PLAN, lambda c: np.array([100.0]), lambda c: 1e-4 if c[0] < 4.321e-4 else 2e-4
+    )
+    assert found.status is Status.OK
+    at = np.linspace(0.0, 1e6, 20001)
+    seen = curves(found, ONE, at)
+    place = seen.clearance[np.argmax(seen.objective > 1.5e-4), 0]
+    assert place == pytest.approx(4.321e-4, rel=0.01)
+
+
+def test_what_ends_a_life_is_a_status():
+    def rate(c):
+        return np.array([3e4])
+
+    through = followed(ONE, PLAN, rate)
+    assert through.status is Status.WORN_THROUGH
+    assert through.ended < 1e6
+    assert lifetime(through, ONE, {}) == through.ended
+    assert np.isnan(curves(through, ONE, np.array([1e6])).clearance).all()
+    fast = followed(ONE, PLAN, lambda c: np.array([1e9]))
+    assert fast.status is Status.JUMP_TOO_SHORT
+    assert math.isnan(lifetime(fast, ONE, {"clearance": 1e-3}))
+    failed = followed(ONE, PLAN, rate, status=Status.STEP_CAP)
+    assert failed.status is Status.STEP_CAP
+    assert np.isnan(curves(failed, ONE, np.linspace(0, 1, 3)).objective).all()
+
+
+def test_a_rate_that_scatters_asks_for_more_copies_and_says_what_it_does_not_know():
+    calm = followed(ONE, PLAN, lambda c: np.array([50.0]), noise=1e-4)
+    wild = followed(ONE, PLAN, lambda c: np.array([50.0]), noise=0.2)
+    assert calm.certain
+    assert not wild.certain
+    assert wild.simulations >= 4 * calm.simulations / len(calm.nodes)
+    end = ONE.worn(wild.nodes[-1].work)[0][0]
+    assert abs(end - (3e-4 + 3e-12 * 50.0 * 1e6)) < 2.0 * wild.limit[0]
+    assert wild.limit[0] > 10.0 * calm.limit[0]
+
+
+def test_worn_volume_is_spread_over_the_surface():
+    """V = k W over 2 pi R L, of bearing and journal."""
+    joints = joints_of(scene_with(WORN), None)[0]
+    around = 2.0 * math.pi * 0.02
+    np.testing.assert_allclose(joints.bearing, [1e-15 / (around * 0.02), 0.0], rtol=1e-14)
+    journal = 1e-6 / 2e9 / (around * (0.02 - 0.3e-3))
+    np.testing.assert_allclose(joints.journal, [0.0, journal], rtol=1e-14)
+    clearance, radius = joints.worn(np.array([1e6, 1e6]))
+    np.testing.assert_allclose(radius - clearance, 0.0197 - joints.journal * 1e6, rtol=1e-12)
+
+
+def test_a_life_ends_where_a_limit_is_passed_first():
+    found = followed(ONE, PLAN, lambda c: np.array([50.0]), lambda c: 2.0 * float(c[0]))
+    assert lifetime(found, ONE, {"clearance": 3.75e-4}) == pytest.approx(5e5, rel=1e-6)
+    assert lifetime(found, ONE, {"clearance": 3.75e-4, "objective": 6.6e-4}) == pytest.approx(
+        2e5, rel=1e-3
+    )
+    assert lifetime(found, ONE, {"clearance": 1e-3}) == math.inf
+    assert lifetime(found, ONE, {"peak_contact_force": 0.5}) == 0.0
+
+
+def test_limits_of_shares_are_clopper_and_pearsons():
+    lower, upper = share_limits(np.array([0, 3, 20]), 20)
+    assert lower[0] == 0.0
+    assert upper[2] == 1.0
+    assert binom.sf(2, 20, lower[1]) == pytest.approx(0.025, rel=1e-9)
+    assert binom.cdf(3, 20, upper[1]) == pytest.approx(0.025, rel=1e-9)
+    assert binom.cdf(0, 20, upper[0]) == pytest.approx(0.025, rel=1e-9)
+
+
+def test_quantiles_keep_what_is_infinite_and_leave_out_what_failed():
+    values = np.array([3.0, 1.0, np.inf, 2.0, np.nan])
+    np.testing.assert_array_equal(
+        quantiles(values, np.array([0.25, 0.5, 0.75, 1.0])), [1.0, 2.0, 3.0, np.inf]
+    )
+    assert np.isnan(quantiles(np.full(3, np.nan), np.array([0.5]))[0])
+    assert rank_correlation(np.arange(9.0), np.exp(np.arange(9.0))) == pytest.approx(1.0)
+    assert math.isnan(rank_correlation(np.arange(3.0), np.arange(3.0)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"wear": None}, "wear"),
+        ({"joints.crank_rod.wear": None, "joints.rod_slider.wear": None, "study": None, "wear.lives": 1}, "joints"),
+        ({"study": None}, "wear.lives"),
+        ({"numerics.target_error": 1e-3}, "numerics.target_error"),
+        ({"numerics.uncertainty": True}, "numerics.uncertainty"),
+    ],
+)  # fmt: skip
+def test_what_has_no_lives_is_refused(changes, key):
+    scene = load_scene(SCENE).with_(changes)
+    with pytest.raises(InputError) as error:
+        check_worn(scene)
+    assert error.value.key == key
+
+
+# ---- the command -----------------------------------------------------------------------------------
+
+
+def words(output: Path, *settings: str) -> list[str]:
+    """A `wear` command of few, short lives."""
+    quick = ("wear.lives=6", "wear.points=5", "wear.copies=2", *settings)
+    return ["wear", str(SCENE), "-o", str(output), *overrides(*quick)]
+
+
+def test_a_linkage_wears_as_the_closed_form_says(tmp_path):
+    """A journal that turns under a constant load; its rate falls with the clearance, as Hertz's law has it."""
+    import tomli_w
+
+    content = {**ROTOR, "wear": {"cycles": 2e6, "tolerance": 1e-4, "points": 3}}
+    content["mechanism"] = {**ROTOR["mechanism"]}
+    content["numerics"] = {**ROTOR["numerics"], "rtol": 1e-9}
+    file = tmp_path / "rotor.toml"
+    file.write_text(tomli_w.dumps(content), encoding="utf-8")
+    code, output = run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
+    assert code == 0, output
+    found = dataset.read(tmp_path / "out.nc", "wear")
+    slope, softness = 1e-15 / (2.0 * math.pi * 0.02 * 0.02), 2.0 * (1.0 - 0.3**2) / 2e11
+
+    def speed(_, c):
+        radius = 0.02 + c - 1e-4  # only the bearing wears
+        stiffness = 4.0 / (3.0 * softness) * np.sqrt(radius * (radius - c) / c)
+        depth = (500.0 / stiffness) ** (2.0 / 3.0)
+        return slope * 500.0 * 2.0 * math.pi * (radius - c - 0.5 * depth)
+
+    truth = solve_ivp(speed, (0.0, 2e6), [1e-4], rtol=1e-11, atol=1e-16).y[0, -1]
+    assert truth > 1.3e-4
+    assert float(found.clearance[0, -1, 0]) == pytest.approx(truth, rel=1e-6)
+    grown = found.bearing_depth[0, -1, 0] + found.journal_depth[0, -1, 0]
+    assert float(grown) == pytest.approx(truth - 1e-4, rel=1e-5)
+
+
+@pytest.mark.mpi
+def test_ranks_and_a_kill_change_no_byte(tmp_path):
+    files = []
+    for ranks in (0, 2, 3):
+        out = tmp_path / str(ranks) / "wear.nc"
+        out.parent.mkdir()
+        code, output = run(words(out), ranks)
+        assert code == 0, output
+        files.append(out.read_bytes())
+    assert files[0] == files[1] == files[2]
+    out = tmp_path / "killed" / "wear.nc"
+    out.parent.mkdir()
+    slow = [*words(out), "--checkpoint-interval", "0"]
+    job = start(slow, 2)
+    deadline = time.time() + crowded(60.0)
+    while not result_files(out.parent):
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.01)
+    kill(ranks_of(job)[1])
+    finish(job)
+    assert not out.exists()
+    code, output = run(words(out), 2)
+    assert code == 0, output
+    assert out.read_bytes() == files[0]
+    found = dataset.read(out, "wear")
+    check(found)
+    assert fan_figure(found) is not None
+    assert survival_figure(found) is not None
+
+
+def check(found):
+    """Numbers of six lives hang together."""
+    assert (found.ending == Status.OK).all()
+    assert not (found.flags & Flag.TARGET_MISSED).any()
+    assert (found.clearance.diff("cycle") > 0.0).all()
+    depths = found.bearing_depth + found.journal_depth
+    grown = found.clearance - found.clearance.isel(cycle=0)
+    np.testing.assert_allclose(grown, depths, atol=1e-15)
+    assert (found.survival_lower <= found.survival).all()
+    assert (found.survival <= found.survival_upper).all()
+    over = (found.lifetime <= float(found.cycle[-1])).mean()
+    assert float(found.survival[-1]) == pytest.approx(1.0 - float(over))
+    assert np.corrcoef(found.k12, grown.isel(cycle=-1, joint=0))[0, 1] > 0.9
+
+
+def test_lives_that_fail_are_told_and_end_the_command(tmp_path):
+    out = tmp_path / "wear.nc"
+    code, output = run(words(out, "numerics.max_steps=50"), 0)
+    assert code == 1
+    assert "step_cap" in output
+    found = dataset.read(out, "wear")
+    assert (found.ending == Status.STEP_CAP).all()
+    assert np.isnan(found.clearance).all()
+    assert np.isnan(found.lifetime).all()
