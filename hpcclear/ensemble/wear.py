@@ -98,7 +98,7 @@ class States:
         return np.concatenate([fixed, state.reshape(len(kicks), -1)], axis=1)
 
     def points(self, rows: Array) -> Points:
-        """Such designs as points."""
+        """Such designs, shape (n, names), as points."""
         return Points(self.names, rows, tuple((name,) for name in self.names))
 
 
@@ -231,6 +231,7 @@ def lives_dataset(
     data: dict[str, Any] = {
         **values,
         "clearance_limit": np.stack([one.limit for one in lives]),
+        "clearance_error": np.stack([one.error for one in lives]),
         "lifetime": ends,
         "ended": np.array([one.ended for one in lives]),
         "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
@@ -269,6 +270,8 @@ def statistics(
     values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None
 ) -> dict[str, Array]:
     """Quantiles over lives, survival and exceedance with limits; lives that failed are left out.
+
+    `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit` of the clearance, m.
 
     A life whose bearing is worn through counts, with a clearance above any limit from there on.
     """

@@ -93,7 +93,8 @@ class Node:
 class Life:
     """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
 
-    `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m.
+    `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m; `error`: sum
+    (joints,) of what two half jumps and one differed by, m.
     """
 
     nodes: list[Node]
@@ -101,6 +102,7 @@ class Life:
     status: Status = Status.OK
     ended: float = math.nan
     limit: Array = field(default_factory=lambda: np.zeros(0))
+    error: Array = field(default_factory=lambda: np.zeros(0))
     certain: bool = True
     simulations: int = 0
 
@@ -123,7 +125,8 @@ def life(joints: Joints, plan: Plan) -> Asking:
     joints : Joints, arrays (joints,)
     plan : Plan
     """
-    found = Life(nodes=[], limit=np.zeros(len(joints.clearance)))
+    nothing = np.zeros(len(joints.clearance))
+    found = Life(nodes=[], limit=nothing, error=nothing)
     variance = np.zeros(len(joints.clearance))
     try:
         here = yield from _look(found, joints, plan, 0.0, np.zeros(len(variance)), None)
@@ -140,6 +143,8 @@ def life(joints: Joints, plan: Plan) -> Asking:
                 found.halves.append(half)
                 found.nodes.append(end)
                 variance += (joints.slope * length * half.rate_limit) ** 2
+                apart = 0.5 * length * joints.slope * np.abs(half.rate - here.rate)
+                found.error = found.error + apart
                 here = end
     except _EndedError as stop:
         found.status = stop.status
