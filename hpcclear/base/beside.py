@@ -30,10 +30,11 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
     Parameters
     ----------
     parts : sequence of str
-        ``"module:function"`` or ``"module:function:word"``: functions that compile, and the number or name they take.
+        ``"module:function"`` or ``"module:function:word"``: functions that compile, and the number or name they take. The
+        first takes longest: where it is there, the others are not worth another process.
     """
     wanted = [part for part in parts if not _mark(part).exists()]
-    if not (wanted and own_cores() > 1):
+    if not (wanted and wanted[0] == parts[0] and own_cores() > 1):
         yield
         return
     code = "import sys; from hpcclear.base.beside import compile_parts; compile_parts(sys.argv[1:])"
