@@ -111,16 +111,12 @@ def parts(samples: int, expected: bytes) -> None:
     for k in (1, 2, 4):
         end = wait(f"{job}_{k}", *ENDS, seconds=600.0)
         expect(f"parts: part {k} of 4 is done", end["JobState"] == "COMPLETED", log)
-    merge = [
-        "hpcclear",
-        "merge",
-        SCENE,
-        "-o",
-        str(output),
+    settings = [
+        *CHEAP[:2],
         "--set",
         f"study.samples={samples}",
-        *CHEAP[:2],
-    ]
+    ]  # in the order of the parts, as files quote them
+    merge = ["hpcclear", "merge", SCENE, "-o", str(output), *settings]
     short = subprocess.run(merge, cwd=ROOT, capture_output=True, text=True, check=False)
     expect("parts: merge names the one that is missing", "'3/4'" in short.stderr, log)
     options = (*options, "--array=3", "--export=ALL,PARTS=4")
