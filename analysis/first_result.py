@@ -24,6 +24,8 @@ STIFF = [
     "numerics.transient_revolutions=0",
     "numerics.averaged_revolutions=1",
 ]
+FOUR_BAR, V_TWIN = "linkages/crank_rocker.toml", "linkages/v_twin.toml"
+SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
 GROUPS: dict[str, dict[str, list[str]]] = {
     "empty cache": {
         "the paper's scene": [],
@@ -37,6 +39,8 @@ GROUPS: dict[str, dict[str, list[str]]] = {
         "driven by a torque": [
             'drive={kind="torque", torque=5.0, initial_speed=520.0, flywheel_inertia=0.01}'
         ],
+        "a four-bar": [FOUR_BAR, *SHORT],
+        "a V-twin": [V_TWIN, *SHORT],
     },
     "empty cache, stiff": {
         "friction with a steep ramp": STIFF,
@@ -44,13 +48,16 @@ GROUPS: dict[str, dict[str, list[str]]] = {
         "other effects": [*STIFF, "effects.gravity=9.81"],
     },
 }
-"""By group, then by row: what is set beside the job's scene."""
+"""By group, then by row: what is set beside the job's scene, or beside another whose file is named first."""
 
 
 def run(overrides: list[str], cache: str, out: Path) -> tuple[float, float]:
     """Wall and processor seconds of one command."""
+    job = JOB
+    if overrides and overrides[0].endswith(".toml"):
+        job, overrides = JOB.parent / overrides[0], overrides[1:]
     words = [word for override in overrides for word in ("--set", override)]
-    command = [sys.executable, "-m", "hpcclear", "simulate", str(JOB), *words, "-o", str(out)]
+    command = [sys.executable, "-m", "hpcclear", "simulate", str(job), *words, "-o", str(out)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "HPCCLEAR_CACHE": cache}
     environment.pop("NUMBA_CACHE_DIR", None)
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
