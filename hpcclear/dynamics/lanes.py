@@ -18,6 +18,7 @@ from hpcclear.dynamics.explicit.steps import explicit_code
 from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.memory import LANES
 from hpcclear.dynamics.implicit.stiff import implicit_code
+from hpcclear.dynamics.linkage.observe import observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.stepping.settings import (
@@ -36,6 +37,7 @@ from hpcclear.dynamics.views import Outcome, Parameters, Start
 NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
+OBSERVING = f"{observing_code.__module__}:{observing_code.__name__}"
 IMPLICIT = f"{implicit_code.__module__}:{implicit_code.__name__}"
 
 
@@ -110,6 +112,7 @@ class Lanes:
         widths = (self.width if blocks else 0, LANES if self._memory is not None else 0)
         texts = [problem.motion_text(effects, width) for width in widths if width]
         apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)] if blocks else []
+        apart += [OBSERVING] if blocks and self.record is not None else []
         with compiled_beside([f"{IMPLICIT}:{n}"] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, stiff).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))

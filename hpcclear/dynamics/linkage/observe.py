@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
@@ -38,6 +39,12 @@ def _observe(motion, lane, tables, states, contacts, times, out):
             out[row, k] = lane[at.ACC + k]
         for r in range(at.RATES):
             out[row, n + r] = lane[at.RATE_NOW + r]
+
+
+def observing_code() -> None:
+    """Compile what `observe` calls, before there is anything to observe."""
+    row, table = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
+    _observe.compile((types.int64, row, row, table, table, row, table))
 
 
 @scalar_function
