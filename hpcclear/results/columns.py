@@ -343,7 +343,7 @@ WEAR: Columns = {
     "clearance_limit": number(("life", "joint"), "m",
         "95 % half-width of the clearance at the end for the limits of the wear rates", required=True),
     "clearance_error": number(("life", "joint"), "m",
-        "sum over jumps of what two half jumps and one differ by in the clearance", required=True),
+        "sum over jumps of what two half jumps and one differ by in the clearance at most", required=True),
     "lifetime": number(("life",), "1", "revolutions until the first limit is passed; infinite if none is", required=True),
     "ended": number(("life",), "1", "revolutions that were followed", required=True),
     "jumps": count(("life",), "number of jumps", required=True),

@@ -94,7 +94,7 @@ class Life:
     """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
 
     `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m; `error`: sum
-    (joints,) of what two half jumps and one differed by, m.
+    over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either half, m.
     """
 
     nodes: list[Node]
@@ -143,8 +143,9 @@ def life(joints: Joints, plan: Plan) -> Asking:
                 found.halves.append(half)
                 found.nodes.append(end)
                 variance += (joints.slope * length * half.rate_limit) ** 2
-                apart = 0.5 * length * joints.slope * np.abs(half.rate - here.rate)
-                found.error = found.error + apart
+                # rates that rise and fall again within a jump are told by its end as well
+                apart = np.maximum(np.abs(half.rate - here.rate), np.abs(end.rate - half.rate))
+                found.error = found.error + 0.5 * length * joints.slope * apart
                 here = end
     except _EndedError as stop:
         found.status = stop.status

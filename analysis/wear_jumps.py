@@ -1,0 +1,147 @@
+"""Jumps against runs without any: clearances of random lives after many revolutions, what jumps cost, whether errors are held.
+
+    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40]
+
+Without jumps every life runs on from where it is, and after every ten revolutions its clearances grow by what these wore.
+Wear coefficients are larger than those of jobs/wear.toml by as much as lives are shorter, so that clearances grow alike.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.wear.law import joints_of
+from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
+from hpcclear.ensemble.wear import States, inputs_of
+from hpcclear.scene import Scene, load_scene
+
+SCENE = Path(__file__).parents[1] / "jobs" / "wear.toml"
+WHOLE = 1e6
+"""Revolutions of the starter's lives."""
+CHUNK = 10
+"""Revolutions between two updates of the clearances."""
+
+
+def scene_of(lives: int, revolutions: int) -> Scene:
+    """The starter's lives, worn faster."""
+    scene = load_scene(SCENE)
+    faster = WHOLE / revolutions
+    changes = {"wear.lives": lives, "wear.cycles": float(revolutions)}
+    for row in scene.required_study.random:
+        if row.name in ("k12", "k23"):
+            changes[row.paths[0]] = faster * scene.number(row.paths[0])
+            changes[f"study.random.{row.name}.deviation"] = faster * row.deviation
+            changes[f"study.random.{row.name}.half_width"] = faster * row.half_width
+    return scene.with_(changes)
+
+
+def unjumped(scene: Scene, revolutions: int) -> tuple[np.ndarray, float]:
+    """Clearances (lives, joints) after so many revolutions, and the processor time."""
+    inputs = inputs_of(scene)
+    joints = joints_of(scene, inputs)
+    states = States(scene, inputs, joints)
+    lives = range(len(joints.clearance))
+    work = np.zeros(joints.clearance.shape)
+    lanes = Lanes(
+        problem_of(
+            scene.with_(
+                {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": CHUNK}
+            )
+        ),
+        32,
+    )
+
+    def par_of() -> np.ndarray:
+        rows = [states.rows(k, Asked(work[k], range(1))) for k in lives]
+        return parameters(scene, states.points(np.concatenate(rows)))
+
+    par = par_of()
+    start = start_states(scene, par, None)
+    lanes.run(par, start)  # compiles
+    began = time.process_time()
+    for _ in range(revolutions // CHUNK):
+        outcome = lanes.run(par_of(), start)
+        if (outcome.status != 0).any():
+            raise RuntimeError("a simulation failed")
+        work += outcome.sliding_work[:, : work.shape[1]]
+        start = outcome.end()
+    return joints.worn(work)[0], time.process_time() - began
+
+
+def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
+    """Clearances by jumps, the stated error of each (lives, joints), processor time, simulations."""
+    inputs = inputs_of(scene)
+    joints = joints_of(scene, inputs)
+    states = States(scene, inputs, joints)
+    table, numerics = scene.wear, scene.numerics
+    plan = Plan(
+        table.cycles,
+        table.tolerance,
+        float(numerics.averaged_revolutions),
+        table.copies,
+        table.most_copies,
+    )
+    lanes = Lanes(problem_of(scene), 32)
+    lives = [life(joints[k], plan) for k in range(len(joints.clearance))]
+    going = {k: next(one) for k, one in enumerate(lives)}
+    ended = {}
+    began = time.process_time()
+    while going:
+        rows = [states.rows(k, asked) for k, asked in going.items()]
+        par = parameters(scene, states.points(np.concatenate(rows)))
+        outcome = lanes.run(par, start_states(scene, par, None))
+        cuts = np.cumsum([len(part) for part in rows])[:-1]
+        period = outcome.time / outcome.revolutions
+        found = zip(
+            np.split(outcome.sliding_power[:, :2] * period[:, None], cuts), np.split(outcome.objective, cuts),
+            np.split(outcome.peak_force[:, :2], cuts), np.split(outcome.status.astype(int), cuts), strict=True,
+        )  # fmt: skip
+        waiting, going = going, {}
+        for k, answer in zip(waiting, found, strict=True):
+            try:
+                going[k] = lives[k].send(Seen(*answer))
+            except StopIteration as end:
+                ended[k] = end.value
+    seconds = time.process_time() - began
+    done = [ended[k] for k in range(len(lives))]
+    ends = np.stack([joints[k].worn(one.nodes[-1].work)[0] for k, one in enumerate(done)])
+    stated = np.stack([one.error + one.limit for one in done])
+    return ends, stated, seconds, sum(one.simulations for one in done)
+
+
+def main() -> None:
+    """Print the comparison."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--revolutions", type=int, default=100_000)
+    parser.add_argument("--lives", type=int, default=40)
+    asked = parser.parse_args()
+    scene = scene_of(asked.lives, asked.revolutions)
+    ends, stated, fast, simulations = jumped(scene)
+    ends, stated, fast, simulations = jumped(scene)  # once more, compiled
+    truth, slow = unjumped(scene, asked.revolutions)
+    off = np.abs(ends - truth)
+    new = joints_of(scene, inputs_of(scene)).clearance
+    print(f"{asked.lives} lives of {asked.revolutions} revolutions, processor time")
+    print(
+        f"growth of clearance: median {np.median(truth / new - 1):.1%}, most {(truth / new).max() - 1:.1%}"
+    )
+    print(
+        f"error of clearance: median {np.median(off / truth):.2e}, most {(off / truth).max():.2e}"
+    )
+    print(
+        f"stated error holds the true one in {(off <= stated).all(axis=1).mean():.1%} of the lives"
+    )
+    print(f"stated over true, median: {np.median(stated / np.maximum(off, 1e-300)):.3g}")
+    print(
+        f"without jumps {slow:.1f} s, with {fast:.2f} s ({simulations} simulations): {slow / fast:.0f} times less"
+    )
+
+
+if __name__ == "__main__":
+    main()
