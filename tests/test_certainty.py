@@ -1,6 +1,7 @@
 """Numbers with limits: replicates, what can be told apart, and where to look next."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hpcclear.scene.stages import SCRAMBLINGS, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student, surely_less
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.search.infill import NEAR, TwoScales, proposals
+from hpcclear.study import refinement
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
 CASE = ("C", "m2", "m3", "u2", "I2")
@@ -229,3 +231,17 @@ def test_proposals_find_the_least_of_both(seed):
 def test_too_few_designs_for_a_model_are_refused():
     with pytest.raises(InputError, match="too few valid samples"):
         proposals(np.full((3, 2), 0.5), np.ones((3, 2)), BOUNDS, 4, np.random.default_rng(1))
+
+
+def test_a_round_that_proposes_nothing_ends_the_search():
+    """Of several variables too: nothing is added to what was tried."""
+    scene = load_scene(ROBUST)
+    run = SimpleNamespace(scene=scene, study=scene.required_study)
+    (case, *_) = (one.name for one in scene.required_study.cases)
+    names = scene.required_study.design_variables(case)
+    assert len(names) > 1
+    nothing = refinement._simulated(run, [], "check-1")
+    before = refinement._tried(run, case, nothing, None)
+    assert before.coordinates.shape == (0, len(names))
+    after = refinement._tried(run, case, nothing, before)
+    assert after.values.shape == (0, 2)

@@ -167,11 +167,12 @@ def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
 
 def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
     """Cases, designs (NaN where a variable is none of the case's) and moments."""
+    names = run.study.optimisation
     if not choices:
-        return {"case": np.array([], "U1"), "design": np.empty((0, 1)), "values": np.empty((0, 2))}
+        nothing = np.empty((0, len(names)))
+        return {"case": np.array([], "U1"), "design": nothing, "values": np.empty((0, 2))}
     count = length(run.study)
     found = truth.sequences(run, choices, stage, "search", count, count * SCRAMBLINGS)
-    names = run.study.optimisation
     return {
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
