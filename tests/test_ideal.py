@@ -218,7 +218,7 @@ def test_series_of_a_scene_without_clearance_keep_the_energy_balance():
 
 
 @pytest.mark.parametrize("drive", ["prescribed", "torque"])
-@pytest.mark.parametrize("longer", [1e-6, 1e-9])
+@pytest.mark.parametrize("longer", [1e-6, 2.6e-8, 1e-9])
 def test_a_rod_hardly_longer_than_the_crank_is_told(drive, longer):
     """Energy closes where numbers are given, and where they are not the status says why."""
     changes = {
@@ -235,7 +235,7 @@ def test_a_rod_hardly_longer_than_the_crank_is_told(drive, longer):
     scene = scene_with(changes)
     found = simulate(scene)
     records = evaluate_records(scene, Points((), np.empty((1, 0)), ()))
-    if longer < 1e-7:
+    if longer < (1e-7 if drive == "torque" else 1e-8):
         assert int(found["status"]) == records["status"][0] == Status.NEAR_SINGULAR
         assert "play" in Status.NEAR_SINGULAR.message
         assert np.isnan(float(found["objective"]))
