@@ -42,8 +42,8 @@ STIFF_DAMPING = 10.0
 LEAST_RISE = {"torque": 5e-3, "speed": 1e-3}
 """Cosine of the rod's steepest angle below which a crank without play, driven by a torque or at a speed, is not simulated.
 
-What it feels changes within so small a part of a turn that steps, or the instants that works are summed over, pass over it. Under a
-torque the energy closes to 1e-4 with 6e-3 and to 0.15 with 2e-3; at a speed to 2e-9 with 2e-3 and to 5e-3 with 2e-4."""
+What it feels changes within so small a part of a turn that steps, or the instants that works are summed over, pass over it.
+Under a torque the energy closes to 1e-4 with 6e-3 and to 0.15 with 2e-3; at a speed to 2e-9 with 2e-3 and to 5e-3 with 2e-4."""
 
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""

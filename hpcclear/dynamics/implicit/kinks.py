@@ -76,7 +76,7 @@ def ramp_sides(rules, m, p, sliding, i):
         return 0.0, 0.0
 
 
-@scalar_function
+@lane_function
 def kinks_of_joint(rules, m, p, i):
     """The four functions of joint p at the state in lane i; 0 where no kink can be felt."""
     row = mem.KINKS + mem.KINKS_A_JOINT * p
@@ -98,7 +98,8 @@ def kinks_of_joint(rules, m, p, i):
 @scalar_function
 def kink_functions(rules, m):
     """Kink functions of all open joints at the states of the first bank, as evaluated."""
-    for p in range(rules.begin, rules.end):
+    for joint in range(rules.begin, rules.end):
+        p = joint & 7  # not below 0, which spares the compiler a question for every lane
         for i in range(LANES):
             kinks_of_joint(rules, m, p, i)
 
