@@ -4,8 +4,11 @@ import subprocess
 import sys
 
 import pytest
+from running import scene_with
 
 from hpcclear.base import beside, cores
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.problem import problem_of
 
 PROGRAM = """
 import sys
@@ -35,6 +38,21 @@ def test_what_is_not_there_is_compiled_by_another_process(tmp_path):
 @pytest.mark.skipif(cores.own_cores() < 2, reason="one core: nothing is compiled beside")
 def test_a_part_that_fails_is_left_to_this_process(tmp_path):
     assert run(tmp_path, "hpcclear.nowhere:nothing") == ["False"]
+
+
+def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
+    """A stepper never runs on addresses that are not there yet."""
+    lanes = Lanes(problem_of(scene_with()), 4)
+
+    def interrupted(width, stiff):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("hpcclear.dynamics.lanes.explicit_code", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            lanes.step(1)
+    assert not lanes.step(1)  # compiled now; nothing is queued
+    assert all(lanes._codes[1][:2])
 
 
 class Started(Exception):

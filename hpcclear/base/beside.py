@@ -5,6 +5,7 @@ What it has compiled this process loads from disk, so nothing is lost where it f
 
 import contextlib
 import importlib
+import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -41,8 +42,10 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
     quiet = subprocess.DEVNULL
     try:
         other = subprocess.Popen(
-            [sys.executable, "-c", code, *wanted], stdin=quiet, stdout=quiet, stderr=quiet
-        )
+            [sys.executable, "-c", code, *wanted],
+            stdin=quiet, stdout=quiet, stderr=quiet,
+            env={**os.environ, "NUMBA_CACHE_DIR": config.CACHE_DIR},  # also where that is a folder of this process alone
+        )  # fmt: skip
     except OSError:  # no room for another process
         yield
         return

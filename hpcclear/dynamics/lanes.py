@@ -105,7 +105,6 @@ class Lanes:
     def _compile(self) -> None:
         """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
         problem, n, effects = self.problem, self.problem.coordinates, self._effects
-        self._compiled = True
         stiff = self._memory is not None and not problem.collocation
         blocks = not problem.collocation
         # of so many lanes, and of eight where evaluations of one lane stand side by side
@@ -121,6 +120,9 @@ class Lanes:
             self._codes = (n, Codes(special_code().address, explicit, implicit))
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        self._compiled = (
+            True  # last: a stepper must not call what an interrupted compilation left out
+        )
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:
         arrays = (self._rules, self._block, self._queue, self._method)

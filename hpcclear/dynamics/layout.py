@@ -131,19 +131,15 @@ RATES = SLIDING_POWERS + MAX_JOINTS
 
 
 class Integrated(NamedTuple):
-    """A rate that every stepper integrates over a step: its row, the effect that asks for it, and, of a gap alone, the row
-    of its joint's clearance. A gap's absolute value is integrated, and the error of its integral, relative to the clearance
-    times a revolution, counts for the step's."""
+    """A rate that every stepper integrates over a step: its row, and the effect that asks for it. A gap's absolute value is
+    integrated, and the error of its integral, relative to the clearance times a revolution, counts for the step's."""
 
     rate: int
     asked_by: str
-    clearance: int | None = None
 
 
 _PLACES = range(MAX_JOINTS)
-GAPS = tuple(
-    Integrated(GAP + k, f"joint_{k}", JOINT_BLOCKS + JOINT_ROWS * k + CLEARANCE) for k in _PLACES
-)
+GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
 _FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
 _SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
 MEASURES = (
@@ -292,7 +288,7 @@ START = START_CONTACTS + 2 * MAX_JOINTS
 
 # ---- what the steppers hand on as one -------------------------------------------------------------
 class Joint(NamedTuple):
-    """Where one joint with clearance has its numbers."""
+    """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
 
     block: int  # of parameters
     gap: int  # rates
@@ -303,18 +299,12 @@ class Joint(NamedTuple):
     sliding_power: int
     active: int  # rows of `work`
     inverse_impact: int
-    peak: int
-    deepest: int
-    ended: int
-    latched: int  # of the books
-    flag: str  # of `Open`
 
 
 JOINTS = tuple(
     Joint(
         JOINT_BLOCKS + JOINT_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
-        SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k, PEAK + k, DEEPEST + k, ENDED + k, LATCHED + k,
-        f"joint_{k}",
+        SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip

@@ -10,6 +10,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.memory import END, LANES
 from hpcclear.dynamics.implicit.radau import BASIS, NODES
+from hpcclear.dynamics.stepping.control import place
 
 BEYOND = 1e-4
 """How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
@@ -99,7 +100,7 @@ def kinks_of_joint(rules, m, p, i):
 def kink_functions(rules, m):
     """Kink functions of all open joints at the states of the first bank, as evaluated."""
     for joint in range(rules.begin, rules.end):
-        p = joint & 7  # not below 0, which spares the compiler a question for every lane
+        p = place(joint)
         for i in range(LANES):
             kinks_of_joint(rules, m, p, i)
 
