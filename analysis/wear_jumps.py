@@ -1,9 +1,10 @@
 """Jumps against runs without any: clearances of random lives after many revolutions, what jumps cost, whether errors are held.
 
-    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40]
+    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40] [--chunk 10] [--truth FILE.npz]
 
-Without jumps every life runs on from where it is, and after every ten revolutions its clearances grow by what these wore.
+Without jumps every life runs on from where it is, and after every chunk of revolutions its clearances grow by what these wore.
 Wear coefficients are larger than those of jobs/wear.toml by as much as lives are shorter, so that clearances grow alike.
+The run without jumps is kept in FILE, if one is named, and taken from there another time.
 """
 
 import argparse
@@ -24,8 +25,6 @@ from hpcclear.scene import Scene, load_scene
 SCENE = Path(__file__).parents[1] / "jobs" / "wear.toml"
 WHOLE = 1e6
 """Revolutions of the starter's lives."""
-CHUNK = 10
-"""Revolutions between two updates of the clearances."""
 
 
 def scene_of(lives: int, revolutions: int) -> Scene:
@@ -41,8 +40,8 @@ def scene_of(lives: int, revolutions: int) -> Scene:
     return scene.with_(changes)
 
 
-def unjumped(scene: Scene, revolutions: int) -> tuple[np.ndarray, float]:
-    """Clearances (lives, joints) after so many revolutions, and the processor time."""
+def unjumped(scene: Scene, revolutions: int, chunk: int) -> tuple[np.ndarray, float]:
+    """Clearances (lives, joints) after so many revolutions, and the processor time; new clearances after each chunk."""
     inputs = inputs_of(scene)
     joints = joints_of(scene, inputs)
     states = States(scene, inputs, joints)
@@ -51,7 +50,7 @@ def unjumped(scene: Scene, revolutions: int) -> tuple[np.ndarray, float]:
     lanes = Lanes(
         problem_of(
             scene.with_(
-                {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": CHUNK}
+                {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": chunk}
             )
         ),
         32,
@@ -65,13 +64,28 @@ def unjumped(scene: Scene, revolutions: int) -> tuple[np.ndarray, float]:
     start = start_states(scene, par, None)
     lanes.run(par, start)  # compiles
     began = time.process_time()
-    for _ in range(revolutions // CHUNK):
+    for _ in range(revolutions // chunk):
         outcome = lanes.run(par_of(), start)
         if (outcome.status != 0).any():
             raise RuntimeError("a simulation failed")
         work += outcome.sliding_work[:, : work.shape[1]]
         start = outcome.end()
     return joints.worn(work)[0], time.process_time() - began
+
+
+def truth_of(
+    scene: Scene, revolutions: int, chunk: int, kept: Path | None
+) -> tuple[np.ndarray, float]:
+    """The same, from the file if it is there, kept in it if not."""
+    if kept is not None and kept.exists():
+        found = np.load(kept)
+        if str(found["scene"]) != scene.hash:
+            raise SystemExit(f"{kept} is of other lives")
+        return found["clearance"], float(found["seconds"])
+    clearance, seconds = unjumped(scene, revolutions, chunk)
+    if kept is not None:
+        np.savez(kept, clearance=clearance, seconds=seconds, scene=scene.hash)
+    return clearance, seconds
 
 
 def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
@@ -120,11 +134,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--revolutions", type=int, default=100_000)
     parser.add_argument("--lives", type=int, default=40)
+    parser.add_argument("--chunk", type=int, default=10)
+    parser.add_argument("--truth", type=Path)
     asked = parser.parse_args()
     scene = scene_of(asked.lives, asked.revolutions)
     ends, stated, fast, simulations = jumped(scene)
     ends, stated, fast, simulations = jumped(scene)  # once more, compiled
-    truth, slow = unjumped(scene, asked.revolutions)
+    truth, slow = truth_of(scene, asked.revolutions, asked.chunk, asked.truth)
     off = np.abs(ends - truth)
     new = joints_of(scene, inputs_of(scene)).clearance
     print(f"{asked.lives} lives of {asked.revolutions} revolutions, processor time")

@@ -19,6 +19,7 @@ from hpcclear.report.answer import ENDS, answer, beside_original
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
+from hpcclear.study import lives
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -68,6 +69,7 @@ def describe_scene(scene: Scene, cost: bool) -> None:
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
+    lives.check(scene)
     states = 2 * coordinate_count(scene)
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
@@ -150,6 +152,10 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
                     f"{variable.ratio[0]:g} to {variable.ratio[1]:g}: {variable.ratio_words}",
                 )
             )
+    for row in study.worn:
+        assert scene.wear is not None  # by validation
+        text = f"as {scene.wear.lives} lives leave it after {row.cycles:g} revolutions; about {lives.simulations(scene)} "
+        rows.append((f"{row.name} random", f"{text}simulations first"))
     return rows
 
 

@@ -25,6 +25,7 @@ from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
@@ -52,11 +53,24 @@ def check_worn(scene: Scene) -> None:
         raise InputError(
             "joints", None, "no joint of the scene wears", "Give one a table wear, as in jobs/wear.toml"
         )  # fmt: skip
-    if scene.wear.lives > 1 and (scene.study is None or not scene.study.random):
+    alike = scene.study is None or not of_lives(scene).required_study.random
+    if scene.wear.lives > 1 and alike:
         raise InputError(
             "wear.lives", scene.wear.lives, "without random inputs all lives are the same",
             "Add [study.random], or follow one life",
         )  # fmt: skip
+    if scene.study is not None and scene.study.worn and scene.wear.lives == 1:
+        raise InputError(
+            "wear.lives",
+            1,
+            "one life has no distribution of clearances",
+            "Follow more, such as 100",
+        )
+    for name in KINDS["wear"].data.keys() | KINDS["wear"].coords.keys():
+        if scene.study is not None and name in [row.name for row in scene.study.random]:
+            raise InputError(
+                f"study.random.{name}", name, "is the name of a result", "Rename it, and give its path"
+            )  # fmt: skip
     for entry, off in (("target_error", None), ("uncertainty", False)):
         if getattr(scene.numerics, entry) != off:
             raise InputError(
@@ -65,12 +79,31 @@ def check_worn(scene: Scene) -> None:
             )  # fmt: skip
 
 
+def of_lives(scene: Scene) -> Scene:
+    """The scene without inputs that its lives are to tell: their clearances are new ones, with what scatter these have."""
+    if scene.study is None or not scene.study.worn:
+        return scene
+    changes: dict[str, Any] = {"study.cases": {}}
+    for row in scene.study.worn:
+        new = {"distribution": "uniform", "half_width": row.half_width, "paths": list(row.paths)}
+        changes[f"study.random.{row.name}"] = new if row.half_width is not None else None
+    return scene.with_(changes)
+
+
+def ages_of(scene: Scene) -> Array:
+    """Revolutions (n,) at which curves are told: evenly over a life, and where random inputs of the study are taken."""
+    assert scene.wear is not None
+    even = np.linspace(0.0, scene.wear.cycles, scene.wear.points)
+    asked = [] if scene.study is None else [row.cycles for row in scene.study.worn]
+    return np.union1d(even, np.array(asked, float))
+
+
 def inputs_of(scene: Scene) -> Points | None:
     """Random inputs of every life, a row each; None of a single one, which is the scene as it stands."""
     assert scene.wear is not None
     if scene.wear.lives == 1:
         return None
-    return monte_carlo(scene, scene.wear.lives, design={}, purpose="wear")
+    return monte_carlo(of_lives(scene), scene.wear.lives, design={}, purpose="wear")
 
 
 class States:
@@ -211,7 +244,7 @@ def lives_dataset(
 ) -> xr.Dataset:
     """Lives and their statistics as a dataset of kind ``wear``."""
     assert scene.wear is not None
-    cycles = np.linspace(0.0, scene.wear.cycles, scene.wear.points)
+    cycles = ages_of(scene)
     found = [curves(one, joints[k], cycles) for k, one in enumerate(lives)]
     labels = len(scene.joint_labels)
     values = {

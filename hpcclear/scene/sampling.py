@@ -230,6 +230,9 @@ def _sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) ->
 def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
     """Values of a random input about `centre` (or its own) at the given probabilities."""
     middle = centre if row.centre is None else row.centre
+    if row.values is not None:
+        place = (uniform * len(row.values)).astype(int)
+        return np.array(row.values)[np.minimum(place, len(row.values) - 1)]
     if row.distribution == "uniform":
         return middle + row.reach * (2 * uniform - 1)
     deviation = row.deviation

@@ -8,7 +8,7 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import citation, describing, domain
-from hpcclear.scene.fields import invalid
+from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.paths import PHYSICAL, replace
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.validation import check_path, validated
@@ -26,6 +26,7 @@ class Scene(SceneTables):
     def _study_fits_mechanism(self) -> Self:
         if self.study is None:
             return self
+        self._check_worn_inputs()
         numbers = self._numbers()
         for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
             for row in rows:
@@ -42,6 +43,31 @@ class Scene(SceneTables):
         except InputError as error:
             raise invalid(error.reason, error.remedy, error.key, error.value) from None
         return self
+
+    def _check_worn_inputs(self) -> None:
+        """Inputs that are clearances of worn joints need lives that are followed so far."""
+        assert self.study is not None
+        clearances = [f"{self.joint_key(name)}.clearance" for name in self.worn_joints()]
+        for row in self.study.worn:
+            key = f"study.random.{row.name}"
+            if self.wear is None:
+                raise invalid(
+                    "the scene does not say what lives to follow",
+                    "Add [wear], as in jobs/worn_study.toml", key, "wear",
+                )  # fmt: skip
+            for path in row.paths:
+                if path not in clearances:
+                    raise invalid(
+                        f"{path} is no clearance of a joint that wears",
+                        nearest(path, clearances) if clearances else "Give joints a table wear",
+                        key, "wear",
+                    )  # fmt: skip
+            assert row.cycles is not None  # by validation
+            if row.cycles > self.wear.cycles:
+                raise invalid(
+                    f"lives are followed for {self.wear.cycles:g} revolutions only",
+                    "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles,
+                )  # fmt: skip
 
     def _check_corners(self) -> None:
         """Each bound of each variable, widened by its random half-width, must still make a

@@ -27,6 +27,11 @@ def scene_schema() -> dict[str, Any]:
         for key in {"range", "ratio", "mean", "half_width", "deviation"} & entries.keys():
             bounds = _BOUNDS if key in ("range", "ratio") else _NUMBER
             entries[key] = {**bounds, "description": entries[key].get("description", "bounds, SI")}
+        if "values" in entries:
+            entries["values"] = {
+                "type": "array", "items": _NUMBER, "minItems": 2,
+                "description": entries["values"].get("description", ""),
+            }  # fmt: skip
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"] = {"type": "array", "items": {"type": "string"}, "minItems": 1}
     effects = definitions["Effects"]["properties"]

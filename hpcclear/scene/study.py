@@ -113,6 +113,12 @@ class Study(Table):
             self._check_width(row)
 
     def _check_width(self, row: RandomInput) -> None:
+        if row.worn and row.name not in self.names:
+            raise invalid(
+                "clearances that wear are no variable of this study, so nothing would be made of them",
+                f"Add study.variables.{row.name} with a range that holds them, or leave it out",
+                key=f"random.{row.name}",
+            )
         if row.name not in self.names:
             return
         if self.variable(row.name).range is None:
@@ -123,6 +129,8 @@ class Study(Table):
                     key=f"random.{row.name}",
                 )
             return
+        if row.worn:
+            return  # seen when its lives are known
         lower, upper = self.variable(row.name).bounds
         slack = 1e-12 * (upper - lower)  # half-widths of decimal numbers are not exact
         if row.centre is None:
@@ -245,6 +253,11 @@ class Study(Table):
     def case(self, name: str) -> Case:
         """The case of that name; KeyError if there is none."""
         return {case.name: case for case in self.cases}[name]
+
+    @property
+    def worn(self) -> tuple[RandomInput, ...]:
+        """Random inputs whose values are clearances of worn joints."""
+        return tuple(row for row in self.random if row.worn)
 
     @property
     def groups(self) -> tuple[Names, ...]:

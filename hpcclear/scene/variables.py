@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.normal import TAIL
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
 from hpcclear.scene.fields import Quantity, Table, invalid, nearest
@@ -111,6 +112,15 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
     return lower, upper
 
 
+def _values(found: Any, quantity: Quantity) -> tuple[float, ...]:
+    """Two numbers or more, in rising order."""
+    if not isinstance(found, (list, tuple)) or len(found) < 2:
+        raise invalid(
+            "two values or more are expected here", "Write [first, second, ...]", key="values"
+        )
+    return tuple(sorted(_number(value, quantity, "values") for value in found))
+
+
 class NamedInput(Table):
     """A named row of the study and the scene entries that get its value."""
 
@@ -196,15 +206,19 @@ class RandomInput(NamedInput):
     """A random number of the scene: about the design's value, or wherever the design is
     (`absolute`)."""
 
-    distribution: Literal["uniform", "normal", "truncated-normal"]
+    distribution: Literal["uniform", "normal", "truncated-normal", "samples", "wear"]
     range: Range | None = None
     """Bounds of an absolute uniform distribution, SI."""
     mean: float | None = None
     """Centre, SI; left out, the distribution lies about the value of the design."""
     half_width: float | None = None
-    """Of "uniform" and "truncated-normal", SI."""
+    """Of "uniform" and "truncated-normal", SI; of "wear", how far clearances lie about the scene's when new, uniform."""
     deviation: float | None = None
     """Standard deviation of "normal", and of "truncated-normal" before it is cut, SI."""
+    values: tuple[float, ...] | None = None
+    """Of "samples": each with equal chance, SI, kept in rising order."""
+    cycles: Annotated[float, Quantity("", least=0)] | None = None
+    """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
 
     @classmethod
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
@@ -216,6 +230,8 @@ class RandomInput(NamedInput):
         for key in ("half_width", "deviation"):
             if key in row:
                 row[key] = _number(row[key], Quantity(quantity.unit, above=0), key)
+        if "values" in row:
+            row["values"] = _values(row["values"], quantity)
         return row
 
     @model_validator(mode="after")
@@ -224,9 +240,12 @@ class RandomInput(NamedInput):
             "uniform": {"range"} if self.range is not None else {"half_width"},
             "normal": {"deviation"},
             "truncated-normal": {"deviation", "half_width"},
+            "samples": {"values"},
+            "wear": {"cycles"},
         }[self.distribution]
-        allowed = needed if "range" in needed else needed | {"mean"}
-        for key in ("range", "mean", "half_width", "deviation"):
+        further = {"samples": set(), "wear": {"half_width"}}.get(self.distribution, {"mean"})
+        allowed = needed if "range" in needed else needed | further
+        for key in ("range", "mean", "half_width", "deviation", "values", "cycles"):
             value = getattr(self, key)
             if key in needed and value is None:
                 raise invalid(
@@ -241,19 +260,41 @@ class RandomInput(NamedInput):
     @property
     def absolute(self) -> bool:
         """Whether the distribution stays where it is when the design moves."""
-        return self.range is not None or self.mean is not None
+        return self.worn or any(one is not None for one in (self.range, self.mean, self.values))
+
+    @property
+    def worn(self) -> bool:
+        """Whether lives of worn joints have to be followed before its values are known."""
+        return self.distribution == "wear"
+
+    @property
+    def ends(self) -> Range | None:
+        """Least and largest value of a distribution that is given by them, SI.
+
+        Raises
+        ------
+        InputError
+            Only lives of worn joints can tell.
+        """
+        if self.worn:
+            raise InputError(
+                f"study.random.{self.name}.distribution", self.distribution,
+                "is known once the lives of [wear] have been followed, which `hpcclear run` does first",
+                'Use `hpcclear run`, or give clearances of your own: distribution = "samples", values = [...]',
+            )  # fmt: skip
+        return self.range if self.values is None else (self.values[0], self.values[-1])
 
     @property
     def centre(self) -> float | None:
         """Middle of an absolute distribution, SI; None when it follows the design."""
-        return self.mean if self.range is None else (self.range[0] + self.range[1]) / 2
+        return self.mean if self.ends is None else (self.ends[0] + self.ends[1]) / 2
 
     @property
     def reach(self) -> float:
         """How far from its centre values count, SI: the half-width, or six standard deviations of a
         normal."""
-        if self.range is not None:
-            return (self.range[1] - self.range[0]) / 2
+        if self.ends is not None:
+            return (self.ends[1] - self.ends[0]) / 2
         if self.half_width is not None:
             return self.half_width
         assert self.deviation is not None  # by validation

@@ -1,5 +1,6 @@
 """The study, from a scene to verified designs: read this after the README.
 
+0. Lives, where a clearance is random as wear leaves it: they are followed, and what their joints come to is the distribution.
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
 2. Kriging: models of the objective; the swarm searches one of them.
@@ -34,6 +35,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study import (
     chaos,
+    lives,
     optimisation,
     paper,
     refinement,
@@ -91,12 +93,14 @@ def run_study(
     study = scene.required_study
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
+    lives.check(scene)
     place = Place.of_directory(Path(directory), fresh, ("responses",))
     if place.output != Path(directory):
         tell(f"Results go to {place.output}.")
     options = Options(fresh, style=progress_style)
     with Session(place, run_key(scene, "run"), ranks, options, tell) as session:
-        if session.has_all(_results(scene)) and not unfinished(place.parts):
+        followed = all((place.output / name).exists() for name in lives.files(scene))
+        if session.has_all(_results(scene)) and followed and not unfinished(place.parts):
             tell(f"{place.output} holds the finished study.")
         else:
             _carry_out(scene, session)
@@ -113,9 +117,11 @@ def _carry_out(scene: Scene, session: Session) -> None:
     columns = tuple(variable.paths for variable in study.variables)
     points = Points(study.names, np.empty((0, len(columns))), columns)
     compile_ahead(scene, session.ranks, points, style)
+    announce = Stages(scene).announced if style != "quiet" else Stages.silent
+    announce("wear")
+    scene = lives.known(scene, session)
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
-    announce = Stages(scene).announced if style != "quiet" else Stages.silent
     _tell_the_story(
         StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
     )

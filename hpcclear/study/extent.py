@@ -3,6 +3,7 @@
 from hpcclear.scene import Scene
 from hpcclear.study import (
     chaos,
+    lives,
     optimisation,
     refinement,
     responses,
@@ -33,6 +34,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
         verified += refinement.RUNNERS_UP * len(study.cases)
     begun, rounds = refinement.simulations(study)
     return {
+        "wear": lives.simulations(scene),
         "sensitivity": sensitivities.simulations(study),
         "kriging": surrogates.simulations(study),
         "check": begun,

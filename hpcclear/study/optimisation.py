@@ -15,7 +15,13 @@ from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, unit_lhs
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.distributions import Distribution, Normal, TruncatedNormal, Uniform
+from hpcclear.statistics.random.distributions import (
+    Distribution,
+    Normal,
+    Samples,
+    TruncatedNormal,
+    Uniform,
+)
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
@@ -98,7 +104,9 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
 def _random_input(row: scene_variables.RandomInput) -> RandomVariable:
     middle = 0.0 if row.centre is None else row.centre
     distribution: Distribution
-    if row.distribution == "uniform":
+    if row.values is not None:
+        distribution = Samples(row.values)
+    elif row.distribution == "uniform":
         distribution = Uniform(middle - row.reach, middle + row.reach)
     else:
         assert row.deviation is not None  # by validation

@@ -15,12 +15,16 @@ _FLAGS = {
     Flag.STIFF: "the implicit method was used for part of the run",
 }
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
+LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
+"""Endings of lives that count."""
+
 LISTED = 40  # samples listed by number before the rest is only counted
 
 
 def summary(content: Content) -> dict[str, object]:
     """What was done and found, in plain words."""
     words = [
+        *_lives_words(content),
         *_samples_words(content),
         *_designs_words(content),
         *_claims_words(content),
@@ -30,6 +34,27 @@ def summary(content: Content) -> dict[str, object]:
     if not words:
         words = ["These are responses of single designs; nothing was sampled or optimised."]
     return {"words": words, "facts": _facts(content)}
+
+
+def _lives_words(content: Content) -> list[str]:
+    lives = content.get("wear")
+    if lives is None:
+        return []
+    last = lives.isel(cycle=-1)
+    cycles, failed = float(last["cycle"]), int((~np.isin(lives["ending"], LIVED)).sum())
+    words = [
+        f"{lives.sizes['life']} lives of {cycles:.4g} revolutions were followed; {_none(failed)} failed."
+    ]
+    for name in lives["joint"].to_numpy():
+        levels = last["clearance_quantile"].sel(joint=name)
+        low, high = (str(quantity(float(levels.sel(quantile=q)), "m")) for q in (0.05, 0.95))
+        words.append(
+            f"The clearance of {name} ends between {low} and {high} in nine of ten of them."
+        )
+    if any(name.startswith("limit_") for name in lives.attrs):
+        limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
+        words.append(f"{float(last['survival']):.0%} of them pass no limit (95 % limits {limits}).")
+    return words
 
 
 def _samples_words(content: Content) -> list[str]:

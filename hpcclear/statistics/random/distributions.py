@@ -149,7 +149,56 @@ class TruncatedNormal:
         return whole / self._mass
 
 
-Distribution = Uniform | Normal | TruncatedNormal
+@dataclass(frozen=True)
+class Samples:
+    """Each of some values (in rising order, two or more) with equal chance: what was measured, or came of simulations.
+
+    Nothing is made of what lies between them, so moments are those of the values themselves.
+    """
+
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        known = np.asarray(self.values, float)
+        if len(known) < 2 or not np.isfinite(known).all() or (np.diff(known) < 0.0).any():
+            raise InputError(
+                "values", self.values, "not finite, not rising or fewer than two", "sort them"
+            )
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest value."""
+        return self.values[0], self.values[-1]
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Independent draws, ``(size,)``."""
+        return rng.choice(np.array(self.values), size)
+
+    def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
+        return _sampled_rule(self.values, count)
+
+    def piece(self, count: int, lower: float, upper: float) -> tuple[np.ndarray, np.ndarray]:
+        """The same of the values from `lower` on and below `upper`, weights adding up to their share.
+
+        The highest value belongs to the piece that ends with it.
+        """
+        low, high = self.support
+        inside = tuple(x for x in self.values if lower <= x < upper or x == upper == high)
+        if not inside:
+            return np.full(count, np.clip(lower, low, high)), np.zeros(count)
+        nodes, weights = _sampled_rule(inside, count)
+        return nodes, weights * (len(inside) / len(self.values))
+
+    def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
+        """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``."""
+        whole = np.zeros(np.shape(centres))
+        for value in self.values:  # one after the other: centres may be many
+            whole += np.exp(-0.5 * ((value - centres) / length) ** 2)
+        return whole / len(self.values)
+
+
+Distribution = Uniform | Normal | TruncatedNormal | Samples
 
 
 @lru_cache(maxsize=64)
@@ -170,6 +219,9 @@ def piece_rule(
     The weights of a row add up to the probability of its part: 0 where the limits leave nothing.
     """
     low, high = distribution.support
+    if isinstance(distribution, Samples):
+        rules = [distribution.piece(count, *ends) for ends in zip(lower, upper, strict=True)]
+        return np.stack([one[0] for one in rules]), np.stack([one[1] for one in rules])
     low, high = np.maximum(lower, low)[:, None], np.minimum(upper, high)[:, None]
     width = np.maximum(high - low, 0.0)
     nodes, weights = legendre(count)
@@ -226,7 +278,23 @@ def _truncated_rule(low: float, high: float, count: int) -> tuple[np.ndarray, np
     nodes, weights = legendre(FINE)
     x = low + (high - low) * nodes
     weights = weights * np.exp(-0.5 * (x**2 - np.min(x**2)))
-    weights = weights / weights.sum()
+    return _gauss_rule(x, weights / weights.sum(), count)
+
+
+@lru_cache(maxsize=256)
+def _sampled_rule(values: tuple[float, ...], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss rule of values with equal chance; of no more different values than nodes, these themselves."""
+    places, times = np.unique(np.array(values), return_counts=True)
+    weights = times / times.sum()
+    if len(places) > count:
+        found = _gauss_rule(places, weights, count)
+        return np.clip(found[0], values[0], values[-1]), found[1]
+    missing = count - len(places)
+    return np.append(places, np.full(missing, places[-1])), np.append(weights, np.zeros(missing))
+
+
+def _gauss_rule(x: np.ndarray, weights: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss rule of masses `weights` at `x` (discretised Stieltjes), with fewer nodes than masses."""
     diagonal, side = np.zeros(count), np.zeros(count)
     before, now = np.zeros_like(x), np.ones_like(x)
     for k in range(count):
