@@ -16,7 +16,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import latin_hypercube, monte_carlo, read_points
+from hpcclear.scene.sampling import read_points, sampled
 
 
 def design(scene: Scene, table: Path | None) -> Points:
@@ -36,7 +36,7 @@ def design(scene: Scene, table: Path | None) -> Points:
             "the scene says nothing about sampling",
             "Add a [study] table, or give --points designs.csv",
         )
-    return latin_hypercube(scene) if scene.study.method == "lhs" else monte_carlo(scene)
+    return sampled(scene)
 
 
 def run_sample(

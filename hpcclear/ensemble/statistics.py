@@ -81,7 +81,7 @@ def run_statistics(
     InputError, StorageError, Stopped, RankFailed
     """
     began = time.perf_counter()
-    if scene.study is None or scene.study.method == "lhs":
+    if scene.study is None or scene.study.method != "monte-carlo":
         method = None if scene.study is None else scene.study.method
         raise InputError(
             "study.method",

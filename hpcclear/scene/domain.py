@@ -58,33 +58,44 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
     return Box(chosen, lower, upper)
 
 
-def _reaches(study: Study, widen: Iterable[str]) -> dict[str, float]:
-    """How far each path moves about its design value."""
+def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """How far each path moves below and above its design value."""
     rows = [study.random_input(name) for name in widen]
-    return {path: row.reach for row in rows if not row.absolute for path in row.paths}
+    return {
+        path: (min(row.span[0], 0.0), max(row.span[1], 0.0))
+        for row in rows
+        if not row.absolute
+        for path in row.paths
+    }
 
 
 def _bounds(
-    scene: SceneTables, variable: Variable, names: tuple[str, ...], reach: dict[str, float]
+    scene: SceneTables,
+    variable: Variable,
+    names: tuple[str, ...],
+    reach: dict[str, tuple[float, float]],
 ) -> tuple[float, float]:
     lower, upper = variable.bounds
-    width = reach.get(variable.paths[0], 0.0)
+    low, high = reach.get(variable.paths[0], (0.0, 0.0))
     if variable.ratio is None:
-        return lower - width, upper + width
+        return lower + low, upper + high
     # The random inputs move I, m and L separately; r = 12 I/(m L^2) is monotonic in each of them
     # and in the design, so its extremes are at corners.
     link = variable.paths[0].rpartition(".")[0]
     masses, lengths = (_span(scene, f"{link}.{part}", names) for part in ("mass", "length"))
-    dm, dl = reach.get(f"{link}.mass", 0.0), reach.get(f"{link}.length", 0.0)
+    mass_ends, length_ends = (
+        reach.get(f"{link}.{part}", (0.0, 0.0)) for part in ("mass", "length")
+    )
     ratios = []
     for mass, length in itertools.product(masses, lengths):
         unit = mass * length**2 / 12
-        ratios.append((lower * unit - width) / ((mass + dm) * (length + dl) ** 2 / 12))
-        ratios.append((upper * unit + width) / ((mass - dm) * (length - dl) ** 2 / 12))
+        heavy = (mass + mass_ends[1]) * (length + length_ends[1]) ** 2 / 12
+        light = (mass + mass_ends[0]) * (length + length_ends[0]) ** 2 / 12
+        ratios += [(lower * unit + low) / heavy, (upper * unit + high) / light]
     if min(ratios) <= 0:
         raise InputError(
             f"study.random.{variable.name}",
-            width,
+            low,
             "takes the smallest inertia of the box to 0 or below",
             f"Narrow it, or raise study.variables.{variable.name}.ratio",
         )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.measured import with_values
 from hpcclear.scene.paths import replace
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.validation import DEEPEST, dotted, validated
@@ -43,6 +44,8 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
         content = parse(text, str(source))
     for override in overrides:
         content = replace(content, *_override(override))
+    folder = Path() if isinstance(source, Mapping) else Path(source).parent
+    content = dict(with_values(content, folder))
     scene = validated(Scene, content)
     notes = "".join(f"# set: {override}\n" for override in overrides)
     scene._text = notes + (scene.to_toml() if text is None else text)

@@ -12,12 +12,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
-from hpcclear.base.normal import TAIL, truncated_quantile
 from hpcclear.scene import Scene
+from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.table import read_points
-from hpcclear.scene.variables import RandomInput
 
 __all__ = [
     "Points",
@@ -25,7 +24,10 @@ __all__ = [
     "generator",
     "latin_hypercube",
     "monte_carlo",
+    "offsets",
     "read_points",
+    "sampled",
+    "sobol",
     "unit_lhs",
 ]
 
@@ -110,6 +112,7 @@ def monte_carlo(
     purpose: str = "train",
     first: int = 0,
     scrambling: int | None = None,
+    stratified: bool = False,
 ) -> Points:
     """Samples `first` to `first + samples` of the study's random inputs.
 
@@ -131,6 +134,9 @@ def monte_carlo(
     scrambling : int, optional
         Samples of the scrambled Sobol sequence of that number, in place of independent ones: each
         scrambling is one independent estimate. Begin and end at powers of two.
+    stratified : bool
+        A Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together the first
+        alone keeps its strata.
 
     Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
     """
@@ -149,12 +155,19 @@ def monte_carlo(
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
     moving = [name for name in names if name in chosen or fixed is None]
-    if scrambling is None:
+    if stratified:
+        if first:
+            raise InputError("first", first, "a Latin hypercube has no parts", "Begin at 0")
+        rng = generator(study.seed, f"stratified {purpose}")
+        uniform = list(np.maximum(unit_lhs(count, len(moving), rng), 2.0**-54).T)
+    elif scrambling is None:
         label = f"monte-carlo {purpose}"
         uniform = [_uniform(study.seed, label, name, first, count) for name in moving]
     else:
         rng = generator(study.seed, f"sobol {purpose}", str(scrambling))
-        uniform = list(_sobol(len(moving), rng, first, count).T)
+        uniform = list(sobol(len(moving), rng, first, count).T)
+    if study.correlation is not None:
+        uniform = _together(study.correlation, moving, chosen, uniform)
     for column, name in enumerate(names):
         if name not in moving:
             assert fixed is not None
@@ -163,7 +176,8 @@ def monte_carlo(
         place = uniform[moving.index(name)]
         if name in chosen:
             centre = (fixed or {}).get(name, scene.number(paths[column][0]))
-            values[:, column] = _quantile(inputs[name], centre, place)
+            found = inputs[name].law(place)
+            values[:, column] = found if inputs[name].absolute else centre + found
         else:
             lower, upper = study.variable(name).bounds
             values[:, column] = lower + place * (upper - lower)
@@ -174,6 +188,28 @@ def monte_carlo(
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row}")
     return points
+
+
+def offsets(scene: Scene, random: Sequence[str], chances: Sequence[Array]) -> dict[str, Array]:
+    """Random inputs at independent probabilities, (n,) each, which are made to vary together as the study says: values of
+    those that are absolute, else differences from the design."""
+    study = scene.required_study
+    if study.correlation is not None:
+        chances = study.correlation.together(random, chances)
+    return {
+        name: study.random_input(name).law(one) for name, one in zip(random, chances, strict=True)
+    }
+
+
+def _together(
+    correlation: Correlation, moving: Sequence[str], chosen: Collection[str], uniform: list[Array]
+) -> list[Array]:
+    """Probabilities of what moves, those of random inputs that vary together made so."""
+    rows = [k for k, name in enumerate(moving) if name in chosen]
+    made = correlation.together([moving[k] for k in rows], [uniform[k] for k in rows])
+    for k, one in zip(rows, made, strict=True):
+        uniform[k] = one
+    return uniform
 
 
 def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str, ...]:
@@ -214,7 +250,7 @@ SOBOL_BITS = 30
 """Digits of a point of a Sobol sequence; a sequence has as many points as they can tell apart."""
 
 
-def _sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
+def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
     """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1,
     shape (count, dimensions)."""
     from scipy.stats import qmc  # as in `unit_lhs`
@@ -227,22 +263,17 @@ def _sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) ->
     return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `_uniform`, off 0
 
 
-def _quantile(row: RandomInput, centre: float, uniform: Array) -> Array:
-    """Values of a random input about `centre` (or its own) at the given probabilities."""
-    middle = centre if row.centre is None else row.centre
-    if row.values is not None:
-        place = (uniform * len(row.values)).astype(int)
-        return np.array(row.values)[np.minimum(place, len(row.values) - 1)]
-    if row.distribution == "uniform":
-        return middle + row.reach * (2 * uniform - 1)
-    deviation = row.deviation
-    assert deviation is not None  # by validation
-    if row.distribution == "normal":
-        from scipy.special import ndtri  # a quarter of a second, which "lhs" does not need
-
-        return middle + deviation * np.clip(ndtri(uniform), -TAIL, TAIL)
-    cut = row.reach / deviation
-    return middle + deviation * truncated_quantile(uniform, -cut, cut)
+def sampled(scene: Scene) -> Points:
+    """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
+    match scene.required_study.method:
+        case "lhs":
+            return latin_hypercube(scene)
+        case "random-lhs":
+            return monte_carlo(scene, stratified=True)
+        case "qmc":
+            return monte_carlo(scene, scrambling=0)
+        case _:
+            return monte_carlo(scene)
 
 
 _PAGE = 4096  # points made at a time

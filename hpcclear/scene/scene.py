@@ -70,12 +70,12 @@ class Scene(SceneTables):
                 )  # fmt: skip
 
     def _check_corners(self) -> None:
-        """Each bound of each variable, widened by its random half-width, must still make a
+        """Each bound of each variable, widened by what is random about it, must still make a
         mechanism."""
         assert self.study is not None
         names = (*PHYSICAL, "numerics")
         content = {name: plain(table) for name in names if (table := getattr(self, name))}
-        reach = {row.name: 0.0 if row.absolute else row.reach for row in self.study.random}
+        reach = {row.name: row.span for row in self.study.random if not row.absolute}
         spans = {
             variable.name: ("variables", variable.paths, variable.range)
             for variable in self.study.variables
@@ -83,13 +83,14 @@ class Scene(SceneTables):
         }
         for row in self.study.random:
             if row.name not in self.study.names:
-                centre = self.number(row.paths[0]) if row.centre is None else row.centre
-                reach[row.name] = row.reach
+                centre = 0.0 if row.absolute else self.number(row.paths[0])
+                reach[row.name] = row.span
                 spans[row.name] = ("random", row.paths, (centre, centre))
         for name, (table, paths, (lower, upper)) in spans.items():
-            corners = [(table, lower), (table, upper)]
-            if width := reach.get(name, 0.0):
-                corners += [("random", lower - width), ("random", upper + width)]
+            corners = [(table, lower), (table, upper)] if table == "variables" else []
+            if name in reach:
+                low, high = reach[name]
+                corners += [("random", lower + low), ("random", upper + high)]
             for key, value in corners:
                 corner: Mapping[str, Any] = content
                 for path in paths:

@@ -2,10 +2,13 @@
 
 from typing import Any
 
+from hpcclear.scene.fields import LONGEST_CURVE
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
 _BOUNDS = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
+_LIST = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": LONGEST_CURVE}
+_CONVERTED = {"range", "ratio", "mean", "half_width", "deviation", "scale", "location", "values"}
 
 
 def scene_schema() -> dict[str, Any]:
@@ -24,16 +27,15 @@ def scene_schema() -> dict[str, Any]:
     for name in ("Variable", "RandomInput"):
         entries = definitions[name]["properties"]
         # Entries whose unit depends on the path are converted before their fields see them.
-        for key in {"range", "ratio", "mean", "half_width", "deviation"} & entries.keys():
-            bounds = _BOUNDS if key in ("range", "ratio") else _NUMBER
-            entries[key] = {**bounds, "description": entries[key].get("description", "bounds, SI")}
-        if "values" in entries:
-            entries["values"] = {
-                "type": "array", "items": _NUMBER, "minItems": 2,
-                "description": entries["values"].get("description", ""),
-            }  # fmt: skip
+        for key in _CONVERTED & entries.keys():
+            kind = _BOUNDS if key in ("range", "ratio") else _LIST if key == "values" else _NUMBER
+            entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"] = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+    entries = definitions["RandomInput"]["properties"]
+    for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
+                       ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
+        entries[key] = {"type": "string", "description": words}
     effects = definitions["Effects"]["properties"]
     for key in ("friction", "guide_friction"):  # one word switches them off
         entry = effects[key]

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
+from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
 from hpcclear.scene.variables import SHORT_NAMES, Case, RandomInput, Variable
@@ -20,8 +21,10 @@ class Study(Table):
 
     seed: Annotated[int, Count(0, 2**63 - 1)] = 0
     """Every random number of the study follows from it."""
-    method: Literal["lhs", "monte-carlo"] = "lhs"
-    """How `sample` draws its points."""
+    method: Literal["lhs", "monte-carlo", "random-lhs", "qmc"] = "lhs"
+    """How `sample` draws its points: "lhs", a Latin hypercube over the ranges of the variables, whatever is random about
+    them; or by the distributions of the random inputs, "monte-carlo", independent draws, "random-lhs", stratified,
+    "qmc", a scrambled Sobol sequence (take a power of two)."""
     samples: Annotated[int, Count(1, 10**9)] = 200
     """Points of a design: training points of each Kriging model, or what `sample` simulates."""
     test_samples: Annotated[int, Count(0, 10**6)] = 50
@@ -36,6 +39,7 @@ class Study(Table):
     """What the study makes small: eq. 13, or another response."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
+    correlation: Correlation | None = None
     cases: Annotated[tuple[Case, ...], NamedRows()] = ()
     sensitivity: Sensitivity = Sensitivity()
     surrogate: Surrogate = Surrogate()
@@ -74,6 +78,7 @@ class Study(Table):
                 key="variables",
             )
         self._check_paths()
+        self._check_correlation()
         self._check_cases()
         self.sensitivity.check()
         self._check_names()
@@ -133,12 +138,11 @@ class Study(Table):
             return  # seen when its lives are known
         lower, upper = self.variable(row.name).bounds
         slack = 1e-12 * (upper - lower)  # half-widths of decimal numbers are not exact
-        if row.centre is None:
-            inside = 2 * row.reach <= upper - lower + slack
+        low, high = row.span
+        if row.absolute:
+            inside = lower - slack <= low and high <= upper + slack
         else:
-            inside = (
-                lower - slack <= row.centre - row.reach and row.centre + row.reach <= upper + slack
-            )
+            inside = high - low <= upper - lower + slack
         if not inside:
             raise invalid(
                 "the distribution is wider than its domain, "
@@ -146,6 +150,22 @@ class Study(Table):
                 f"Narrow it, or widen study.variables.{row.name}.range",
                 key=f"random.{row.name}",
             )
+
+    def _check_correlation(self) -> None:
+        known = tuple(row.name for row in self.random)
+        for name in self.correlation.inputs if self.correlation is not None else ():
+            if name not in known:
+                raise invalid(
+                    f"{name!r} is not a random input of this study",
+                    nearest(name, known),
+                    key="correlation.inputs",
+                )
+            if self.random_input(name).worn:
+                raise invalid(
+                    f"{name!r} comes of lives of worn joints, which know of no other input",
+                    "Leave it out",
+                    key="correlation.inputs",
+                )
 
     def _check_cases(self) -> None:
         for case in self.cases:

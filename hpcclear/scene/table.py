@@ -47,7 +47,7 @@ def read_points(path: str | Path, scene: Scene) -> Points:
         column.
     """
     key = str(path)
-    lines = _csv_lines(Path(path))
+    lines = csv_lines(Path(path))
     columns = [_column(cell, scene, key) for cell in lines[0][1]]
     names, paths = tuple(c.name for c in columns), tuple(c.paths for c in columns)
     driven = [path for column in paths for path in column]
@@ -71,12 +71,12 @@ def read_points(path: str | Path, scene: Scene) -> Points:
     return points
 
 
-def _csv_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of the header and the points."""
+def csv_lines(path: Path, what: str = "table of points") -> list[tuple[int, list[str]]]:
+    """Line numbers and cells of the header and of the rows below it; an InputError says `what` the file is."""
     remedy = "Give a CSV file in UTF-8"
     try:
         if not path.is_file():
-            raise InputError("table of points", str(path), "there is no such regular file", remedy)
+            raise InputError(what, str(path), "there is no such regular file", remedy)
         with path.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.reader(_short_lines(stream, path), strict=True)
             lines = [
@@ -84,13 +84,15 @@ def _csv_lines(path: Path) -> list[tuple[int, list[str]]]:
                 for cells in reader
                 if any(cells) and not cells[0].lstrip().startswith("#")
             ]
-    except (OSError, UnicodeError, csv.Error) as error:
+    except InputError:
+        raise
+    except (OSError, ValueError, csv.Error) as error:
         reason = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError("table of points", str(path), reason, remedy) from None
+        raise InputError(what, str(path), reason, remedy) from None
     lines = [(line, cells) for line, cells in lines if any(cells)]  # not of blanks alone
     if len(lines) < 2:
-        remedy = "Write a row of names, then a row for each point"
-        raise InputError("table of points", str(path), "holds no points", remedy)
+        remedy = "Write a row of names, then a row for each point or value"
+        raise InputError(what, str(path), "holds no points", remedy)
     return lines
 
 

@@ -2,15 +2,17 @@
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from functools import cached_property
+from math import inf
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError
-from hpcclear.base.normal import TAIL
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
-from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, invalid, nearest
 from hpcclear.scene.paths import described, quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
@@ -46,6 +48,8 @@ RESERVED = frozenset(
 )
 """Names of dimensions and results in the datasets."""
 
+_COMMON = ("name", "paths", "distribution")
+_SHAPE = Quantity("", least=1e-2, most=1e4)
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 Range = tuple[float, float]
 
@@ -112,13 +116,12 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
     return lower, upper
 
 
-def _values(found: Any, quantity: Quantity) -> tuple[float, ...]:
-    """Two numbers or more, in rising order."""
-    if not isinstance(found, (list, tuple)) or len(found) < 2:
-        raise invalid(
-            "two values or more are expected here", "Write [first, second, ...]", key="values"
-        )
-    return tuple(sorted(_number(value, quantity, "values") for value in found))
+def _list(value: Any, quantity: Quantity, key: str, least: int, most: int) -> tuple[float, ...]:
+    """Numbers, at least and at most so many."""
+    if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
+        count = f"{least}" if least == most else f"from {least} to {most}"
+        raise invalid(f"{count} numbers are expected here", "Write [first, second]", key=key)
+    return tuple(_number(one, quantity, key) for one in value)
 
 
 class NamedInput(Table):
@@ -202,74 +205,127 @@ def is_link_inertia(path: str) -> bool:
     return path in LINK_INERTIAS
 
 
+_NEEDED: Mapping[str, tuple[frozenset[str], frozenset[str]]] = {
+    "uniform": (frozenset({"half_width"}), frozenset({"mean"})),
+    "normal": (frozenset({"deviation"}), frozenset({"mean"})),
+    "truncated-normal": (frozenset({"deviation", "half_width"}), frozenset({"mean"})),
+    "lognormal": (frozenset({"mean", "deviation"}), frozenset({"range", "about_design"})),
+    "beta": (frozenset({"shapes", "half_width"}), frozenset({"mean"})),
+    "weibull": (frozenset({"scale", "shape"}), frozenset({"location", "range", "about_design"})),
+    "samples": (frozenset({"values"}), frozenset({"about_design"})),
+    "wear": (frozenset({"cycles"}), frozenset({"half_width"})),
+}
+"""Entries that a distribution needs, and those that it may have; "uniform" and "beta" take a range in place of both others."""
+
+_LEAST_SHARE = 1e-9
+"""Least probability that a range may leave of a distribution it cuts."""
+
+
 class RandomInput(NamedInput):
     """A random number of the scene: about the design's value, or wherever the design is
     (`absolute`)."""
 
-    distribution: Literal["uniform", "normal", "truncated-normal", "samples", "wear"]
+    elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "file": ("files are read where a scene is loaded, and this came another way",
+                 "Give values = [...]"),
+        "column": ("says which column of a file is meant, and there is none", "Add file = ..."),
+    }  # fmt: skip
+
+    distribution: Literal[
+        "uniform", "normal", "truncated-normal", "lognormal", "beta", "weibull", "samples", "wear"
+    ]
     range: Range | None = None
-    """Bounds of an absolute uniform distribution, SI."""
+    """Bounds of an absolute "uniform" or "beta" distribution; where "lognormal" and "weibull" are cut off. SI."""
     mean: float | None = None
-    """Centre, SI; left out, the distribution lies about the value of the design."""
+    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; left out, the distribution lies about the value of the
+    design. Of "lognormal" its mean, before it is cut off."""
     half_width: float | None = None
-    """Of "uniform" and "truncated-normal", SI; of "wear", how far clearances lie about the scene's when new, uniform."""
+    """Of "uniform", "truncated-normal" and "beta", SI; of "wear", how far new clearances lie about the scene's, uniform."""
     deviation: float | None = None
-    """Standard deviation of "normal", and of "truncated-normal" before it is cut, SI."""
+    """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
+    shapes: tuple[float, float] | None = None
+    """Of "beta": a and b of its density x^(a-1) (1-x)^(b-1), x from 0 to 1 over its range."""
+    shape: float | None = None
+    """Of "weibull": k of exp(-((x - location)/scale)^k), the share above x."""
+    scale: float | None = None
+    """Of "weibull", SI."""
+    location: float | None = None
+    """Of "weibull": where it begins, SI; default 0."""
     values: tuple[float, ...] | None = None
-    """Of "samples": each with equal chance, SI, kept in rising order."""
+    """Of "samples": measured values, each with equal chance, SI; in their place `file`, a CSV table beside the scene file, and
+    `column`, as its first row has it."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
+    about_design: bool | None = None
+    """Of "lognormal", "weibull" and "samples": whether what scatters is the difference from the design's value."""
 
     @classmethod
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         quantity = quantities()[paths[0]]
+        offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
-            row["range"] = _range(row["range"], quantity, "range")
-        if "mean" in row:
-            row["mean"] = _number(row["mean"], quantity, "mean")
-        for key in ("half_width", "deviation"):
+            row["range"] = _range(row["range"], offset, "range")
+        for key in ("mean", "location"):
+            if key in row:
+                row[key] = _number(
+                    row[key], Quantity(quantity.unit) if key == "location" else offset, key
+                )
+        for key in ("half_width", "deviation", "scale"):
             if key in row:
                 row[key] = _number(row[key], Quantity(quantity.unit, above=0), key)
+        if "shape" in row:
+            row["shape"] = _number(row["shape"], _SHAPE, "shape")
+        if "shapes" in row:
+            row["shapes"] = _list(row["shapes"], _SHAPE, "shapes", 2, 2)
         if "values" in row:
-            row["values"] = _values(row["values"], quantity)
+            row["values"] = tuple(sorted(_list(row["values"], offset, "values", 2, LONGEST_CURVE)))
         return row
 
     @model_validator(mode="after")
     def _parameters_fit(self) -> "RandomInput":
-        needed = {
-            "uniform": {"range"} if self.range is not None else {"half_width"},
-            "normal": {"deviation"},
-            "truncated-normal": {"deviation", "half_width"},
-            "samples": {"values"},
-            "wear": {"cycles"},
-        }[self.distribution]
-        further = {"samples": set(), "wear": {"half_width"}}.get(self.distribution, {"mean"})
-        allowed = needed if "range" in needed else needed | further
-        for key in ("range", "mean", "half_width", "deviation", "values", "cycles"):
+        needed, further = _NEEDED[self.distribution]
+        if self.range is not None and self.distribution in ("uniform", "beta"):
+            needed, further = (needed - {"half_width"}) | {"range"}, frozenset()
+        for key in (name for name in type(self).model_fields if name not in _COMMON):
             value = getattr(self, key)
             if key in needed and value is None:
                 raise invalid(
                     f"the distribution {self.distribution!r} needs it", "Add it", key, None
                 )
-            if key not in allowed and value is not None:
+            if key not in needed | further and value not in (None, False):
                 raise invalid(
                     f"does not belong to this {self.distribution!r} distribution", "Remove it", key
                 )
+        self._check_cut()
         return self
+
+    def _check_cut(self) -> None:
+        if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
+            raise invalid("a lognormal has a mean above 0", "Mend it, or use another", "mean")
+        if self.distribution in ("lognormal", "weibull") and self.range is not None:
+            below, above = self.law.chances  # type: ignore[attr-defined]
+            if above - below < _LEAST_SHARE:
+                raise invalid(
+                    f"holds less than {_LEAST_SHARE:g} of the distribution",
+                    "Choose limits where its values are",
+                    "range",
+                )
 
     @property
     def absolute(self) -> bool:
         """Whether the distribution stays where it is when the design moves."""
-        return self.worn or any(one is not None for one in (self.range, self.mean, self.values))
+        if self.distribution in ("lognormal", "weibull", "samples", "wear"):
+            return not self.about_design
+        return self.range is not None or self.mean is not None
 
     @property
     def worn(self) -> bool:
         """Whether lives of worn joints have to be followed before its values are known."""
         return self.distribution == "wear"
 
-    @property
-    def ends(self) -> Range | None:
-        """Least and largest value of a distribution that is given by them, SI.
+    @cached_property
+    def law(self) -> quantiles.Quantiles:
+        """Its quantile function: of its value where it is absolute, else of its difference from the design, SI.
 
         Raises
         ------
@@ -282,23 +338,35 @@ class RandomInput(NamedInput):
                 "is known once the lives of [wear] have been followed, which `hpcclear run` does first",
                 'Use `hpcclear run`, or give clearances of your own: distribution = "samples", values = [...]',
             )  # fmt: skip
-        return self.range if self.values is None else (self.values[0], self.values[-1])
+        return _law(self.distribution, self.model_dump(exclude_none=True))
 
     @property
-    def centre(self) -> float | None:
-        """Middle of an absolute distribution, SI; None when it follows the design."""
-        return self.mean if self.ends is None else (self.ends[0] + self.ends[1]) / 2
+    def span(self) -> Range:
+        """Least and largest value that counts, SI: of the difference from the design, where it follows it."""
+        return self.law.span
 
-    @property
-    def reach(self) -> float:
-        """How far from its centre values count, SI: the half-width, or six standard deviations of a
-        normal."""
-        if self.ends is not None:
-            return (self.ends[1] - self.ends[0]) / 2
-        if self.half_width is not None:
-            return self.half_width
-        assert self.deviation is not None  # by validation
-        return TAIL * self.deviation
+
+def _law(distribution: str, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+    """The quantile function that entries of a random input stand for, which were checked."""
+    ends = entries.get("range", (-inf, inf))
+    match distribution:
+        case "samples":
+            return quantiles.Samples(entries["values"])
+        case "lognormal":
+            return quantiles.lognormal(entries["mean"], entries["deviation"], *ends)
+        case "weibull":
+            location = entries.get("location", 0.0)
+            return quantiles.weibull(entries["scale"], entries["shape"], location, *ends)
+    middle, reach = entries.get("mean", 0.0), entries.get("half_width", inf)
+    if "range" in entries:
+        middle, reach = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
+    match distribution:
+        case "uniform":
+            return quantiles.Uniform(middle, reach)
+        case "beta":
+            ends = ends if "range" in entries else (middle - reach, middle + reach)
+            return quantiles.beta(entries["shapes"], *ends)
+    return quantiles.Normal(middle, entries["deviation"], reach)
 
 
 class Case(Table):

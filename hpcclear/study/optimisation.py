@@ -7,18 +7,20 @@ from dataclasses import dataclass
 import moocore
 import numpy as np
 
+from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.domain import Box, box, to_physical
-from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.distributions import (
     Distribution,
     Normal,
     Samples,
+    Tabled,
     TruncatedNormal,
     Uniform,
 )
@@ -32,6 +34,10 @@ from hpcclear.study.surrogates import coordinate
 
 PROBES = 64
 """Designs, beside the corners, at which the rules of derived random inputs are chosen."""
+
+
+TOGETHER = 256
+"""Points of a Sobol sequence by which the surrogate is averaged over inputs that vary together."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,8 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     """The problem of one case on a surrogate of its objective.
 
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
-    the model knows its ratio; such a case is averaged by Monte Carlo.
+    the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
+    for inputs that vary together. Such a case is averaged by Monte Carlo.
     """
     study = scene.required_study
     names = study.design_variables(case)
@@ -88,32 +95,47 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     unit = unit_lhs(PROBES, len(names), rng)
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(names))))
     probes = region.lower + np.concatenate([unit, corners]) * (region.upper - region.lower)
-    askew = len(model.leaves) > 1 and any(set(one.of) & set(random) for one in derived)
-    by_draws = askew or study.swarm.statistics == "monte-carlo"
+    inputs = [_random_input(study.random_input(name)) for name in random]
+    askew = len(model.leaves) > 1 and (
+        any(set(one.of) & set(random) for one in derived)
+        or any(isinstance(one.distribution, Tabled) for one in inputs)
+    )
+    draws: tuple[int, np.random.Generator] | dict[str, Array] | None = None
+    joint = None
+    if study.correlation is not None and len(set(study.correlation.inputs) & set(random)) > 1:
+        draws = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
+
+        def joint(count: int, rng: np.random.Generator) -> dict[str, Array]:
+            return offsets(scene, random, list(rng.random((len(random), count)) + 2.0**-54))
+
+    elif askew or study.swarm.statistics == "monte-carlo":
+        draws = (study.swarm.monte_carlo_samples, rng)
     objective = RobustObjective(
         model,
         names,
-        [_random_input(study.random_input(name)) for name in random],
+        inputs,
         derived=derived,
         probes=to_physical(scene, names, probes),
-        draws=(study.swarm.monte_carlo_samples, rng) if by_draws else None,
+        draws=draws,
+        joint=joint,
     )
     return Problem(names, region, objective, scene)
 
 
 def _random_input(row: scene_variables.RandomInput) -> RandomVariable:
-    middle = 0.0 if row.centre is None else row.centre
+    law = row.law
+    low, high = law.span
     distribution: Distribution
-    if row.values is not None:
-        distribution = Samples(row.values)
-    elif row.distribution == "uniform":
-        distribution = Uniform(middle - row.reach, middle + row.reach)
+    if isinstance(law, quantiles.Uniform):
+        distribution = Uniform(low, high)
+    elif isinstance(law, quantiles.Normal):
+        distribution = Normal(law.middle, law.deviation)
+        if law.reach < np.inf:
+            distribution = TruncatedNormal(law.middle, law.deviation, low, high)
+    elif isinstance(law, quantiles.Samples):
+        distribution = Samples(law.values)
     else:
-        assert row.deviation is not None  # by validation
-        distribution = Normal(middle, row.deviation)
-        if row.distribution == "truncated-normal":
-            ends = middle - row.reach, middle + row.reach
-            distribution = TruncatedNormal(middle, row.deviation, *ends)
+        distribution = Tabled(law)
     return RandomVariable(row.name, distribution, about_design=not row.absolute)
 
 

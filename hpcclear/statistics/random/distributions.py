@@ -6,7 +6,7 @@ Sources: G. H. Golub and J. H. Welsch, "Calculation of Gauss quadrature rules", 
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import inf, isfinite, pi, sqrt
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.normal import TAIL, truncated_quantile
+from hpcclear.base.quantiles import Quantiles
 
 FINE = 400
 """Legendre nodes of the inner products that define the rule of a truncated normal."""
@@ -198,7 +199,48 @@ class Samples:
         return whole / len(self.values)
 
 
-Distribution = Uniform | Normal | TruncatedNormal | Samples
+@dataclass(frozen=True)
+class Tabled:
+    """Any other that has no jumps, by its quantile function.
+
+    What it integrates is summed at steps of its place in standard deviations of a normal, where the trapezoidal rule is good:
+    what is smooth vanishes at both ends.
+    """
+
+    quantiles: Quantiles
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Lowest and highest value that counts."""
+        return self.quantiles.span
+
+    @cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values, (m,), and their probabilities."""
+        places = np.linspace(-TAIL, TAIL, FINE + 1)
+        weights = np.exp(-0.5 * places**2)
+        return self.quantiles(ndtr(places)), weights / weights.sum()
+
+    def draw(self, size: int, rng: np.random.Generator) -> np.ndarray:
+        """Independent draws, ``(size,)``, by inversion."""
+        return self.quantiles(rng.random(size) + 2.0**-54)
+
+    def rule(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights (they add up to 1) of the Gauss rule with `count` nodes."""
+        values, weights = self._table
+        middle = weights @ values
+        scale = sqrt(weights @ (values - middle) ** 2)
+        nodes, weights = _gauss_rule((values - middle) / scale, weights, count)
+        return np.clip(middle + scale * nodes, *self.support), weights
+
+    def kernel_integral(self, centres: np.ndarray, length: float) -> np.ndarray:
+        """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``."""
+        values, weights = self._table
+        steps = (values - np.asarray(centres)[..., None]) / length
+        return np.exp(-0.5 * steps**2) @ weights
+
+
+Distribution = Uniform | Normal | TruncatedNormal | Samples | Tabled
 
 
 @lru_cache(maxsize=64)
@@ -217,7 +259,14 @@ def piece_rule(
     """Rules over the part of the support between limits, ``(n, count)`` nodes and weights.
 
     The weights of a row add up to the probability of its part: 0 where the limits leave nothing.
+
+    Raises
+    ------
+    InputError
+        If the distribution is known by its quantiles alone.
     """
+    if isinstance(distribution, Tabled):
+        raise InputError("distribution", distribution, "has no density here", 'use "monte-carlo"')
     low, high = distribution.support
     if isinstance(distribution, Samples):
         rules = [distribution.piece(count, *ends) for ends in zip(lower, upper, strict=True)]

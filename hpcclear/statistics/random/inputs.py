@@ -16,7 +16,7 @@ class RandomVariable:
     Attributes
     ----------
     name : str
-    distribution : Uniform, Normal or TruncatedNormal
+    distribution : Uniform, Normal, TruncatedNormal or Tabled
         Of the value, or of the offset from the design.
     about_design : bool
         Whether the distribution is an offset added to the design variable of this name.

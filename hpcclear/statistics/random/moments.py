@@ -7,13 +7,13 @@ Three ways, each a check on the others:
 - Monte Carlo with standard errors, the paper's way;
 - the closed form in error functions, for independent inputs of one model.
 
-Random inputs are independent. They may stand for the model's inputs themselves or act through
+Random inputs are independent, unless their draws are given. They may stand for the model's inputs themselves or act through
 `Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
 and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel
 is still a product over the groups.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
@@ -98,9 +98,12 @@ class RobustObjective:
         Needed only where a derived input depends on a random one.
     tolerance : float
         Absolute error allowed in the integral of any kernel (at most 1) over one random input.
-    draws : (int, numpy Generator), optional
-        Monte Carlo in place of quadrature: how many draws, and what makes them. All designs see
-        the same ones, so that their ranking is not noise.
+    draws : (int, numpy Generator) or mapping of str to array (s,), optional
+        Monte Carlo in place of quadrature: how many draws, and what makes them; or the draws themselves, of each random input,
+        which may vary together then. All designs see the same ones, so that their ranking is not noise.
+    joint : callable, optional
+        Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
+        array (count,).
 
     Attributes
     ----------
@@ -124,14 +127,18 @@ class RobustObjective:
         derived: Sequence[Derived] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
-        draws: tuple[int, np.random.Generator] | None = None,
+        draws: tuple[int, np.random.Generator] | Mapping[str, np.ndarray] | None = None,
+        joint: Callable[[int, np.random.Generator], Mapping[str, np.ndarray]] | None = None,
     ) -> None:
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
         self._draws: dict[str, np.ndarray] | None = None
         self._rules: tuple[TensorRule, ...] = ()
-        if draws is not None:
-            self._draws = self._wiring.draw(*draws)
+        self._joint = joint
+        if isinstance(draws, Mapping):
+            self._draws = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
+        elif draws is not None:
+            self._draws = self._drawn(*draws)
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes) for leaf in model.leaves
@@ -156,16 +163,22 @@ class RobustObjective:
     ) -> SampledMoments:
         """The same by Monte Carlo, `samples` fresh draws that all designs share, with errors."""
         designs = self._checked(designs)
-        return sample_moments(self._sampled(designs, self._wiring.draw(samples, rng)))
+        return sample_moments(self._sampled(designs, self._drawn(samples, rng)))
 
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
         """The same in error functions, ``(n, 2)``: one `Kriging` model, no derived inputs."""
         designs = self._checked(designs)
-        if len(self.model.leaves) > 1 or self._wiring.derived:
+        if len(self.model.leaves) > 1 or self._wiring.derived or self._joint is not None:
             raise InputError(
                 "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
             )
         return np.array([self._closed(design) for design in designs]).reshape(-1, 2)
+
+    def _drawn(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Draws of every random input, ``(1, samples)`` each."""
+        if self._joint is None:
+            return self._wiring.draw(samples, rng)
+        return {name: one[None] for name, one in self._joint(samples, rng).items()}
 
     def _checked(self, designs: np.ndarray) -> np.ndarray:
         """Designs as floats, after checking that their random inputs stay inside the domain."""

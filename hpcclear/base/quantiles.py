@@ -1,0 +1,155 @@
+"""Distributions by their quantile functions: what the sampling of scenes and the moments of surrogates share.
+
+Whatever draws probabilities, independent, stratified or of a Sobol sequence, makes values of them here. Distributions by
+a formula are cut off where a normal is (`hpcclear.base.normal.TAIL`): 1e-9 of each lies beyond either way, and is clipped.
+
+Sources: N. L. Johnson, S. Kotz and N. Balakrishnan, "Continuous Univariate Distributions" (1994, 1995); the functions
+themselves are those of scipy.stats and scipy.special.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, log1p, sqrt
+from typing import Any, Protocol
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.normal import TAIL, truncated_quantile
+
+
+class Quantiles(Protocol):
+    """A distribution of a number or of its offset."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value that counts."""
+        ...
+
+    def __call__(self, chance: Array) -> Array:
+        """Values below which a share `chance` lies, of any shape, strictly between 0 and 1."""
+        ...
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Uniform within `reach` of `middle`."""
+
+    middle: float
+    reach: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value."""
+        return self.middle - self.reach, self.middle + self.reach
+
+    def __call__(self, chance: Array) -> Array:
+        """Quantiles, of any shape."""
+        return self.middle + self.reach * (2 * chance - 1)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal about `middle`, cut off at `reach` from it; infinite for the whole of it."""
+
+    middle: float
+    deviation: float
+    reach: float = inf
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value that counts."""
+        reach = TAIL * self.deviation if self.reach == inf else self.reach
+        return self.middle - reach, self.middle + reach
+
+    def __call__(self, chance: Array) -> Array:
+        """Quantiles, of any shape."""
+        if self.reach == inf:
+            from scipy.special import ndtri  # a quarter of a second, which "lhs" does not need
+
+            return np.asarray(self.middle + self.deviation * np.clip(ndtri(chance), -TAIL, TAIL))
+        cut = self.reach / self.deviation
+        return self.middle + self.deviation * truncated_quantile(chance, -cut, cut)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Each of some values with equal chance, shape (n,), in rising order: the empirical quantile function."""
+
+    values: tuple[float, ...]
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value."""
+        return self.values[0], self.values[-1]
+
+    def __call__(self, chance: Array) -> Array:
+        """Quantiles, of any shape."""
+        count = len(self.values)
+        return np.array(self.values)[np.minimum((chance * count).astype(np.int64), count - 1)]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A distribution of scipy.stats, cut off at two limits.
+
+    Attributes
+    ----------
+    name : str
+        In scipy.stats.
+    shapes : tuple of float
+    location, scale : float
+    lower, upper : float
+        Where it is cut off; infinite for the whole of it.
+    """
+
+    name: str
+    shapes: tuple[float, ...]
+    location: float = 0.0
+    scale: float = 1.0
+    lower: float = -inf
+    upper: float = inf
+
+    @cached_property
+    def _whole(self) -> Any:
+        from scipy import stats  # most of a second, which few scenes need
+
+        return getattr(stats, self.name)(*self.shapes, loc=self.location, scale=self.scale)
+
+    @cached_property
+    def chances(self) -> tuple[float, float]:
+        """Probabilities of lying below either limit."""
+        return float(self._whole.cdf(self.lower)), float(self._whole.cdf(self.upper))
+
+    @cached_property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value that counts."""
+        from scipy.special import ndtr
+
+        rare = ndtr(-TAIL)
+        ends = float(self._whole.ppf(rare)), float(self._whole.isf(rare))
+        return max(ends[0], self.lower), min(ends[1], self.upper)
+
+    def __call__(self, chance: Array) -> Array:
+        """Quantiles, of any shape."""
+        below, above = self.chances
+        return np.clip(self._whole.ppf(below + chance * (above - below)), *self.span)
+
+
+def lognormal(mean: float, deviation: float, lower: float = -inf, upper: float = inf) -> Named:
+    """A lognormal with that mean and standard deviation, both of all of it, before it is cut off."""
+    variance = log1p((deviation / mean) ** 2)
+    middle = mean / sqrt(1.0 + (deviation / mean) ** 2)
+    return Named("lognorm", (sqrt(variance),), scale=middle, lower=lower, upper=upper)
+
+
+def beta(shapes: tuple[float, float], lower: float, upper: float) -> Named:
+    """A beta distribution over ``[lower, upper]``."""
+    return Named("beta", shapes, lower, upper - lower, lower, upper)
+
+
+def weibull(
+    scale: float, shape: float, location: float, lower: float = -inf, upper: float = inf
+) -> Named:
+    """A Weibull distribution from `location` on."""
+    return Named("weibull_min", (shape,), location, scale, lower, upper)

@@ -1,0 +1,102 @@
+"""Random inputs that vary together: a Gaussian copula, by the correlation matrix in the scene.
+
+Each input keeps its own distribution; what is correlated are the standard normals whose probabilities are its own.
+
+Sources: R. B. Nelsen, "An Introduction to Copulas" (2006); for ranks K. Pearson, "On further methods of determining
+correlation" (1907): rho = 6/pi asin(r/2).
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from hpcclear.base.arrays import Array
+from hpcclear.scene.fields import Quantity, Table, invalid
+
+Entry = Annotated[float, Quantity("", least=-1, most=1)]
+
+LEAST_EIGENVALUE = 1e-10
+"""Of a matrix that can be factored with digits to spare."""
+
+
+class Correlation(Table):
+    """Which random inputs vary together, and how closely; all others are independent."""
+
+    inputs: tuple[str, ...]
+    """Random inputs, in the order of the rows of the matrix."""
+    matrix: tuple[tuple[Entry, ...], ...]
+    """Correlations, symmetric with ones along the diagonal."""
+    measure: Literal["normal", "rank"] = "normal"
+    """What the matrix holds: "normal", correlations of the normals behind the inputs (those of the inputs themselves,
+    where these are normal), or "rank", Spearman's of the inputs, whatever their distributions."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Correlation":
+        count = len(self.inputs)
+        if count < 2 or len(set(self.inputs)) < count:
+            raise invalid("two inputs or more, each once, are expected here", "Name them", "inputs")
+        if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
+            raise invalid(
+                f"{count} inputs need {count} rows of {count} numbers",
+                "Write a row for each input",
+                "matrix",
+            )
+        entries = np.array(self.matrix)
+        if (entries != entries.T).any() or (entries.diagonal() != 1.0).any():
+            raise invalid(
+                "a correlation matrix is symmetric, with ones along its diagonal",
+                "Mend the entries that differ",
+                "matrix",
+            )
+        least = float(np.linalg.eigvalsh(self.normal(self.inputs)).min())
+        if least < LEAST_EIGENVALUE:
+            raise invalid(
+                f"no inputs vary so together: the least eigenvalue is {least:.2g}, and none may be 0 or below",
+                f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say",
+                "matrix",
+            )
+        return self
+
+    def normal(self, names: Sequence[str]) -> Array:
+        """Correlations of the normals behind some of its inputs, shape (n, n)."""
+        rows = [self.inputs.index(name) for name in names]
+        entries = np.array(self.matrix)[np.ix_(rows, rows)]
+        if self.measure == "normal":
+            return entries
+        found = 2.0 * np.sin(np.pi / 6.0 * entries)
+        np.fill_diagonal(found, 1.0)
+        return found
+
+    def together(self, names: Sequence[str], chances: Sequence[Array]) -> list[Array]:
+        """Probabilities that vary together, from independent ones.
+
+        Parameters
+        ----------
+        names : sequence of str
+            What varies. The first input of the matrix that is among them keeps its own numbers, the next mixes them with
+            its own, and so on.
+        chances : sequence of arrays, shape (n,) each
+            Strictly between 0 and 1.
+
+        Returns
+        -------
+        list of arrays, shape (n,) each
+            Those of names that are not among the inputs are what they were.
+        """
+        from scipy.special import ndtr, ndtri  # as in `hpcclear.base.normal`
+
+        own = [name for name in self.inputs if name in names]
+        made = list(chances)
+        if len(own) < 2:
+            return made
+        factor = np.linalg.cholesky(self.normal(own))
+        normals = [ndtri(chances[list(names).index(name)]) for name in own]
+        for row, name in enumerate(own[1:], 1):
+            # sums in a fixed order: a product of matrices has other last bits for another number of rows
+            mixed = factor[row, 0] * normals[0]
+            for column in range(1, row + 1):
+                mixed = mixed + factor[row, column] * normals[column]
+            made[list(names).index(name)] = np.clip(ndtr(mixed), 2.0**-54, 1.0 - 2.0**-53)
+        return made
