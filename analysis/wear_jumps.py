@@ -17,9 +17,10 @@ from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Start
 from hpcclear.dynamics.wear.law import joints_of
 from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
-from hpcclear.ensemble.wear import States, inputs_of
+from hpcclear.ensemble.wear import States, inputs_of, waiting_longer
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parents[1] / "jobs" / "wear.toml"
@@ -101,7 +102,7 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
         table.copies,
         table.most_copies,
     )
-    lanes = Lanes(problem_of(scene), 32)
+    kinds = [Lanes(problem_of(one), 32) for one in (scene, waiting_longer(scene))]
     lives = [life(joints[k], plan) for k in range(len(joints.clearance))]
     going = {k: next(one) for k, one in enumerate(lives)}
     ended = {}
@@ -109,17 +110,29 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
     while going:
         rows = [states.rows(k, asked) for k, asked in going.items()]
         par = parameters(scene, states.points(np.concatenate(rows)))
-        outcome = lanes.run(par, start_states(scene, par, None))
+        late = np.concatenate([np.array(asked.copies) % 2 for asked in going.values()])
+        start = start_states(scene, par, None)
+        answer = [
+            np.empty((len(par), 2)),
+            np.empty(len(par)),
+            np.empty((len(par), 2)),
+            np.empty(len(par), int),
+        ]
+        for kind, lanes in enumerate(kinds):
+            chosen = late == kind
+            outcome = lanes.run(par[chosen], Start(start.rows[chosen]))
+            period = outcome.time / outcome.revolutions
+            parts = (
+                outcome.sliding_power[:, :2] * period[:, None], outcome.objective, outcome.peak_force[:, :2], outcome.status,
+            )  # fmt: skip
+            for whole, part in zip(answer, parts, strict=True):
+                whole[chosen] = part
         cuts = np.cumsum([len(part) for part in rows])[:-1]
-        period = outcome.time / outcome.revolutions
-        found = zip(
-            np.split(outcome.sliding_power[:, :2] * period[:, None], cuts), np.split(outcome.objective, cuts),
-            np.split(outcome.peak_force[:, :2], cuts), np.split(outcome.status.astype(int), cuts), strict=True,
-        )  # fmt: skip
+        found = zip(*(np.split(whole, cuts) for whole in answer), strict=True)
         waiting, going = going, {}
-        for k, answer in zip(waiting, found, strict=True):
+        for k, seen in zip(waiting, found, strict=True):
             try:
-                going[k] = lives[k].send(Seen(*answer))
+                going[k] = lives[k].send(Seen(*seen))
             except StopIteration as end:
                 ended[k] = end.value
     seconds = time.process_time() - began

@@ -17,7 +17,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.wear.curves import curves, lifetime
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Plan, Seen, life
+from hpcclear.dynamics.wear.life import Plan, Seen, _drift, life
 from hpcclear.ensemble.wear import check_worn
 from hpcclear.report import fan_figure, survival_figure
 from hpcclear.results import dataset
@@ -29,8 +29,11 @@ PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
 ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12)))
 
 
-def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK):
-    """A life whose dynamics are functions of the clearances (joints,): rates (joints,), f; noise is relative."""
+def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK, settling=0.0):
+    """A life whose dynamics are functions of the clearances (joints,): rates (joints,), f; noise is relative.
+
+    `settling`: by how much, relative, copies that wait longer wear faster.
+    """
     asking, rng = life(joints, plan), np.random.default_rng(3)
     f = objective or (lambda c: float(c[0]))
     asked = next(asking)
@@ -38,6 +41,7 @@ def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK):
         c, _ = joints.worn(asked.work)
         n = len(asked.copies)
         scatter = 1.0 + noise * rng.standard_normal((n, 1))
+        scatter[np.array(asked.copies) % 2 == 1] += settling
         answer = Seen(
             scatter * rate(c), np.full(n, f(c)) * scatter[:, 0], np.ones((n, len(c))),
             np.full(n, int(status)),
@@ -138,6 +142,29 @@ def test_a_rate_that_scatters_asks_for_more_copies_and_says_what_it_does_not_kno
     end = ONE.worn(wild.nodes[-1].work)[0][0]
     assert abs(end - (3e-4 + 3e-12 * 50.0 * 1e6)) < 2.0 * wild.limit[0]
     assert wild.limit[0] > 10.0 * calm.limit[0]
+
+
+def test_a_transient_that_is_not_over_is_told_and_widens_the_limit():
+    settled = followed(ONE, PLAN, lambda c: np.array([50.0]), noise=1e-3)
+    moving = followed(ONE, PLAN, lambda c: np.array([50.0]), noise=1e-3, settling=0.1)
+    assert settled.drift < 1e-3
+    assert settled.certain
+    assert moving.drift == pytest.approx(0.1, rel=0.1)
+    assert not moving.certain
+    grown = ONE.worn(moving.nodes[-1].work)[0][0] - 3e-4
+    assert moving.limit[0] > 0.04 * grown  # half of the jumps' differences, added as squares
+    assert moving.simulations / len(moving.nodes) < 3 * PLAN.copies  # copies do not help
+
+
+def test_chaos_is_not_taken_for_a_transient():
+    """Of 200 states whose copies scatter by 20 %, some 5 % differ by chance, and by little."""
+    seen = [
+        np.random.default_rng(k).normal(1.0, 0.2, (8, 1)) for k in range(200)
+    ]  # fmt: skip
+    drifts = np.array([_drift(one)[0] for one in seen])
+    assert (drifts > 0.0).sum() <= binom.ppf(1.0 - 1e-6, 200, 0.05)
+    assert (drifts > 0.0).any()
+    assert _drift(np.array([[1.0], [2.0]]))[0] == 0.0  # scatter of one each is not known
 
 
 def test_worn_volume_is_spread_over_the_surface():
@@ -277,6 +304,20 @@ def check(found):
     over = (found.lifetime <= float(found.cycle[-1])).mean()
     assert float(found.survival[-1]) == pytest.approx(1.0 - float(over))
     assert np.corrcoef(found.k12, grown.isel(cycle=-1, joint=0))[0, 1] > 0.9
+
+
+def test_a_motion_that_has_not_settled_is_told(tmp_path):
+    hasty = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
+    short = words(tmp_path / "wear.nc", *hasty, "wear.copies=4")
+    code, output = run(short, 0)
+    assert code == 0, output
+    assert "raise numerics.transient_revolutions" in " ".join(output.split())
+    found = dataset.read(tmp_path / "wear.nc", "wear")
+    assert (found.drift > 0.01).any()
+    code, output = run([*short, "--fresh", "--set", "numerics.transient_revolutions=5"], 0)
+    assert code == 0, output
+    assert "transient_revolutions" not in output
+    assert (dataset.read(tmp_path / "wear-2.nc", "wear").drift < 0.01).all()
 
 
 def test_lives_that_fail_are_told_and_end_the_command(tmp_path):

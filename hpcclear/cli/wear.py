@@ -32,6 +32,7 @@ def describe(found: "Finished") -> int:
     if unsure:
         text = f"{unsure} lives whose wear rate or f scatters more than wear.tolerance; see clearance_limit"
         rows.append(("unsure", text))
+    rows += _settling(content)
     rows += [*_ends(content), *_lifetimes(content), *_causes(content)]
     out.print(table("Wear", rows + _load(found)))
     out.print(f"wear     {found.output}")
@@ -39,6 +40,16 @@ def describe(found: "Finished") -> int:
         return Exit.DONE
     click.echo("Error: every life failed", err=True)
     return Exit.FAILED
+
+
+def _settling(content: xr.Dataset) -> list[tuple[str, str]]:
+    """Lives whose motion had not settled when it was measured."""
+    drift = content["drift"].to_numpy()
+    moving = int((drift > content.attrs["tolerance"]).sum())
+    if not moving:
+        return []
+    text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
+    return [("transient", f"{text}; raise numerics.transient_revolutions")]
 
 
 def _ends(content: xr.Dataset) -> list[tuple[str, str]]:

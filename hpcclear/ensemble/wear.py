@@ -14,7 +14,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.dynamics.parameters import Numbers
 from hpcclear.dynamics.wear.curves import Curves, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints, joints_of
@@ -155,14 +155,28 @@ def follow(
     first = 0
     while going:
         rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
-        design = states.points(np.concatenate(rows))
-        records = sample_points(scene, design, ranks, checkpoint, stage="wear", first=first)
-        first += len(design)
+        design = np.concatenate(rows)
+        late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
+        records = np.empty(len(design), OUTCOME)
+        for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
+            if chosen.any():
+                points = states.points(design[chosen])
+                records[chosen] = sample_points(
+                    here, points, ranks, checkpoint, stage="wear", first=first
+                )
+                first += len(points)
         answers = np.split(records, np.cumsum([len(part) for part in rows])[:-1])
         waiting, going = going, {}
         for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
             _go_on(number, asking, _seen(answer, worn, len(scene.joint_labels)), going, ended)
     return [ended[number] for number in range(len(joints.clearance))]
+
+
+def waiting_longer(scene: Scene) -> Scene:
+    """The scene for copies that wait longer before they are measured, by a stretch as long as is averaged."""
+    numerics = scene.numerics
+    wait = numerics.transient_revolutions + int(_averaged(scene))
+    return scene.with_({"numerics.transient_revolutions": wait})
 
 
 def _averaged(scene: Scene) -> int:
@@ -265,6 +279,7 @@ def lives_dataset(
         **values,
         "clearance_limit": np.stack([one.limit for one in lives]),
         "clearance_error": np.stack([one.error for one in lives]),
+        "drift": np.array([one.drift for one in lives]),
         "lifetime": ends,
         "ended": np.array([one.ended for one in lives]),
         "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
@@ -291,7 +306,11 @@ def lives_dataset(
     }  # fmt: skip
     units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
     words = None if inputs is None else inputs.words
-    told = {**attributes, **{f"limit_{name}": value for name, value in limits.items()}}
+    told = {
+        **attributes,
+        "tolerance": scene.wear.tolerance,
+        **{f"limit_{name}": value for name, value in limits.items()},
+    }
     return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
 
 

@@ -5,6 +5,9 @@ simulation tell with Student's limits. A jump of n revolutions is taken twice: a
 E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). What is gone on from is twice the one less the other, w + n E_half,
 whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
 how far it is, half-way, from the middle between both ends. What limits of E and f leave open is not held against a jump.
+
+Copies of odd number wait longer before they are measured. Where they differ from the others by more than both scatter, the
+transient is not over: their difference widens the limits, and is told.
 """
 
 import math
@@ -66,7 +69,10 @@ class Seen:
 
 @dataclass(frozen=True)
 class Asked:
-    """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies."""
+    """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies.
+
+    Those of odd number are to wait longer.
+    """
 
     work: Array
     copies: range
@@ -77,7 +83,8 @@ class Node:
     """What is known at a state of wear; limits are 95 % half-widths.
 
     `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
-    joint of the scene, N.
+    joint of the scene, N; `drift`: difference beyond scatter between copies that waited longer and the others, of the
+    rates and of f (joints + 1,), relative.
     """
 
     cycle: float
@@ -87,6 +94,7 @@ class Node:
     objective: float
     objective_limit: float
     peak: Array
+    drift: Array
 
 
 @dataclass
@@ -94,7 +102,8 @@ class Life:
     """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
 
     `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m; `error`: sum
-    over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either half, m.
+    over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either half, m; `drift`:
+    the largest of any rate or f at any state.
     """
 
     nodes: list[Node]
@@ -104,6 +113,7 @@ class Life:
     limit: Array = field(default_factory=lambda: np.zeros(0))
     error: Array = field(default_factory=lambda: np.zeros(0))
     certain: bool = True
+    drift: float = 0.0
     simulations: int = 0
 
 
@@ -215,14 +225,19 @@ def _look(
         seen.append(answer)
         done = wanted
         node = _node(cycle, work, seen)
+        drift = node.drift[:-1] * node.rate
         if length is None:
-            grown = FIRST_GROWTH * node.rate_limit / np.maximum(node.rate, 1e-300) * clearance
+            ahead = FIRST_GROWTH / np.maximum(node.rate, 1e-300) * clearance
         else:
-            grown = joints.slope * length * node.rate_limit
-        sure = (grown <= 0.5 * plan.tolerance * clearance).all()
+            ahead = joints.slope * length
+        allowed = 0.5 * plan.tolerance * clearance
+        sure = (ahead * node.rate_limit <= allowed).all()
         sure &= node.objective_limit <= plan.tolerance * abs(node.objective)
-        if sure or done >= plan.most_copies:
+        # more copies do not end a transient
+        moving = (ahead * drift > allowed).any() or node.drift[-1] > plan.tolerance
+        if sure or moving or done >= plan.most_copies:
             found.certain &= bool(sure)
+            found.drift = max(found.drift, float(node.drift.max()))
             return node
         wanted = min(2 * done, plan.most_copies)
 
@@ -231,8 +246,25 @@ def _node(cycle: float, work: Array, seen: list[Seen]) -> Node:
     rates = np.concatenate([one.work for one in seen])
     values = np.concatenate([one.objective for one in seen])
     peaks = np.concatenate([one.peak for one in seen])
-    scale = student(0.95, len(values) - 1) / math.sqrt(len(values))
+    every = np.column_stack([rates, values])
+    mean, scatter = every.mean(axis=0), every.std(axis=0, ddof=1)
+    drift = _drift(every)
+    limit = np.hypot(student(0.95, len(every) - 1) / math.sqrt(len(every)) * scatter, drift)
     return Node(
-        cycle, work, rates.mean(axis=0), scale * rates.std(axis=0, ddof=1), float(values.mean()),
-        scale * float(values.std(ddof=1)), peaks.mean(axis=0),
+        cycle, work, mean[:-1], limit[:-1], float(mean[-1]), float(limit[-1]), peaks.mean(axis=0),
+        drift / np.maximum(np.abs(mean), 1e-300),
     )  # fmt: skip
+
+
+def _drift(values: Array) -> Array:
+    """By how much means of copies (copies, n) that waited longer, those of odd number, and of the others differ beyond 95 %
+    limits of their scatter, (n,); 0 of fewer than two each, whose scatter is not known."""
+    groups = values[0::2], values[1::2]
+    sizes = [len(one) for one in groups]
+    if min(sizes) < 2:
+        return np.zeros(values.shape[1])
+    freedom = sum(sizes) - 2
+    squares = [np.square(one - one.mean(axis=0)).sum(axis=0) for one in groups]
+    error = np.sqrt(sum(squares) / freedom * sum(1.0 / size for size in sizes))
+    apart = np.abs(groups[0].mean(axis=0) - groups[1].mean(axis=0))
+    return np.maximum(apart - student(0.95, freedom) * error, 0.0)
