@@ -1,6 +1,6 @@
 """The kernel's equations of motion as a function of a state, and classical Runge-Kutta steps over them.
 
-For integrators that are not the kernel's. A state is y = (q, v, integrals of the absolute gaps at O12 and O23).
+For integrators that are not the kernel's. A state is y = (q, v, integrals of the absolute gaps of the joints).
 """
 
 from typing import Any
@@ -9,9 +9,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
-from hpcclear.dynamics.layout import MAX_JOINTS, TURN
+from hpcclear.dynamics.layout import MAX_JOINTS
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
-from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.views import Parameters, Start
 
@@ -20,7 +19,7 @@ from hpcclear.dynamics.views import Parameters, Start
 def latch(contacts, seen, floor):
     """Start or end contacts by the signs of the gaps; True if a contact started or ended."""
     changed = False
-    for j in range(2):
+    for j in range(len(seen)):
         if contacts[j] == 0.0 and seen[j, OPEN] > 0.0:
             contacts[j] = 1.0
             contacts[MAX_JOINTS + j] = 1.0 / max(seen[j, RATE], floor)
@@ -36,12 +35,13 @@ def classical_turn(motion, tables, rule, steps, y, contacts, seen):
     """Integrate `y` over one revolution by the classical Runge-Kutta method of order 4, in equal steps.
 
     Contacts start and end between steps, as they come. `rule`: whether contacts latch, whether the last coordinate is the
-    crank angle (then the last step is cut at a full turn), least impact speed, period. Returns duration, largest contact
+    driven angle (then the last step is cut at a full revolution), least impact speed, period, and by how much that angle
+    turns in a revolution. Returns duration, largest contact
     force at a step's end, and evaluations.
     """
-    latched, free, floor, period = rule
-    n = len(y) // 2 - 1
+    latched, free, floor, period, cycle = rule
     out, joints = seen.rates, seen.joints
+    n = (len(y) - len(joints)) // 2
     stage, total = y.copy(), np.empty(len(y))
     h = period / steps
     time, peak, count, step, corrections, s, last = 0.0, 0.0, 0, 0, 0, 0, False
@@ -52,7 +52,8 @@ def classical_turn(motion, tables, rule, steps, y, contacts, seen):
         if s == 0:
             if latched and latch(contacts, joints, floor):
                 continue  # the force has jumped: the first stage anew
-            peak = max(peak, max(joints[0, FORCE], joints[1, FORCE]))
+            for j in range(len(joints)):
+                peak = max(peak, joints[j, FORCE])
             if last or step >= 1000 * steps or not np.isfinite(out[n]):
                 return time, peak, count
             total[:] = 0.0
@@ -65,9 +66,9 @@ def classical_turn(motion, tables, rule, steps, y, contacts, seen):
             s = 0
             for k in range(len(y)):
                 stage[k] = y[k] + h / 6.0 * total[k]
-            beyond = free and (corrections > 0 or stage[n - 1] > TURN)
+            beyond = free and (corrections > 0 or stage[n - 1] > cycle)
             if beyond and corrections < 6:
-                h += (TURN - stage[n - 1]) / stage[2 * n - 1]
+                h += (cycle - stage[n - 1]) / stage[2 * n - 1]
                 corrections += 1
                 stage[:] = y
             else:
@@ -96,32 +97,34 @@ class Equations:
         self.named = Parameters(par)
         self.latched = problem.effects.latched is not None
         self.free = problem.effects.torque is not None
-        self.start = np.concatenate([start.state(n), np.zeros(2)])
+        self.size = problem.effects.joints or 2  # joints whose gaps are integrated
+        self.start = np.concatenate([start.state(n), np.zeros(self.size)])
         self.contacts = start.contacts.copy()
         self._origin = start
         self.calls = 0
-        self._head: tuple[Any, ...] = (motion_of(problem.effects, 1).address, problem.tables)
-        self._seen = new_seen(n, par)
+        self._head: tuple[Any, ...] = (problem.motion(problem.effects, 1).address, problem.tables)
+        self._seen = new_seen(n, par, self.size)
 
     def anew(self) -> "Equations":
         """The same design at its start."""
         return Equations(self.problem, self.par, self._origin)
 
     def __call__(self, time: float, y: Array) -> Array:
-        """dy/dt, shape (2 n + 2,)."""
+        """dy/dt, shape (2 n + joints,)."""
         self.calls += 1
         derivative(*self._head, self.contacts, time, y, *self._seen)
         return self._seen.rates.copy()
 
     def joints(self, time: float, y: Array) -> Array:
-        """Gap, contact force and rate of the gap at both joints, shape (2, 3)."""
+        """Gap, contact force and rate of the gap of every joint, shape (joints, 3)."""
         derivative(*self._head, self.contacts, time, y, *self._seen)
         return self._seen.joints
 
     def classical(self, steps: int) -> tuple[Array, float, float, int]:
         """State after one revolution in `steps` classical steps, its duration, largest force, evaluations."""
         y, contacts = self.start.copy(), self.contacts.copy()
-        rule = (self.latched, self.free, self.problem.impact_floor, float(self.named.period))
+        problem, period = self.problem, float(self.named.period)
+        rule = (self.latched, self.free, problem.impact_floor, period, problem.cycle)
         time, peak, count = classical_turn(
             *self._head,
             rule,

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcclear.accuracy.looked_at import QUANTITIES
 from hpcclear.accuracy.methods import (
-    QUANTITIES,
     kernel_method,
     methods_of,
     solve_turn,
@@ -24,6 +24,8 @@ from hpcclear.scene import Scene
 REFERENCE_RTOL = 1e-13
 MARGIN = 100.0
 """The reference must be this many times better than what is measured against it."""
+LOST = 10.0
+"""Error of the position, in lengths of the crank, from which a method has lost the motion: no error of its is told."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,8 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
             setting[m, r] = method.setting(rtol)
             # collocation may be better than the reference: no error is told that the reference cannot tell
             off = rms((outcome.values - reference.values) / reference.scale)
-            error[m, r] = np.fmax(off, reference.error)
+            lost = not abs(off[0]) < LOST
+            error[m, r] = np.nan if lost else np.fmax(off, reference.error)
     floor = MARGIN * reference.error
     order = np.array([[observed_order(n, e[:, k], floor[k]) for k in range(len(QUANTITIES))]
                       for n, e in zip(evaluations, error, strict=True)])  # fmt: skip

@@ -10,24 +10,21 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from hpcclear.accuracy.equations import FORCE, OPEN, RATE, Equations
+from hpcclear.accuracy.looked_at import QUANTITIES, end_of, neighbours
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics import views
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.layout import MAX_JOINTS, TURN
-from hpcclear.dynamics.linkage import geometry
-from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
+from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
 
-QUANTITIES = ("slider_position", "slider_velocity", "peak_contact_force", "objective")
 LARGEST_STEP = 1.0 / 64.0
 """Of the classical method, over the period; the tolerance ladder is turned into steps from here."""
-
-_SLIDER_9 = 5  # slider position among the nine coordinates of the multiplier formulation
 
 
 @dataclass(frozen=True)
@@ -80,27 +77,6 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
     return scene.with_({f"numerics.{key}": value for key, value in changes.items()})
 
 
-def neighbours(scene: Scene, count: int) -> Points:
-    """The scene and designs beside it: slider masses growing by 2 % each, so that no result is one lucky number."""
-    mass = scene.number("mechanism.slider.mass") * np.power(1.02, np.arange(count, dtype=float))
-    return Points(("m3",), mass[:, None], (("mechanism.slider.mass",),))
-
-
-def slider_of(
-    scene: Scene, par: Array, q: Array, v: Array, phi: float = TURN
-) -> tuple[float, float]:
-    """Slider position (m) and velocity (m/s) at the end of a revolution, from coordinates and velocities of shape (n,)."""
-    first, second, free = topology(scene)
-    if scene.numerics.formulation == "baumgarte":
-        return float(q[_SLIDER_9]), float(v[_SLIDER_9])
-    omega = v[-1] if free else float(views.Parameters(par).speed)
-    if free:
-        phi, q, v = q[-1], q[:-1], v[:-1]
-    angle, speed = np.array([phi]), np.array([omega])
-    m = geometry.motion((first, second), par, angle, speed, q[:, None], v[:, None])
-    return float(m.slider[0]), float(m.slider_speed[0])
-
-
 # ---- the kernel's own methods -------------------------------------------------------------------
 
 
@@ -136,8 +112,8 @@ def _kernel_outcome(
     for k in range(designs):
         one = outcome[k]
         if one.status == 0:
-            slider = slider_of(scene, par[k], one.coordinates(n), one.velocities(n))
-            values[k] = *slider, one.peak_force.max(), one.objective
+            place = end_of(scene, par[k], one.coordinates(n), one.velocities(n))
+            values[k] = *place, one.peak_force.max(), one.objective
     return Outcome(values, outcome.evaluations)
 
 
@@ -194,9 +170,9 @@ def _values(
     scene: Scene, one: Equations, y: Array, duration: float, peak: float
 ) -> tuple[float, float, float, float]:
     n = one.n
-    f = float(np.hypot(y[2 * n], y[2 * n + 1])) / duration
+    f = float(objective(y[2 * n :])) / duration
     here = scene.with_({"numerics.formulation": "minimal"})
-    return *slider_of(here, one.par, y[:n], y[n : 2 * n]), peak, f
+    return *end_of(here, one.par, y[:n], y[n : 2 * n]), peak, f
 
 
 def solve_turn(
@@ -205,18 +181,18 @@ def solve_turn(
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
     here, start, period = one.anew(), one.start.copy(), float(one.named.period)
     effects = one.problem.effects
-    joints = [j for j, on in enumerate((effects.crank_rod, effects.rod_slider)) if on is not None]
+    joints = [j for j, on in enumerate(at.open_of(effects)) if on is not None]
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     end = np.inf if one.free else period
     limit = 20.0 * period if one.free else end
     atol = np.array(one.problem.atol)[np.r_[0 : 2 * one.n]] * rtol / one.problem.rtol
-    atol = np.append(atol, 2 * [rtol * 1e-3 * period])
+    atol = np.append(atol, one.size * [rtol * 1e-3 * period])
     t, y, peak, count = 0.0, start, 0.0, 0
     for _ in range(100_000):
         gaps = here.joints(t, y)[:, OPEN].copy()
         events = [_crossing(here, j, side[j], gaps[j]) for j in joints]
         if one.free:
-            events.append(_full_turn(one.n))
+            events.append(_full_turn(one.n, one.problem.cycle))
         piece = solve_ivp(
             here, (t, limit), y, solver, rtol=rtol, atol=atol, events=events, dense_output=True,
             max_step=period / 64.0,  # a whole contact inside a step would go unnoticed
@@ -236,7 +212,7 @@ def solve_turn(
             if here.latched:
                 here.contacts[j] = float(side[j] > 0.0)
                 rate = here.joints(t, y)[j, RATE]
-                here.contacts[MAX_JOINTS + j] = 1.0 / max(rate, one.problem.impact_floor)
+                here.contacts[at.MAX_JOINTS + j] = 1.0 / max(rate, one.problem.impact_floor)
     return (np.nan,) * 4, count
 
 
@@ -246,8 +222,8 @@ def _crossing(one: Equations, joint: int, side: float, at_start: float) -> Event
     return _event(lambda time, y: float(one.joints(time, y)[joint, OPEN]) - shift, -side)
 
 
-def _full_turn(n: int) -> Event:
-    return _event(lambda time, y: float(y[n - 1] - TURN), 1.0)
+def _full_turn(n: int, cycle: float) -> Event:
+    return _event(lambda time, y: float(y[n - 1] - cycle), 1.0)
 
 
 def _event(value: Event, direction: float) -> Event:

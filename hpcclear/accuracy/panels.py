@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.accuracy import averaging, integration, parallel, random_inputs, spending, surrogate
-from hpcclear.accuracy.methods import QUANTITIES
+from hpcclear.accuracy.looked_at import quantities_of
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.outcome import Status
@@ -119,7 +119,9 @@ class Panels:
         with self.ranks.stage("integration"):
             self.panel(
                 "integration",
-                lambda: _integration(integration.measure(self.scene, self.profile, self.tell)),
+                lambda: _integration(
+                    integration.measure(self.scene, self.profile, self.tell), self.scene
+                ),
             )
 
     def add_averaging(self) -> None:
@@ -220,12 +222,12 @@ def _spending(found: spending.Spending) -> Values:
     }
 
 
-def _integration(found: integration.Integration) -> Values:
+def _integration(found: integration.Integration, scene: Scene) -> Values:
     names = ("setting", "error", "seconds", "evaluations", "order", "reference_error")
     return {
         "integrator": np.array(found.methods),
         "rung": np.arange(found.setting.shape[1]),
-        "quantity": np.array(QUANTITIES),
+        "quantity": np.array(quantities_of(scene)),
         **{name: getattr(found, name) for name in names},
     }
 

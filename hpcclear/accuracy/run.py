@@ -52,11 +52,6 @@ def measure(
     InputError
         If both joints are ideal: the objective is 0 then, whatever the settings.
     """
-    if scene.is_planar:
-        raise InputError(
-            "mechanism.kind", "planar", "what accuracy costs is measured on slider-cranks alone so far",
-            "Compare numerics.rtol by hand with simulate, or set numerics.uncertainty = true",
-        )  # fmt: skip
     if scene.objective.joints:
         raise InputError(
             "numerics.objective_joints", scene.numerics.objective_joints,

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from hpcclear.accuracy.looked_at import body_of
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import SHORT_NAMES
 
@@ -44,12 +46,19 @@ def _by_quadrature(scene: Scene) -> Scene:
 
 
 def _variables(scene: Scene) -> dict[str, Any]:
-    """Rod mass, slider mass and the clearances, each about the scene's value."""
+    """Rod mass, slider mass and the clearances, each about the scene's value; of a linkage, the mass of one body."""
+    if scene.is_planar:
+        mass = f"mechanism.bodies.{body_of(linkage_of(scene).mechanism)}.mass"
+        plays = [path for path in scene.numeric_paths() if path.endswith(".clearance")]
+        paths = {"mass": [mass], **{f"C{k}": [path] for k, path in enumerate(plays, 1)}}
+        return {name: {"paths": one, **_about(scene, one[0])} for name, one in paths.items()}
     known = set(scene.numeric_paths())
     clearances = {scene.number(path) for path in SHORT_NAMES["C"] if path in known}
     names = ["m2", "m3", *(["C"] if len(clearances) == 1 else ["C12", "C23"])]
-    rows = {}
-    for name in names:
-        value = scene.number(next(path for path in SHORT_NAMES[name] if path in known))
-        rows[name] = {"range": [(1.0 - WIDTH) * value, (1.0 + WIDTH) * value]}
-    return rows
+    first = {name: next(path for path in SHORT_NAMES[name] if path in known) for name in names}
+    return {name: _about(scene, path) for name, path in first.items()}
+
+
+def _about(scene: Scene, path: str) -> dict[str, Any]:
+    value = scene.number(path)
+    return {"range": [(1.0 - WIDTH) * value, (1.0 + WIDTH) * value]}

@@ -63,16 +63,16 @@ OPEN, FORCE, RATE = 0, 1, 2
 
 
 class Seen(NamedTuple):
-    """What `derivative` writes: dy/dt, the joints (2, 3), and the kernel's rows of one lane, parameters included."""
+    """What `derivative` writes: dy/dt, the joints (j, 3), and the kernel's rows of one lane, parameters included."""
 
     rates: Array
     joints: Array
     lane: Array
 
 
-def new_seen(n: int, par: Array) -> Seen:
-    """Room for n coordinates of the lane with these parameters (PARAMETERS,)."""
-    return Seen(np.empty(2 * n + 2), np.zeros((2, 3)), new_lane(par))
+def new_seen(n: int, par: Array, joints: int = 2) -> Seen:
+    """Room for n coordinates and so many joints of the lane with these parameters (PARAMETERS,)."""
+    return Seen(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
 
 
 # nine arguments: packed into named tuples, a call from Python takes 32 us in place of 17
@@ -83,13 +83,13 @@ def derivative(motion, tables, contacts, time, y, out, joints, lane):
     `motion`: address of a motion of one lane; `contacts`: whether each joint is latched, then 1/d'_0 of each. `out`, `joints`,
     `lane`: as in `Seen`.
     """
-    n = len(y) // 2 - 1
+    n = (len(y) - len(joints)) // 2
     put_state(lane, contacts, time, y, n)
     run_motion(motion, lane, tables)
     for k in range(n):
         out[k] = y[n + k]
         out[n + k] = lane[at.ACC + k]
-    for j in range(2):
+    for j in range(len(joints)):
         for m in range(3):
             joints[j, m] = lane[at.RATE_NOW + at.GAP + m * at.MAX_JOINTS + j]
         out[2 * n + j] = abs(joints[j, OPEN])

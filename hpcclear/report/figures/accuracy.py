@@ -22,6 +22,8 @@ AIM = 0.01
 _WORDS = {
     "slider_position": "slider position",
     "slider_velocity": "slider velocity",
+    "body_position": "body position",
+    "body_velocity": "body velocity",
     "peak_contact_force": "contact-force peak",
     "objective": "objective $f$",
 }
