@@ -98,7 +98,8 @@ def test_ranks_know_what_a_study_asks_for(how):
     records = sample_points(scene, points, alone())
     here = asked(evaluate_records(scene, points, lanes=32), scene.objective)
     assert records.tobytes() == here.tobytes()
-    assert all(np.isfinite(records[name]).all() for name in RESPONSES)
+    told = [name for name in RESPONSES if "point" not in name]  # no point is followed
+    assert all(np.isfinite(records[name]).all() for name in told)
 
 
 WORN = {"joints.crank_rod.wear": {"length": 0.02, "journal": {"coefficient": 1e-15}}}

@@ -61,6 +61,18 @@ _ALL = (
         "standard deviation in time of the slider acceleration",
         lambda r: r["slider_acceleration_deviation"],
     ),
+    Objective(
+        "point-acceleration-deviation",
+        "m/s^2",
+        "root mean square about its mean of the acceleration of the followed point",
+        lambda r: r["point_acceleration_deviation"],
+    ),
+    Objective(
+        "peak-point-acceleration",
+        "m/s^2",
+        "largest acceleration of the followed point",
+        lambda r: r["peak_point_acceleration"],
+    ),
 )
 OBJECTIVES = {one.name: one for one in _ALL}
 """Every objective by its name."""

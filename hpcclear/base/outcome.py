@@ -115,7 +115,13 @@ _REGIMES = {
 }
 
 
-RESPONSES = ("mean_contact_force", "peak_crank_moment", "slider_acceleration_deviation")
+RESPONSES = (
+    "mean_contact_force",
+    "peak_crank_moment",
+    "slider_acceleration_deviation",
+    "point_acceleration_deviation",
+    "peak_point_acceleration",
+)
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
 ON_REQUEST = (*RESPONSES, "sliding_work", "energy_error")
@@ -152,6 +158,8 @@ OUTCOME = np.dtype(
         ),  # N; NaN unless the study's objective asks for it,
         ("peak_crank_moment", np.float64),  # N m, likewise
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
+        ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
+        ("peak_point_acceleration", np.float64),  # m/s^2, likewise
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits

@@ -1,6 +1,7 @@
 """Points to outcome records, in this process: what every rank runs, and what a script calls without MPI."""
 
 import os
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
@@ -121,9 +122,8 @@ class Evaluator:
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
         effects = self._problem.effects
-        records = outcome_records(labels, outcome, par, bool(effects.responses), bool(effects.wear))
-        if self._problem.linkage is not None and not self._problem.linkage.follow:
-            records["slider_acceleration_deviation"] = np.nan  # nothing slides
+        told = responses_told(self._problem)
+        records = outcome_records(labels, outcome, par, told, bool(effects.wear))
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
             off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
@@ -142,6 +142,17 @@ class Evaluator:
             if (group["flags"] & _ARRIVED).all():
                 done.append(joined(sample, self._partial.pop(sample)))
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
+
+
+def responses_told(problem: Problem) -> tuple[str, ...]:
+    """Which of `RESPONSES` samples tell: those asked for, of a slider where one is followed, of a point where one is."""
+    if not problem.effects.responses:
+        return ()
+    linkage = problem.linkage
+    if linkage is None or (linkage.follow and not linkage.follows_a_point):
+        return tuple(name for name in RESPONSES if "point" not in name)
+    followed = "point" if linkage.follows_a_point else "nothing"
+    return tuple(name for name in RESPONSES if followed in name or "acceleration" not in name)
 
 
 _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
@@ -175,12 +186,12 @@ def joined(sample: int, group: Records) -> Records:
 
 
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, responses: bool = False, worn: bool = False
+    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False
 ) -> Records:
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `responses`, sliding work unless `worn`, uncertainty and energy error until their makers fill them in.
+    `told` (as of `responses_told`), sliding work unless `worn`, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
@@ -195,13 +206,15 @@ def outcome_records(
     records["mean_contact_force"] = outcome.mean_force
     records["peak_crank_moment"] = outcome.peak_moment
     records["slider_acceleration_deviation"] = outcome.acceleration_deviation
+    records["point_acceleration_deviation"] = outcome.acceleration_deviation
+    records["peak_point_acceleration"] = outcome.peak_acceleration
     records["energy_error"] = np.nan
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][~valid] = np.nan
     for name in (*STEADY, *MAPPED):
         records[name] = np.nan
     for name in RESPONSES:
-        records[name][~(valid & responses)] = np.nan
+        records[name][~(valid & (name in told))] = np.nan
     records["sliding_work"] = sliding_work(outcome) if worn else np.nan
     records["sliding_work"][~valid] = np.nan
     latched = outcome.latched == 1.0

@@ -124,9 +124,12 @@ GAP_RATE = FORCE + MAX_JOINTS
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
 SLIDINGS = DRIVE_MOMENT + 1  # of each joint, for the implicit method only
-FOLLOWED_ACCELERATION = SLIDINGS + MAX_JOINTS  # of the slider; for responses only
+FOLLOWED_ACCELERATION = (
+    SLIDINGS + MAX_JOINTS
+)  # of the slider, or of a point along x; for responses only
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
-SLIDING_POWERS = FOLLOWED_SQUARE + 1  # of each joint, F_N |v_t|; for wear only
+FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
+SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
 RATES = SLIDING_POWERS + MAX_JOINTS
 
 
@@ -150,6 +153,7 @@ MEASURES = (
     *_FORCES,
     Integrated(FOLLOWED_ACCELERATION, "responses"),
     Integrated(FOLLOWED_SQUARE, "responses"),
+    Integrated(FOLLOWED_ACROSS, "responses"),
     *_SLIDING,
 )
 INTEGRATED = (*GAPS, *MEASURES)
@@ -197,6 +201,7 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     LOG_ERROR,  # log2 of the last accepted one
     ACCEPT,  # 1 or 0
     PEAK_MOMENT,  # of the drive, its size
+    PEAK_FOLLOWED,  # of the square of the followed acceleration
     AVERAGING,  # 1 once the transient is over
     ATTEMPTS,  # steps tried, accepted or not
     EVALUATIONS,
@@ -212,7 +217,7 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 23)
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 24)
 MAX_CURVES = 8
 CURVES = CALM + 1  # values of tabulated curves at the stage
 TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
@@ -267,9 +272,10 @@ BOOK = TOTAL + len(INTEGRATED)
     OUT_STIFF_STEPS,
     OUT_MOMENT,
     OUT_ACCELERATION,
-) = range(10)
+    OUT_FOLLOWED,
+) = range(11)
 # of each joint
-OUT_PEAK = 10
+OUT_PEAK = 11
 OUT_LATCHED = OUT_PEAK + MAX_JOINTS
 OUT_DEEPEST = OUT_LATCHED + MAX_JOINTS
 OUT_ACTIVE = OUT_DEEPEST + MAX_JOINTS

@@ -13,7 +13,7 @@ from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import outcome_records
+from hpcclear.dynamics.evaluator import outcome_records, responses_told
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
@@ -87,9 +87,7 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
     )
     return (
         steps,
-        outcome_records(
-            labels, out, finished, bool(problem.effects.responses), bool(problem.effects.wear)
-        ),
+        outcome_records(labels, out, finished, responses_told(problem), bool(problem.effects.wear)),
         par[0],
     )
 
@@ -138,7 +136,9 @@ def _between(
         q[:, -1] += cycle * steps.revolution
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
     h = (steps.time[k + 1] - steps.time[k])[:, None]
-    s = (times - steps.time[k])[:, None] / h
+    s = (times - steps.time[k])[:, None] / np.where(
+        h > 0.0, h, 1.0
+    )  # the last of a motion that stalled
     d = q[k + 1] - q[k]
     v0, v1 = h * steps.v[k], h * steps.v[k + 1]
     a0, a1 = h * h * steps.a[k], h * h * steps.a[k + 1]
@@ -282,9 +282,7 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     lanes = ClosedForm(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(
-        *lanes.collect(), bool(problem.effects.responses), bool(problem.effects.wear)
-    )
+    record = outcome_records(*lanes.collect(), responses_told(problem), bool(problem.effects.wear))
     found = prescribed_series(scene) if scene.is_planar else ideal_series(scene)
     return *found, record
 

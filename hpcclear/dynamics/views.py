@@ -132,7 +132,10 @@ class Outcome(View):
     sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
     sliding_work = _of_joints(at.OUT_TOTAL + at.place(at.SLIDING_POWERS))  # J
     peak_moment = Column(at.OUT_MOMENT)  # N m
-    acceleration_deviation = Column(at.OUT_ACCELERATION)  # m/s^2
+    acceleration_deviation = Column(
+        at.OUT_ACCELERATION
+    )  # m/s^2, of the slider or of the followed point
+    peak_acceleration = Column(at.OUT_FOLLOWED)  # m/s^2, likewise
     moving = Column(slice(at.OUT_STATE, at.OUT))  # all places of coordinates and velocities
 
     def coordinates(self, n: int) -> Array:
@@ -224,4 +227,6 @@ class Rates(View):
     force = _of_joints(at.FORCE)  # N, normal
     friction = _of_joints(at.FRICTIONS)  # N
     drive_moment = Column(at.DRIVE_MOMENT)  # N m
+    followed_x = Column(at.FOLLOWED_ACCELERATION)  # m/s^2, of the followed point
+    followed_y = Column(at.FOLLOWED_ACROSS)
     powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load

@@ -315,6 +315,23 @@ class Planar(Table):
     joints: Annotated[tuple[PlanarJoint, ...], Rows]
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
     loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
+    followed: str | None = None
+    """``body.point`` whose acceleration and path responses tell of."""
+
+    @model_validator(mode="after")
+    def _followed_is_a_point(self) -> "Planar":
+        if self.followed is not None:
+            places = [
+                f"{body.name}.{point}" for body in self.bodies for point in names_of_points(body)
+            ]
+            if self.followed not in places:
+                raise invalid(
+                    "is no point of a body",
+                    nearest(self.followed, places),
+                    key="followed",
+                    value=self.followed,
+                )
+        return self
 
     @model_validator(mode="after")
     def _curves_repeat(self) -> "Planar":
@@ -355,6 +372,12 @@ def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
             value=row["like"],
         )
     return {**model, **{key: value for key, value in row.items() if key != "like"}}
+
+
+def names_of_points(body: PlanarBody) -> tuple[str, ...]:
+    """Points of a body; a bar has a and b besides those that are written."""
+    own = () if body.length is None else ("a", "b")
+    return (*own, *(point.name for point in body.points))
 
 
 def turns_of(planar: Planar) -> int:

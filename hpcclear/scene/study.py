@@ -35,6 +35,8 @@ class Study(Table):
         "peak-contact-force",
         "peak-crank-moment",
         "slider-acceleration-deviation",
+        "point-acceleration-deviation",
+        "peak-point-acceleration",
     ] = "mean-gap"
     """What the study makes small: eq. 13, or another response."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]

@@ -38,8 +38,8 @@ class On(NamedTuple):
     gravity: bool = False
     ledger: bool = False  # energies
     series: bool = False  # drive moment, for time series
-    responses: bool = False  # drive moment and the followed body's acceleration
-    follow: str = ""  # a guided body
+    responses: bool = False  # drive moment and what is followed
+    follow: str = ""  # a guided body, or body.point
 
 
 @dataclass(frozen=True)
@@ -328,10 +328,34 @@ class _Generator:
                 loss = loss + guide.force * guide.speed
             self._rate(at.DISSIPATION, loss)
             self._rate(at.LOAD_POWER, self.load_power)
-        if on.responses and on.follow:
+        if "." in on.follow:
+            self._follow_point(found)
+        elif on.responses and on.follow:
             k = self.number[Column("slide", on.follow)]
             self._rate(at.FOLLOWED_ACCELERATION, found[k])
             self._rate(at.FOLLOWED_SQUARE, found[k] * found[k])
+
+    def _follow_point(self, found: dict[int, Term]) -> None:
+        """Acceleration of the followed point along both axes, and its square."""
+        if not (self.on.series or self.on.responses):
+            return
+
+        def second(column: Column) -> Term:
+            term = found[self.number[column]] if column in self.number else ZERO
+            if column.kind == "y" and column.body in self.balance.falling:
+                return term - self.writer.parameter("gravity")
+            return term
+
+        kin = self.kinematics
+        x, y = (
+            self.writer.let(f"followed_{axis}", term)
+            for axis, term in zip(
+                "xy", kin.acceleration(kin.point(self.on.follow), second), strict=True
+            )
+        )
+        self._rate(at.FOLLOWED_ACCELERATION, x)
+        self._rate(at.FOLLOWED_ACROSS, y)
+        self._rate(at.FOLLOWED_SQUARE, x * x + y * y)
 
     def _drives(self) -> list[Drive]:
         main = self.mechanism.period

@@ -4,6 +4,7 @@ A point is a sum of vectors, each held in a rotating frame: what does not change
 has only products with the frames' angular velocities, and the mass matrix only cosines and sines of differences of angles.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import (
@@ -233,6 +234,25 @@ class Kinematics:
             spin = self.spin(frame)
             x, y = point.arms.get(frame, NOWHERE)
             found = plus(found, self.rotated(frame, (-(y * spin), x * spin)))
+        return found
+
+    def acceleration(self, point: Point, second: Callable[[Column], Term]) -> Vector:
+        """How its velocity changes; `second`: the acceleration of a coordinate, and of a frame that no drive turns."""
+        found = NOWHERE
+        for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
+            spin = self.spin(frame)
+            turn = self.turn(frame) if self.given(frame) else second(Column("angle", frame))
+            for move in point.moves:
+                if move.frame == frame and move.kind != "across":
+                    speed = named(self.speed_name((move.kind, move.body, "")))
+                    rate = second(Column(move.kind, move.body))
+                    x, y = move.direction
+                    twice = spin * speed + spin * speed  # Coriolis
+                    moved = (x * rate - y * twice, y * rate + x * twice)
+                    found = plus(found, self.rotated(frame, moved))
+            x, y = point.arms.get(frame, NOWHERE)
+            turned = (-(y * turn) - x * spin * spin, x * turn - y * spin * spin)
+            found = plus(found, self.rotated(frame, turned))
         return found
 
     def columns(self, point: Point) -> dict[Column, tuple[str, Vector]]:

@@ -31,7 +31,7 @@ class Linkage:
     cartesian : bool
         Every body by itself, with multipliers and feedback.
     follow : str
-        A guided body whose acceleration responses tell of; "" for none.
+        A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
 
     Raises
     ------
@@ -84,6 +84,11 @@ class Linkage:
     def forest(self) -> Forest:
         """Its trees and coordinates."""
         return forest(self.mechanism, self.cartesian)
+
+    @property
+    def follows_a_point(self) -> bool:
+        """Whether it is a point that responses tell of."""
+        return "." in self.follow
 
     @property
     def parameter_rows(self) -> int:

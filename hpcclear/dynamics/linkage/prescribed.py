@@ -76,6 +76,18 @@ def prescribed_motion(
             "Prescribe the angle of one body a degree of freedom, and give no joint clearance",
         )  # fmt: skip
     assembly = assemble(mechanism)
+    found, margin = passed_through(assembly, times)
+    return _reactions(assembly, np.asarray(times), found, gravity, margin, turned or {})
+
+
+def passed_through(assembly: Assembly, times: Array) -> tuple[Array, Array]:
+    """Coordinates and velocities (t, 2, n) at instants (t,) that rise from 0, and how far from a dead centre each is (t,).
+
+    Raises
+    ------
+    InputError
+        Where the mechanism comes to a dead centre.
+    """
     loops, q, here = assembly.loops, assembly.q, 0.0
     found = np.zeros((len(times), 2, loops.size))
     margin = np.zeros(len(times))
@@ -87,7 +99,7 @@ def prescribed_motion(
             here = time
         margin[row] = check_rank(loops, loops.at(q, v, time).jacobian, everything, time)
         found[row] = q, v
-    return _reactions(assembly, np.asarray(times), found, gravity, margin, turned or {})
+    return found, margin
 
 
 def _passed(

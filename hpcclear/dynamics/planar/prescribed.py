@@ -5,9 +5,10 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Revolute
+from hpcclear.dynamics.linkage.parts import Revolute, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
+from hpcclear.dynamics.planar.path import followed, rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
 from hpcclear.dynamics.planar.response import bodies_and_points
 from hpcclear.dynamics.planar.tables import curves_of
@@ -75,11 +76,21 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     )
     total = kinetic + potential
     speed = np.full_like(times, cycle / period)
-    pins = pins_of(scene)
+    pins, places = pins_of(scene), bodies_and_points(mechanism, pose)
+    acceleration = np.zeros(len(times), complex)
+    if tables.followed is not None:
+        k = [body.name for body in mechanism.bodies].index(split(tables.followed)[0])
+        columns = [forest.index(kind, mechanism.bodies[k].name) for kind in ("x", "y", "angle")]
+        still = np.zeros(len(times))
+        rows = np.array([still if column is None else found.a[:, column] for column in columns])
+        acceleration = rigid_acceleration(
+            mechanism, tables.followed, rows, pose.angle[k], pose.spin[k]
+        )
     return times, {
         "crank_angle": angle,
         "crank_speed": speed,
-        **bodies_and_points(mechanism, pose),
+        **places,
+        **followed(scene, angle, places, acceleration, play=False),
         "pin_force_x": np.array([found.holds[f"{pin}_x"] for pin in pins]).T,
         "pin_force_y": np.array([found.holds[f"{pin}_y"] for pin in pins]).T,
         "crank_moment": found.holds[f"{mechanism.period.name}_angle"],

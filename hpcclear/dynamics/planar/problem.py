@@ -50,12 +50,8 @@ def linkage_of(scene: Scene) -> Linkage:
     mechanism = mechanism_of(tables_of(shown))
     check_drives(mechanism)
     cartesian = scene.numerics.formulation == "baumgarte"
-    follow = guided(mechanism, cartesian)
-    if scene.objective.name == "slider-acceleration-deviation" and not follow:
-        raise InputError(
-            "study.objective", scene.objective.name, "no body slides along a line of the ground here",
-            'Take another objective, say "peak-contact-force"',
-        )  # fmt: skip
+    follow = tables_of(scene).followed or guided(mechanism, cartesian)
+    _check_followed(scene, follow)
     return Linkage(
         mechanism,
         follow=follow,
@@ -63,6 +59,22 @@ def linkage_of(scene: Scene) -> Linkage:
         friction=scene.effects.friction.law != "none",
         cartesian=cartesian,
     )
+
+
+def _check_followed(scene: Scene, follow: str) -> None:
+    """InputError where the objective is of something that is not followed."""
+    name, point = scene.objective.name, "." in follow
+    if name == "slider-acceleration-deviation" and (point or not follow):
+        raise InputError(
+            "study.objective", name,
+            "a point is followed here" if point else "no body slides along a line of the ground here",
+            'Take "point-acceleration-deviation"' if point else 'Take another one, say "peak-contact-force"',
+        )  # fmt: skip
+    if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
+        raise InputError(
+            "study.objective", name, "no point is followed",
+            'Name it: mechanism.followed = "body.point"',
+        )  # fmt: skip
 
 
 def guided(mechanism: Mechanism, cartesian: bool) -> str:

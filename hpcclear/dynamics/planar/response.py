@@ -9,6 +9,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.poses import Pose
+from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of, tables_of
 from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.scene import Scene
@@ -42,10 +43,13 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     driving, _, dissipated, load = seen.works.T
     total = kinetic + elastic + potential
     angle, speed = _turned(scene, linkage, par, seen)
+    places = bodies_and_points(mechanism, pose)
+    acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
     return {
         "crank_angle": angle,
         "crank_speed": speed,
-        **bodies_and_points(mechanism, pose),
+        **places,
+        **followed(scene, angle, places, acceleration),
         "eccentricity_x": eccentricity[:, 0].T,
         "eccentricity_y": eccentricity[:, 1].T,
         "penetration": np.maximum(gaps, 0.0) * active,

@@ -1,13 +1,13 @@
 """Steady means of a stream of designs: their procedures share the lanes."""
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
@@ -100,9 +100,9 @@ class SteadyEvaluator:
         self._asks: dict[int, _Ask] = {}
         contact = scene.effects.contact
         self._latched = contact is not None and contact.latched
-        self._free = scene.drive is not None and scene.drive.kind == "torque"
-        effects = self._lanes_of(1e-4, 1).problem.effects  # refuses what cannot be simulated
-        self._responses, self._worn = bool(effects.responses), bool(effects.wear)
+        problem = self._lanes_of(1e-4, 1).problem  # refuses what cannot be simulated
+        self._free = problem.effects.torque is not None
+        self._told, self._worn = responses_told(problem), bool(problem.effects.wear)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
         """The lanes for stretches of this kind."""
@@ -172,7 +172,7 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                yield record_of(sample, ask.par, mean, self._responses, self._worn)
+                yield record_of(sample, ask.par, mean, self._told, self._worn)
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)
@@ -185,7 +185,9 @@ def _labels(ask: _Ask) -> Integers:
     return ask.sample * _MOST_COPIES + np.arange(len(ask.stretch.start))
 
 
-def record_of(sample: int, par: Array, mean: Mean, responses: bool, worn: bool = False) -> Records:
+def record_of(
+    sample: int, par: Array, mean: Mean, told: Sequence[str] = (), worn: bool = False
+) -> Records:
     """What was found as a record (1,): means over stretches and copies, of the peaks too unless the motion is regular.
 
     Parameters
@@ -193,8 +195,10 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool, worn: bool =
     sample : int
     par : ndarray, shape (1, PARAMETERS)
     mean : Mean
-    responses, worn : bool
-        Whether further responses were asked for, and whether a joint wears.
+    told : sequence of str
+        Further responses, as of `responses_told`.
+    worn : bool
+        Whether a joint wears.
     """
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:
@@ -203,7 +207,7 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool, worn: bool =
         np.zeros(len(rows), np.int64),
         Outcome(rows),
         np.repeat(par, len(rows), axis=0),
-        responses,
+        told,
         worn,
     )
     record = each[:1].copy()
@@ -212,12 +216,15 @@ def record_of(sample: int, par: Array, mean: Mean, responses: bool, worn: bool =
         "peak_contact_force",
         "peak_crank_moment",
         "slider_acceleration_deviation",
+        "point_acceleration_deviation",
+        "peak_point_acceleration",
         "sliding_work",
     ):
         record[name] = each[name].mean(axis=0)
     if mean.stretch == 1:
         record["peak_contact_force"] = each["peak_contact_force"].max(axis=0)
-        record["peak_crank_moment"] = each["peak_crank_moment"].max()
+        for name in ("peak_crank_moment", "peak_point_acceleration"):
+            record[name] = each[name].max()
     record["sample"] = sample
     record["mean_gap"] = mean.gaps
     record["objective"] = objective(mean.gaps)

@@ -174,7 +174,7 @@ def measure(effects, r):
 
 @lane_function
 def commit_measures(effects, work, W):
-    """Integrals of what is measured besides the gaps, and the peak of the crank moment, after a step."""
+    """Integrals of what is measured besides the gaps, and the peaks of drive moment and followed acceleration, after a step."""
     for r in range(len(effects.measures)):
         rate = measure(effects, r)
         for i in range(W):
@@ -188,11 +188,14 @@ def commit_measures(effects, work, W):
 
 @lane_function
 def commit_peak(work, i, W):
-    """Peak of the crank moment after a step."""
+    """Peaks of the drive's moment and of the square of the followed acceleration after a step."""
     counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
     moment = abs(work[(at.RATE_NOW + at.DRIVE_MOMENT) * W + i])
     peak = max(work[at.PEAK_MOMENT * W + i], moment if counts else 0.0)
     work[at.PEAK_MOMENT * W + i] = peak
+    square = work[(at.RATE_NOW + at.FOLLOWED_SQUARE) * W + i]
+    peak = max(work[at.PEAK_FOLLOWED * W + i], square if counts else 0.0)
+    work[at.PEAK_FOLLOWED * W + i] = peak
 
 
 @lane_function

@@ -30,6 +30,7 @@ JOINTS = at.MAX_JOINTS
 RATES = len(at.INTEGRATED)
 ACCELERATION = at.place(at.FOLLOWED_ACCELERATION)
 SQUARE = at.place(at.FOLLOWED_SQUARE)
+ACROSS = at.place(at.FOLLOWED_ACROSS)
 
 
 @lane_event
@@ -107,7 +108,9 @@ def finish_averages(lane, W, work, book, out, slot, settings):
         out[slot, at.OUT_MOMENT] = work[at.PEAK_MOMENT * W + lane]
         mean = out[slot, at.OUT_MEAN + ACCELERATION]
         square = out[slot, at.OUT_MEAN + SQUARE]
-        out[slot, at.OUT_ACCELERATION] = math.sqrt(max(square - mean * mean, 0.0))
+        across = out[slot, at.OUT_MEAN + ACROSS]
+        out[slot, at.OUT_ACCELERATION] = math.sqrt(max(square - mean * mean - across * across, 0.0))
+        out[slot, at.OUT_FOLLOWED] = math.sqrt(work[at.PEAK_FOLLOWED * W + lane])
 
 
 @lane_event

@@ -1,0 +1,128 @@
+"""The followed point of a linkage: where it is, its acceleration, and how far play takes it off its path."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
+from hpcclear.dynamics.linkage.parts import (
+    Clearance,
+    ConstantSpeed,
+    Joint,
+    Revolute,
+    TorqueDrive,
+    split,
+)
+from hpcclear.dynamics.linkage.poses import placed
+from hpcclear.dynamics.linkage.prescribed import passed_through
+from hpcclear.dynamics.planar.problem import linkage_of, tables_of
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
+
+Path = Callable[[Array], Array]
+
+INSTANTS = 720
+"""Of a turn at which the linkage without play is put together; cubic between them, which is off by 1e-11 of its size."""
+
+
+def followed(
+    scene: Scene, angle: Array, points: Mapping[str, Array], acceleration: Array, play: bool = True
+) -> dict[str, Array]:
+    """Series of the followed point, none where none is followed: place, acceleration (t,) and `path_error`.
+
+    Parameters
+    ----------
+    scene : Scene
+    angle : ndarray, shape (t,)
+        By which the drive of the period has turned since the start, rad.
+    points : dict
+        ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
+    acceleration : ndarray of complex, shape (t,)
+        Of the point, x + iy.
+    play : bool
+        Whether there is any, or no path is off.
+    """
+    place, mechanism = tables_of(scene).followed, linkage_of(scene).mechanism
+    if place is None:
+        return {}
+    names = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
+    x, y = (points[f"point_{axis}"][:, names.index(place)] for axis in "xy")
+    found = {
+        "followed_x": x,
+        "followed_y": y,
+        "followed_acceleration_x": acceleration.real,
+        "followed_acceleration_y": acceleration.imag,
+    }
+    path = ideal_path(mechanism, place) if play else None
+    if path is not None:
+        cycle = at.TURN * turns_of(tables_of(scene))
+        ideal = path(np.mod(angle, cycle) / cycle)
+        found["path_error"] = np.abs(x + 1j * y - ideal)
+    return found
+
+
+def _path(ideal: Mechanism, place: str) -> Path:
+    from scipy.interpolate import CubicHermiteSpline  # a third of a second, for these alone
+
+    drive = ideal.period
+    share = np.linspace(0.0, 1.0, INSTANTS * getattr(drive, "turns", 1) + 1)
+    assembly = assemble(ideal)
+    times = share * drive.seconds
+    rows, _ = passed_through(assembly, times)
+    seen = [placed(replace(assembly, q=q, v=v), place)[:2] for q, v in rows]
+    where, speed = np.array(seen).T
+    path: Path = CubicHermiteSpline(share, where, speed * drive.seconds)
+    return path
+
+
+def rigid_acceleration(
+    mechanism: Mechanism, place: str, rows: Array, angle: Array, spin: Array
+) -> Array:
+    """Acceleration x + iy (t,) of a place of a body, m/s2.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    place : str
+    rows : ndarray, shape (3, t)
+        Accelerations of the body's mass centre and of its angle.
+    angle, spin : ndarray, shape (t,)
+        Of the body, rad and rad/s.
+    """
+    name, point = split(place)
+    body = mechanism.body(name)
+    arm = (complex(*body.points[point]) - complex(*body.center)) * np.exp(1j * angle)
+    found: Array = rows[0] + 1j * rows[1] + (1j * rows[2] - spin**2) * arm
+    return found
+
+
+def ideal_path(mechanism: Mechanism, place: str) -> Path | None:
+    """Where a place of the linkage is without any play: complex m of the share of a revolution (t,); None where its drives
+    leave something free then, or it cannot pass a dead centre."""
+    ideal = without_play(mechanism)
+    try:
+        return None if freedom(ideal) else _path(ideal, place)
+    except InputError:
+        return None
+
+
+def without_play(mechanism: Mechanism) -> Mechanism:
+    """The same with pins in place of clearances, and a drive of constant speed in place of a torque."""
+
+    def pin(joint: Joint) -> Joint:
+        if isinstance(joint, Clearance):
+            return Revolute(joint.name, joint.journal, joint.bearing)
+        return joint
+
+    drives = tuple(
+        ConstantSpeed(d.name, d.body, d.initial_speed, d.period, d.turns)
+        if isinstance(d, TorqueDrive)
+        else d
+        for d in mechanism.drives
+    )
+    return replace(mechanism, joints=tuple(map(pin, mechanism.joints)), drives=drives, loads=())
