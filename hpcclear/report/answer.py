@@ -57,11 +57,12 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     scatter = _scatter(files, best)
     return [
         Line("take", _named(best)),
-        Line("why", f"{labels.objective(verified)}: least mean + {SPAN:g} deviations of "
+        Line("why", f"{labels.objective(verified)}: least {_merit(ours)} of "
              f"{ours.sizes['design']} designs simulated, case {_case(best)}"),
         Line("its values", _values(best)),
         Line("true mean", _moment(best, "mean", original)),
         Line("true deviation", _moment(best, "deviation", original)),
+        *(Line("asked for", text) for text in _goals(best)),
         Line("as good as it", _alike(ours, best)),
         Line("on a bound", _bounds(best)),
         Line("theory", _left(files, best)),
@@ -93,6 +94,11 @@ def beside_original(verified: xr.Dataset) -> Iterator[tuple[str, list[tuple[str,
             (words, *(_against(one, designs[0], name) for one in designs))
             for words, name in _TOLD.items()
         ]
+        for name in _asked(designs[0]):
+            words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
+            lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
+        if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
+            lines.append(("constraints", *(_standing(text) or "none" for text in kept)))
         yield case, [*lines, ("held at", "", *(_bounds(one) for one in designs[1:]))]
 
 
@@ -101,13 +107,67 @@ def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
     if name not in one or not np.isfinite(float(one[name])):
         return "not known"
     value, stem = float(one[name]), name.removesuffix("_true")
-    text = labels.quantity(value, str(one[name].attrs["units"]))
+    unit = _unit(one, name)
+    text = labels.quantity(value, unit)
+    if not unit:  # a share or a formula
+        ends = [float(one[f"{stem}_{end}"]) for end in ("lower", "upper")]
+        return text if ends[0] == ends[1] else f"{text} ({ends[0]:.2g} to {ends[1]:.2g})"
     if f"{stem}_upper" in one and value:
         half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
         text += f" ±{abs(half / value):.2%}"
     if one["design"].item() == original["design"].item():
         return text
-    return f"{text} {value / float(original[name]) - 1.0:+.0%}"
+    before = float(original[name])
+    return f"{text} {value / before - 1.0:+.0%}" if before else text
+
+
+def _unit(one: xr.Dataset, name: str) -> str:
+    """Unit of a variable; of what a case makes small it stands beside it."""
+    own = f"{name.removesuffix('_true')}_unit"
+    return str(one[own].item()) if own in one else str(one[name].attrs["units"])
+
+
+_USUAL = ("mean of f", "deviation of f", "95th percentile of f")
+"""What is told of every design, whatever its case makes small."""
+
+
+def _asked(one: xr.Dataset) -> list[str]:
+    """What the case of a design makes small and is not told anyway: "first", "second"."""
+    return [
+        name
+        for name in ("first", "second")
+        if f"{name}_goal" in one and str(one[f"{name}_goal"].item()) not in _USUAL
+    ]
+
+
+def _goals(best: xr.Dataset) -> Iterator[str]:
+    """What the case of a design asks for beyond mean and deviation, with limits."""
+    names = ("first", "second") if "first_goal" in best and not _is_plain(best) else ()
+    for name in names:
+        value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
+        ends = [float(best[f"{name}_{end}"]) for end in ("lower", "upper")]
+        text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
+        if ends[0] < ends[1]:
+            text += f" ({' to '.join(labels.quantity(end, unit) for end in ends)})"
+        yield text
+    if "constraints" in best and str(best["constraints"].item()):
+        yield from str(best["constraints"].item()).split("; ")
+
+
+def _is_plain(one: xr.Dataset) -> bool:
+    """Whether its case makes mean and deviation small, within no constraints."""
+    if "first_goal" not in one:
+        return True
+    asked = tuple(str(one[f"{name}_goal"].item()) for name in ("first", "second"))
+    return asked == _USUAL[:2] and not str(one["constraints"].item())
+
+
+def _standing(text: str) -> str:
+    """How a design stands to all its constraints, in a word or three."""
+    for word in ("broken", "cannot be told", "kept"):
+        if any(part.endswith(f": {word}") for part in text.split("; ")):
+            return word
+    return ""
 
 
 def _ours(verified: xr.Dataset) -> xr.Dataset:
@@ -137,7 +197,21 @@ def _original(ours: xr.Dataset) -> xr.Dataset | None:
 
 
 def _judged(ours: xr.Dataset) -> np.ndarray:
-    return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
+    """What designs of a case are compared by: infinite for those that stand worse to its constraints than others do."""
+    if _is_plain(ours.isel(design=0)):
+        return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
+    order = ("", "kept", "cannot be told", "broken")
+    ranks = np.array([order.index(_standing(str(one))) for one in ours["constraints"].to_numpy()])
+    return np.where(ranks == ranks.min(), ours["first_true"].to_numpy(), np.inf)
+
+
+def _merit(ours: xr.Dataset) -> str:
+    """What `_judged` goes by, in words."""
+    first = ours.isel(design=0)
+    if _is_plain(first):
+        return f"mean + {SPAN:g} deviations"
+    words = str(first["first_goal"].item())
+    return f"{words} within the constraints," if str(first["constraints"].item()) else words
 
 
 def _named(best: xr.Dataset) -> str:

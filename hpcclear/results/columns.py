@@ -125,6 +125,18 @@ def _statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
     }
 
 
+def _goal(name: str) -> Columns:
+    """What a case makes small, where that is not mean and deviation: each design has that of its case."""
+    of = f"of what is made small, the {name}"
+    return {
+        f"{name}_goal": text(("design",), f"{of}: in words"),
+        f"{name}_unit": text(("design",), f"{of}: its unit, empty for none"),
+        f"{name}_true": number(("design",), "", f"{of}: by direct simulation"),
+        f"{name}_lower": number(("design",), "", f"{of}: lower confidence limit"),
+        f"{name}_upper": number(("design",), "", f"{of}: upper confidence limit"),
+    }
+
+
 # fmt: off
 RESPONSE: Columns = {
     "time": number(("time",), "s", "time since the start"),
@@ -249,6 +261,9 @@ FRONT: Columns = {
         "standard deviation of the objective, by the surrogate", required=True),
     "verified": flag(("case", "run", "solution"), "whether the solution was simulated directly"),
     "hypervolume": number(("case", "run"), "objective^2", "area that the front dominates"),
+    "searched": text(("case",), "what is made small, where that is not mean and deviation alone"),
+    "searched_first": number(("case", "run", "solution"), "", "the first of these, by the surrogate"),
+    "searched_second": number(("case", "run", "solution"), "", "the second of these, by the surrogate"),
 }
 
 VERIFICATION: Columns = {
@@ -271,6 +286,8 @@ VERIFICATION: Columns = {
     "percentile_upper": number(("design",), "objective", "upper confidence limit of the percentile"),
     "same_as": text(("design",), "design named before it that it cannot be told apart from, in mean and deviation"),
     "dominated": flag(("design",), "whether another design of its case is surely better in mean and deviation"),
+    **_goal("first"), **_goal("second"),
+    "constraints": text(("design",), "how it stands to the constraints of its case"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations whose penetration left the range of Hertz theory"),

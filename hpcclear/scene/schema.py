@@ -36,6 +36,19 @@ def scene_schema() -> dict[str, Any]:
     for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
                        ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
         entries[key] = {"type": "string", "description": words}
+    for name in ("Goal", "Constraint"):
+        entries = definitions[name]["properties"]
+        for key in {"limit", "most"} & entries.keys():
+            entries[key] = {**_NUMBER, "description": entries[key]["description"]}
+    one_word = {"enum": ["mean", "deviation", "quantile"]}  # an exceedance needs a limit
+    goals = {
+        "type": "array",
+        "items": {"anyOf": [one_word, {"$ref": "#/$defs/Goal"}]},
+        "minItems": 2,
+        "maxItems": 2,
+    }
+    entries = definitions["Case"]["properties"]
+    entries["objectives"] = {**goals, "description": entries["objectives"]["description"]}
     effects = definitions["Effects"]["properties"]
     for key in ("friction", "guide_friction"):  # one word switches them off
         entry = effects[key]

@@ -112,6 +112,10 @@ class MomentAccuracy(Table):
     """Of the mean."""
     deviation: Share = 0.005
     """Of the deviation."""
+    quantile: Share | None = None
+    """Of quantiles, where a case asks for one; default that of the deviation."""
+    exceedance: Share | None = None
+    """Of the probability of exceeding a limit, where a case asks for it: absolute; default 0.01."""
 
 
 SCRAMBLINGS = 16

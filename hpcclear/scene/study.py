@@ -7,10 +7,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
+from hpcclear.scene import goals
+from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
+from hpcclear.scene.formula import names_in
 from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
-from hpcclear.scene.variables import SHORT_NAMES, Case, RandomInput, Variable
+from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
 
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
 _LINK_NUMBERS = ("mass", "mass_center", "inertia")
@@ -58,8 +61,11 @@ class Study(Table):
         data = dict(data)
         cases, variables, random = data.get("cases"), data.get("variables"), data.get("random")
         if isinstance(cases, Mapping):
+            asked = data.get("objective", "mean-gap")
             data["cases"] = {
-                name: {"random": case} if isinstance(case, (list, tuple)) else case
+                name: {"random": case}
+                if isinstance(case, (list, tuple))
+                else goals.in_si(case, asked, f"cases.{name}")
                 for name, case in cases.items()
             }
         if isinstance(random, Mapping) and isinstance(variables, Mapping):
@@ -191,6 +197,20 @@ class Study(Table):
                     "Add a study variable, or give a half_width instead of a range",
                     key=f"cases.{case.name}",
                 )
+            self._check_goals(case)
+
+    def _check_goals(self, case: Case) -> None:
+        own = self.design_variables(case.name)
+        for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
+            for k, goal in enumerate(rows):
+                for name in () if goal.formula is None else names_in(goal.formula):
+                    if name not in own:
+                        raise invalid(
+                            f"{name!r} is no design variable of this case",
+                            nearest(name, own),
+                            key=f"cases.{case.name}.{table}.{k}.formula",
+                            value=goal.formula,
+                        )
 
     def _check_names(self) -> None:
         lists: list[tuple[str, Iterable[str]]] = [

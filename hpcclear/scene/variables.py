@@ -44,20 +44,22 @@ RESERVED = frozenset(
             *JUDGED,
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        *("searched", "searched_first", "searched_second", "constraints"),
     )
 )
 """Names of dimensions and results in the datasets."""
 
 _COMMON = ("name", "paths", "distribution")
 _SHAPE = Quantity("", least=1e-2, most=1e4)
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+"""What variables, random inputs and cases may be called."""
 Range = tuple[float, float]
 
 
 def _resolve_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
     """The paths a named row drives, from `paths`, `path` or its name."""
     name = data.get("name")
-    if not isinstance(name, str) or not _NAME.fullmatch(name) or name in RESERVED:
+    if not isinstance(name, str) or not NAME.fullmatch(name) or name in RESERVED:
         reason = "is taken by a result" if name in RESERVED else "is not a name"
         raise invalid(
             reason, "Use a letter, then letters, digits or _, and give the path as path = ..."
@@ -367,26 +369,3 @@ def _law(distribution: str, entries: Mapping[str, Any]) -> quantiles.Quantiles:
             ends = ends if "range" in entries else (middle - reach, middle + reach)
             return quantiles.beta(entries["shapes"], *ends)
     return quantiles.Normal(middle, entries["deviation"], reach)
-
-
-class Case(Table):
-    """One optimisation: which of the random inputs are random in it."""
-
-    name: str
-    random: tuple[str, ...]
-
-    @model_validator(mode="after")
-    def _named(self) -> "Case":
-        if not _NAME.fullmatch(self.name):  # it stands in names of files, figures and pages
-            raise invalid("is not a name", "Use a letter, then letters, digits or _", key="name")
-        return self
-
-    @model_validator(mode="after")
-    def _some_random(self) -> "Case":
-        if not self.random:
-            raise invalid(
-                "a case without random inputs has no deviation to minimise", "Name some", "random"
-            )
-        if len(set(self.random)) < len(self.random):
-            raise invalid("a random input is named twice", "Remove one", key="random")
-        return self

@@ -139,7 +139,7 @@ def _tell_the_story(run: StudyRun) -> None:
     surrogates.write(run, kriging)
     fronts = run.stage("optimisation", optimisation.optimise, model)
     ends, between = optimisation.extremes(run, fronts), optimisation.spread(run, fronts)
-    optimisation.write(run, fronts, [*ends, *between])
+    optimisation.write(run, fronts, [*ends, *between], model)
     finalists, remarks = refinement.search(run, [*ends, *between])
 
     designs = [*ends, *(finalists or between)]

@@ -1,8 +1,8 @@
 """Robust optimisation of each case: fronts of mean and deviation, alpha and beta (eqs. 19 to 23)."""
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import moocore
 import numpy as np
@@ -13,6 +13,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
+from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study
@@ -29,6 +30,7 @@ from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.study.goals import excess, guessed, names_of
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
 
@@ -37,7 +39,8 @@ PROBES = 64
 
 
 TOGETHER = 256
-"""Points of a Sobol sequence by which the surrogate is averaged over inputs that vary together."""
+"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, and for all that is not mean and
+deviation."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +56,33 @@ class Problem:
     objective : RobustObjective
         Mean and deviation of designs in SI.
     scene : Scene
+    case : Case
+    draws : mapping of str to array (s,)
+        Points of a Sobol sequence in the random inputs, for what is made small besides.
     """
 
     names: tuple[str, ...]
     region: Box
     objective: RobustObjective
     scene: Scene
+    case: Case
+    draws: Mapping[str, Array]
 
     def physical(self, coordinates: Array) -> Array:
         """Designs in SI, shape (n, d)."""
         return to_physical(self.scene, self.names, coordinates)
+
+    def searched(self, designs: Array) -> Array | tuple[Array, Array]:
+        """What the case makes small of designs in SI, (n, 2); with constraints, by how much these are broken besides, (n,)."""
+        if self.case.plain:
+            return self.objective(designs)
+        drawn = self.objective.sampled(designs, self.draws)
+        named = dict(zip(self.names, designs.T, strict=True))
+        asked = (*self.case.goals, *self.case.kept)
+        found = np.column_stack([guessed(goal, drawn, named) for goal in asked])
+        if not self.case.kept:
+            return found
+        return found[:, :2], np.maximum(excess(self.case.kept, found[:, 2:]), 0.0)
 
     def moments(self, designs: Array) -> Array:
         """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
@@ -119,7 +139,9 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
         draws=draws,
         joint=joint,
     )
-    return Problem(names, region, objective, scene)
+    rng = generator(study.seed, "goals", case)
+    points = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
+    return Problem(names, region, objective, scene, study.case(case), points)
 
 
 def _random_input(row: scene_variables.RandomInput) -> RandomVariable:
@@ -166,8 +188,8 @@ def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + 2): design coordinates, mean, deviation,
-        NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
+        For case number k ``front_k`` (runs, solutions, d + 2): design coordinates, and what the case makes
+        small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
     for index, case in enumerate(run.study.cases):
@@ -192,12 +214,29 @@ def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
 
 
 def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
-    settings = run.study.swarm
-
-    def function(coordinates: Array) -> Array:
+    def function(coordinates: Array) -> Array | tuple[Array, Array]:
         run.ranks.raise_if_stopped()
-        return problem.objective(problem.physical(coordinates))
+        return problem.searched(problem.physical(coordinates))
 
+    def nearest(coordinates: Array) -> Array:
+        """Where no design keeps the constraints: how much it breaks them, and the first goal."""
+        values, broken = function(coordinates)
+        return np.column_stack([broken, values[:, 0]])
+
+    front = _minimised(run, problem, function, rng)
+    if len(front.values):
+        return front
+    near = _minimised(run, problem, nearest, rng)
+    return replace(near, values=np.asarray(function(near.points)[0]))
+
+
+def _minimised(  # type: ignore[no-untyped-def]
+    run: StudyRun,
+    problem: Problem,
+    function: Callable[[Array], Array | tuple[Array, Array]],
+    rng: np.random.Generator,
+):
+    settings = run.study.swarm
     return minimise(
         function,
         np.column_stack([problem.region.lower, problem.region.upper]),
@@ -247,7 +286,7 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Designs of least mean and of least deviation of each case, by the surrogate.
+    """Designs with the least of either that a case makes small, by the surrogate: of least mean and of least deviation.
 
     Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
     average keeps the bounds; and the best single ones.
@@ -295,7 +334,9 @@ def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def write(run: StudyRun, fronts: Result, verified: Sequence[Choice]) -> None:
+def write(
+    run: StudyRun, fronts: Result, verified: Sequence[Choice], model: PiecewiseKriging
+) -> None:
     """Write front.nc: every run's front of every case, and which solutions were simulated."""
     cases = [case.name for case in run.study.cases]
     names = run.study.optimisation
@@ -306,13 +347,27 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice]) -> None:
         name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)
     }
     data["verified"] = np.zeros(shape, np.int8)
-    data["hypervolume"] = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])
+    plain = np.array([case.plain for case in run.study.cases])
+    area = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])
+    data["hypervolume"] = np.where(plain[:, None], area, np.nan)  # else it has another unit
+    if not plain.all():
+        unit = run.scene.objective.unit
+        data["searched"] = np.array([", ".join(names_of(case, unit)) for case in run.study.cases])
+        data |= {name: np.full(shape, np.nan) for name in ("searched_first", "searched_second")}
     for k, case in enumerate(cases):
         padded = fronts[f"front_{k}"]
         place = np.s_[k, :, : padded.shape[1]]
         data["mean"][place], data["deviation"][place] = padded[..., -2], padded[..., -1]
         own = run.study.design_variables(case)
         flat = to_physical(run.scene, own, padded[..., :-2].reshape(-1, len(own)))
+        if "searched" in data:
+            data["searched_first"][place], data["searched_second"][place] = (
+                padded[..., -2],
+                padded[..., -1],
+            )
+        if not run.study.case(case).plain:
+            found = problem_of(run.scene, case, model).moments(flat).reshape(*padded.shape[:2], 2)
+            data["mean"][place], data["deviation"][place] = found[..., 0], found[..., 1]
         for column, name in enumerate(own):
             data[name][place] = flat[:, column].reshape(padded.shape[:2])
     for choice in verified:

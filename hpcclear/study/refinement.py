@@ -21,6 +21,7 @@ from hpcclear.scene.study import Study
 from hpcclear.statistics.search.infill import proposals
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.study import truth
+from hpcclear.study.goals import excess, wanted
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
 
@@ -45,16 +46,23 @@ class Tried:
     coordinates : array, shape (n, d)
         Sampling coordinates.
     values : array, shape (n, 2)
-        Mean and deviation.
+        What its case makes small: mean and deviation, if nothing else is asked for.
+    excess : array, shape (n,)
+        By how much its constraints are broken (`hpcclear.study.goals.excess`).
     """
 
     names: tuple[str, ...]
     coordinates: Array
     values: Array
+    excess: Array
 
     def best(self) -> Array:
-        """Numbers of the designs that no other one dominates."""
-        rows = np.flatnonzero(np.isfinite(self.values).all(axis=1))
+        """Numbers of the designs that no other one dominates, of those that keep the constraints; if none does, of the one that
+        comes nearest."""
+        known = np.isfinite(self.values).all(axis=1) & ~np.isnan(self.excess)
+        if known.any():
+            known &= self.excess <= max(self.excess[known].min(), 0.0)
+        rows = np.flatnonzero(known)
         return rows[moocore.is_nondominated(self.values[rows])]
 
 
@@ -102,7 +110,7 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
         found = run.stage(stage, _go_on, going, stage)
         for name, before in going.items():
             tried[name] = _tried(run, name, found, before)
-            won[name].append(_won(run, before, tried[name]))
+            won[name].append(_won(run, name, before, tried[name]))
     remarks = [
         f"The search of {name} ended with its rounds while {rounds[-1]}; more "
         "study.verification.infill_rounds may still win."
@@ -151,7 +159,8 @@ def _go_on(run: StudyRun, tried: Mapping[str, Tried], stage: str) -> Result:
         bounds = np.column_stack([region.lower, region.upper])
         count, rng = run.study.verification.infill_designs, run.rng(stage, name)
         try:
-            where = proposals(one.coordinates, one.values, bounds, count, rng)
+            broken = one.excess if run.study.case(name).kept else None
+            where = proposals(one.coordinates, one.values, bounds, count, rng, broken)
         except InputError:  # too few designs that did not fail for a model
             unit = unit_lhs(count, len(one.names), rng)
             where = region.lower + unit * (region.upper - region.lower)
@@ -166,17 +175,24 @@ def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
 
 
 def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
-    """Cases, designs (NaN where a variable is none of the case's) and moments."""
+    """Cases, designs (NaN where a variable is none of the case's), what they make small, by how much they break constraints."""
     names = run.study.optimisation
     if not choices:
         nothing = np.empty((0, len(names)))
-        return {"case": np.array([], "U1"), "design": nothing, "values": np.empty((0, 2))}
+        none = {"values": np.empty((0, 2)), "excess": np.empty(0)}
+        return {"case": np.array([], "U1"), "design": nothing, **none}
     count = length(run.study)
     found = truth.sequences(run, choices, stage, "search", count, count * SCRAMBLINGS)
     return {
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
-        "values": np.column_stack([found["mean"], found["deviation"]]),
+        "values": found["goal"][:, :2],
+        "excess": np.array(
+            [
+                excess(kept := run.study.case(c.case).kept, row[None, 2 : 2 + len(kept)])[0]
+                for c, row in zip(choices, found["goal"], strict=True)
+            ]
+        ),
     }
 
 
@@ -188,17 +204,18 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
     coordinates = to_coordinates(run.scene, names, found["design"][rows][:, columns])
     region = box(run.scene, names)
     coordinates = np.clip(coordinates, region.lower, region.upper)  # round-off at the border
-    values = found["values"][rows]
+    values, broken = found["values"][rows], found["excess"][rows]
     if before is None:
-        return Tried(names, coordinates, values)
+        return Tried(names, coordinates, values, broken)
     return Tried(
         names,
         np.concatenate([before.coordinates, coordinates]),
         np.concatenate([before.values, values]),
+        np.concatenate([before.excess, broken]),
     )
 
 
-def _won(run: StudyRun, before: Tried, now: Tried) -> str:
+def _won(run: StudyRun, name: str, before: Tried, now: Tried) -> str:
     """What a round has won, in words; empty if nothing by more than the accuracy asked for.
 
     Designs that only stand between those of the earlier front count for nothing.
@@ -206,15 +223,28 @@ def _won(run: StudyRun, before: Tried, now: Tried) -> str:
     old, new = (one.values[one.best()] for one in (before, now))
     if not (len(old) and len(new)):
         return "no design had moments"
-    wanted = run.study.verification.accuracy
-    gains = 1.0 - new / old[:, None]  # of each design of the earlier front by each of the new one
-    counts = gains > (wanted.mean, wanted.deviation)
-    for column, name in enumerate(("mean", "deviation")):
-        gain = 1.0 - new[:, column].min() / old[:, column].min()
-        if gain > getattr(wanted, name):
-            return f"the last one still lowered the least {name} by {gain:.1%}"
-    moved = int((counts.any(axis=2) & (gains >= 0.0).all(axis=2)).any(axis=1).sum())
+    broken = before.excess[before.best()].min()
+    if broken > 0.0 and now.excess[now.best()].min() < broken:
+        return "the last one still came nearer to the constraints"
+    case, accuracy = run.study.case(name), run.study.verification.accuracy
+    shares, relative = zip(*(wanted(goal, accuracy) for goal in case.goals), strict=True)
+    gains = _gains(old, new, relative)
+    counts = np.asarray(gains > np.array(shares))
+    for column, goal in enumerate(case.goals):
+        gain = _gains(old.min(axis=0)[None], new.min(axis=0)[None], relative)[0, 0, column]
+        if gain > shares[column]:
+            words = goal.words(run.scene.objective.unit).removesuffix(" of f")
+            return f"the last one still lowered the least {words} by {gain:.1%}"
+    better = np.any(counts, axis=2) & np.all(gains >= 0.0, axis=2)
+    moved = int(np.any(better, axis=1).sum())
     return f"the last one still dominated {moved} of {len(old)} designs" if moved else ""
+
+
+def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
+    """What each new design wins over each old one, (old, new, 2): relative, or as it is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.sign(old[:, None]) * (1.0 - new / old[:, None])
+    return np.asarray(np.where(relative, shares, old[:, None] - new))
 
 
 def _finalists(run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice]) -> list[Choice]:

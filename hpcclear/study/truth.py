@@ -10,6 +10,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import SCRAMBLINGS, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student
+from hpcclear.study import goals
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -56,7 +57,8 @@ def simulate(
     dict of arrays over the designs
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``samples``, ``failed``, ``beyond_hertz``.
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
+        then what it keeps below a limit, NaN beyond; ``samples``, ``failed``, ``beyond_hertz``.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def simulate(
     """
     settings = run.study.verification
     if settings.draws is not None:
-        return _told(settings, _values(run, choices, stage, purpose, settings.draws, None))
+        return _told(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
     return sequences(run, choices, stage, purpose, first_length(settings), settings.most_samples)
 
 
@@ -87,7 +89,6 @@ def sequences(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
 ) -> Result:
     """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
-    settings = run.study.verification
     made = [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
     rows = list(range(len(choices)))
     while rows:
@@ -98,8 +99,8 @@ def sequences(
         length = first + length  # a sequence is balanced at powers of two
         if 2 * length * SCRAMBLINGS > most:
             break
-        rows = [k for k in rows if not _accurate(settings, made[k][0])]
-    return _told(settings, made)
+        rows = [k for k in rows if not _accurate(run, choices[k], made[k][0])]
+    return _told(run, choices, made)
 
 
 def _values(
@@ -137,19 +138,38 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
     )  # type: ignore[return-value]
 
 
-def _accurate(settings: Verification, values: Array) -> bool:
-    """Whether both limits are as narrow as asked for; a deviation of nothing but round-off is."""
+def _accurate(run: StudyRun, choice: Choice, values: Array) -> bool:
+    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is."""
+    settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
     wanted = settings.accuracy
     good = reach[0] <= wanted.mean * abs(mean)
-    return bool(good and reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean)))
+    good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
+    if good and not case.plain:
+        good = all(
+            goals.accurate(goal, one, wanted)
+            for goal, one in zip(
+                (*case.goals, *case.kept), _goals(run, choice, values), strict=True
+            )
+            if goal.statistic in ("quantile", "exceedance")
+        )
+    return bool(good)
 
 
-def _told(settings: Verification, made: Sequence[Array]) -> Result:
+def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
+    """What a design comes to in all that its case asks."""
+    case, level = run.study.case(choice.case), run.study.verification.confidence
+    asked = (*case.goals, *case.kept)
+    return [goals.told(goal, values, choice.design, level) for goal in asked]
+
+
+def _told(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
     """All that is told of designs from their objectives."""
+    settings = run.study.verification
+    most = max(2 + len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
-    for values, beyond in made:
+    for choice, (values, beyond) in zip(choices, made, strict=True):
         row: dict[str, object] = {
             "samples": values.size,
             "failed": int(np.isnan(values).sum()),
@@ -159,7 +179,15 @@ def _told(settings: Verification, made: Sequence[Array]) -> Result:
         for name, one, reach in zip(("mean", "deviation"), moments(values), reaches, strict=True):
             row |= {name: one.value, f"{name}_error": one.error, f"{name}_reach": reach}
             row[f"{name}_shifts"] = one.shifts
-        ends = quantile(values, QUANTILE, settings.confidence)
-        row |= dict(zip(("percentile", "percentile_lower", "percentile_upper"), ends, strict=True))
+        found = quantile(values, QUANTILE, settings.confidence)
+        row |= {"percentile": found.value, "percentile_lower": found.lower}
+        row["percentile_upper"] = found.upper
+        told = _goals(run, choice, values)
+        missing = [np.nan] * (most - len(told))
+        row["goal"] = [one.value for one in told] + missing
+        row["goal_lower"] = [one.lower for one in told] + missing
+        row["goal_upper"] = [one.upper for one in told] + missing
+        nothing = np.full(len(values), np.nan)
+        row["goal_shifts"] = [one.shifts for one in told] + [nothing] * len(missing)
         rows.append(row)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}

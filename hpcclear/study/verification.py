@@ -7,9 +7,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
+from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.study.goals import excess
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
 
@@ -75,7 +77,7 @@ class Table:
     same_as : list of str
         The first design before it that it cannot be told apart from; empty if there is none.
     dominated : list of bool
-        Whether another design of its case is surely better in mean and deviation.
+        Whether another design of its case is surely better in both that the case makes small.
     """
 
     choices: list[Choice]
@@ -87,9 +89,10 @@ class Table:
 def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     """Verified designs under the names that they have earned.
 
-    Alpha has the least mean, beta the least deviation; of those that cannot be told from it at the study's
+    Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
+    nothing else is asked for; of those that cannot be told from it at the study's
     confidence, the best in the other. Each design of the front is surely better than each
-    other in one of the two.
+    other in one of the two. Designs that break a constraint are none of these, unless all do.
     """
     table = Table([], [], [], [])
     for case in run.study.cases:
@@ -106,10 +109,13 @@ def _name_case(
     true: Result,
     table: Table,
 ) -> None:
-    values = np.column_stack([true["mean"][rows], true["deviation"][rows]])
-    shifts = np.stack([true["mean_shifts"][rows], true["deviation_shifts"][rows]])
+    values = true["goal"][rows, :2]
+    shifts = np.moveaxis(true["goal_shifts"][rows, :2], 1, 0)
     everything = Compared(values, shifts, run.study.verification.confidence)
+    kept = run.study.case(case).kept
+    keeps = excess(kept, true["goal"][rows, 2 : 2 + len(kept)]) <= 0.0
     ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
+    ours = [k for k in ours if keeps[k]] or ours
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
     ends = [ours[mine.best(0)], ours[mine.best(1)]] if mine.known.any() else ours[:1] * 2
     front = mine.front(run.study.verification.designs + 2) if mine.known.any() else []
@@ -145,6 +151,41 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
         abs(place) < ON_BOUND, "lower", np.where(abs(place - 1) < ON_BOUND, "upper", "")
     )
     return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
+
+
+_ORDINALS = ("first", "second")
+
+
+def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
+    """What cases make small and keep, with limits, in words and numbers; empty where all ask for mean and deviation."""
+    if all(case.plain for case in run.study.cases):
+        return {}
+    unit, data = run.scene.objective.unit, {}
+    cases = [run.study.case(choice.case) for choice in table.choices]
+    for column, name in enumerate(_ORDINALS):
+        data[f"{name}_goal"] = np.array([case.goals[column].words(unit) for case in cases])
+        data[f"{name}_unit"] = np.array([case.goals[column].unit(unit) for case in cases])
+        data[f"{name}_true"] = true["goal"][:, column]
+        data[f"{name}_lower"] = true["goal_lower"][:, column]
+        data[f"{name}_upper"] = true["goal_upper"][:, column]
+    data["constraints"] = np.array(
+        [_kept(case, unit, *rows) for case, rows in zip(cases, _limits(true), strict=True)]
+    )
+    return data
+
+
+def _limits(true: Result) -> list[tuple[Array, Array, Array]]:
+    """Values and limits of constraints, a tuple a design."""
+    return list(zip(*(true[f"goal{end}"][:, 2:] for end in ("", "_lower", "_upper")), strict=True))
+
+
+def _kept(case: Case, unit: str, values: Array, lower: Array, upper: Array) -> str:
+    """How a design stands to its constraints: "share with f above 0.0003 m 0.012 at most 0.05: kept"."""
+    texts = []
+    for goal, value, low, high in zip(case.kept, values, lower, upper, strict=False):
+        surely = "kept" if high <= goal.most else "broken" if low > goal.most else "cannot be told"
+        texts.append(f"{goal.words(unit)} {value:.4g} at most {goal.most:g}: {surely}")
+    return "; ".join(texts)
 
 
 def write(
@@ -193,11 +234,18 @@ def write(
     data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
     data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])
+    data |= _goals(run, table, true)
     units = {name: study.variable(name).unit or "1" for name in used}
     coords = {"design": np.array([choice.name for choice in choices])}
     content = dataset.dataset(
         "verification", coords, data, None, units, run.scene.objective, run.words
     )
+    if "first_goal" in content:
+        both = f"{content['first_goal'].item(0)} and {content['second_goal'].item(0)}"
+        both = "what its case makes small" if len(study.cases) > 1 else both
+        for name in ("same_as", "dominated"):
+            words = content[name].attrs["long_name"].replace("mean and deviation", both)
+            content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"
     content.attrs["remarks"] = " ".join(remarks) if remarks else "none"

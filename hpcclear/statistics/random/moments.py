@@ -158,6 +158,17 @@ class RobustObjective:
         spread = (share * (variance + (mean - total) ** 2)).sum(axis=0)
         return np.stack([total, np.sqrt(spread)], axis=1)
 
+    def sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The surrogate at given draws of the random inputs, (s,) each: ``(n, s)``.
+
+        Raises
+        ------
+        InputError
+            As on a call.
+        """
+        rows = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
+        return self._sampled(self._checked(designs), rows)
+
     def monte_carlo(
         self, designs: np.ndarray, samples: int, rng: np.random.Generator
     ) -> SampledMoments:

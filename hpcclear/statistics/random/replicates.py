@@ -1,4 +1,4 @@
-"""Mean, deviation and a quantile from independent replicates, with confidence limits.
+"""Mean, deviation, quantiles and probabilities from independent replicates, with confidence limits.
 
 A replicate is one scrambling of a Sobol sequence, or one draw of plain Monte Carlo: what differs
 between replicates is all that is known about the error, whatever is inside them. So one
@@ -8,13 +8,15 @@ Sources: A. B. Owen, "Monte Carlo variance of scrambled net quadrature", SIAM J.
 (1997), doi:10.1137/S0036142994277468; P. L'Ecuyer and C. Lemieux, "Recent advances in randomized
 quasi-Monte Carlo methods" (2002), doi:10.1007/0-306-48102-2_20; for the quantile R. S. Woodruff,
 "Confidence intervals for medians and other position measures", J. Amer. Stat. Assoc. 47 (1952),
-doi:10.1080/01621459.1952.10483443.
+doi:10.1080/01621459.1952.10483443, and R. R. Bahadur, "A note on quantiles in large samples", Ann. Math. Stat. 37 (1966),
+doi:10.1214/aoms/1177699450; for the probability E. L. Korn and B. I. Graubard, "Confidence intervals for proportions with small
+expected number of positive counts estimated from survey data", Survey Methodology 24 (1998), 193-201.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import betaincinv, stdtrit
 
 from hpcclear.base.arrays import Array, Booleans
 
@@ -99,7 +101,21 @@ def _shifts(sums: Array, counts: Array) -> Array:
     return np.where(counts > 0, sums / counts[counts > 0].mean(), np.nan)
 
 
-def quantile(values: Array, order: float, confidence: float) -> tuple[float, float, float]:
+@dataclass(frozen=True)
+class Limited(Estimate):
+    """An estimate whose limits are not symmetric.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Confidence limits; NaN where the sample does not reach that far.
+    """
+
+    lower: float
+    upper: float
+
+
+def quantile(values: Array, order: float, confidence: float) -> Limited:
     """A quantile and its limits: those of its order, turned back into values (Woodruff).
 
     Parameters
@@ -113,13 +129,14 @@ def quantile(values: Array, order: float, confidence: float) -> tuple[float, flo
 
     Returns
     -------
-    (float, float, float)
-        Value, lower and upper limit; NaN where the sample does not reach that far.
+    Limited
+        Its shifts are those of the order times the slope of the quantile function between the limits (Bahadur); all NaN where
+        fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
     if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
-        return np.nan, np.nan, np.nan
+        return Limited(np.nan, np.full(len(values), np.nan), np.nan, np.nan)
     ranked = np.sort(values[known])
     total = len(ranked)
     value = float(np.quantile(ranked, order, method="hazen"))
@@ -130,7 +147,45 @@ def quantile(values: Array, order: float, confidence: float) -> tuple[float, flo
     places = np.arange(total) + 0.5
     ends = np.array([order - reach, order + reach]) * total
     lower, upper = np.interp(ends, places, ranked, left=np.nan, right=np.nan)
-    return value, float(lower), float(upper)
+    low, high = np.clip(ends, places[0], places[-1])
+    slope = float(np.diff(np.interp([low, high], places, ranked))[0] / (high - low)) * total
+    return Limited(value, -slope * shifts, float(lower), float(upper))
+
+
+def exceedance(values: Array, limit: float, confidence: float) -> Limited:
+    """Probability of lying above `limit`; its limits are those of as many independent draws as have its error (Korn, Graubard).
+
+    Parameters
+    ----------
+    values : array, shape (r, s)
+        As in `moments`.
+    limit : float
+    confidence : float
+        Level of the limits.
+
+    Returns
+    -------
+    Limited
+        Within [0, 1]; all NaN where fewer than `FEWEST` values or replicates are left.
+    """
+    known = np.isfinite(values)
+    counts = known.sum(axis=1)
+    if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
+        return Limited(np.nan, np.full(len(values), np.nan), np.nan, np.nan)
+    above = (known & (values > limit)).sum(axis=1)
+    total = int(counts.sum())
+    share = float(above.sum() / total)
+    shifts = _shifts(above - counts * share, counts)
+    error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
+    # as many independent draws, fewer for an error of few degrees of freedom
+    worth = (
+        stdtrit(total - 1, 0.5 + confidence / 2) / student(confidence, int((counts > 0).sum()) - 1)
+    ) ** 2
+    draws = share * (1.0 - share) / error**2 * worth if 0.0 < share < 1.0 else float(total)
+    hits, tail = share * draws, (1.0 - confidence) / 2.0
+    lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0
+    upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if share < 1.0 else 1.0
+    return Limited(share, shifts, lower, upper)
 
 
 def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:

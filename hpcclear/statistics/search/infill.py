@@ -65,7 +65,12 @@ class TwoScales:
 
 
 def proposals(
-    designs: Array, values: Array, bounds: Array, count: int, rng: np.random.Generator
+    designs: Array,
+    values: Array,
+    bounds: Array,
+    count: int,
+    rng: np.random.Generator,
+    excess: Array | None = None,
 ) -> Array:
     """Designs to evaluate next, at most `count`, shape (k, d).
 
@@ -79,6 +84,8 @@ def proposals(
     count : int
     rng : Generator
         Advanced.
+    excess : array, shape (n,), optional
+        By how much each breaks the constraints, at most 0 where it keeps them; NaN where it failed.
 
     Raises
     ------
@@ -88,39 +95,61 @@ def proposals(
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     with threadpool_limits(limits=1, user_api="blas"):  # as in the fit: the same bits, and faster
-        models = [TwoScales(designs, values[:, j], bounds, rng) for j in range(values.shape[1])]
+        table = values if excess is None else np.column_stack([values, excess])
+        models = [TwoScales(designs, column, bounds, rng) for column in table.T]
         fronts = [
             minimise(
-                _believed(models, boldness),
+                _believed(models, boldness, values.shape[1]),
                 bounds,
                 iterations=ITERATIONS,
                 rng=rng,
                 size=PARTICLES,
                 settings=SwarmSettings(particles=PARTICLES),
-                start=_best(designs, values, PARTICLES // 2),
+                start=_best(designs, values, PARTICLES // 2, excess),
             ).points
             for boldness in BOLD
         ]
+        fronts = [
+            front for front in fronts if len(front)
+        ]  # none where nothing keeps the constraints
+    if not fronts:
+        assert excess is not None  # only constraints leave a front without designs
+        return _chosen(designs[:0], _nearer(designs, excess, bounds, rng), designs, bounds, count)
     ends = np.concatenate([front[[0, -1]] for front in fronts])  # by rising first objective
     return _chosen(ends, np.concatenate(fronts), designs, bounds, count)
 
 
-def _best(designs: Array, values: Array, count: int) -> Array:
-    """Designs with the least sum of both objectives, each in units of its deviation."""
+def _nearer(
+    designs: Array, excess: Array, bounds: Array, rng: np.random.Generator, count: int = 64
+) -> Array:
+    """Designs about the one that comes nearest to the constraints, a tenth of each range off it."""
+    width = bounds[:, 1] - bounds[:, 0]
+    steps = 0.1 * width * rng.standard_normal((count, len(width)))
+    return np.clip(designs[np.nanargmin(excess)] + steps, bounds[:, 0], bounds[:, 1])
+
+
+def _best(designs: Array, values: Array, count: int, excess: Array | None) -> Array:
+    """Designs with the least sum of both objectives, each in units of its deviation; those that keep the constraints first."""
     scale = np.nanstd(values, axis=0)
     merit = (values / np.where(scale > 0.0, scale, 1.0)).sum(axis=1)
+    if excess is not None:
+        merit = np.where(excess <= 0.0, merit, np.nanmax(merit) + 1.0 + excess)
     return designs[np.argsort(merit, kind="stable")[:count]]  # NaN comes last
 
 
-def _believed(models: Sequence[TwoScales], boldness: float) -> Callable[[Array], Array]:
-    """Objectives as the models see them, less `boldness` standard deviations."""
+def _believed(
+    models: Sequence[TwoScales], boldness: float, objectives: int
+) -> Callable[[Array], Array | tuple[Array, Array]]:
+    """Objectives as the models see them, less `boldness` standard deviations; with more models than objectives, what the last
+    says of constraints besides."""
 
-    def function(points: Array) -> Array:
+    def function(points: Array) -> Array | tuple[Array, Array]:
         means = [model.predict(points) for model in models]
         if boldness:
             reach = [boldness * np.sqrt(model.variance(points)) for model in models]
             means = [mean - off for mean, off in zip(means, reach, strict=True)]
-        return np.stack(means, axis=1)
+        found = np.stack(means[:objectives], axis=1)
+        return found if len(means) == objectives else (found, np.maximum(means[-1], 0.0))
 
     return function
 

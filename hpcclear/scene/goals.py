@@ -1,0 +1,114 @@
+"""What a case asks of a design: statistics of f over its random inputs, or a formula, made small or kept below a limit."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import model_validator
+from pydantic_core import PydanticCustomError
+
+from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.scene.fields import Quantity, Table, invalid
+from hpcclear.scene.formula import FormulaError, names_in
+
+Level = Annotated[float, Quantity("", above=0, below=1)]
+
+
+class Goal(Table):
+    """A statistic of f over the random inputs of a case, or a formula of its design variables."""
+
+    statistic: Literal["mean", "deviation", "quantile", "exceedance"] | None = None
+    """Of f: its mean, its standard deviation, the value that a share `level` of all machines stays below, or the share of them
+    beyond `limit`."""
+    formula: str | None = None
+    """In place of a statistic: numbers, design variables (SI, as designed) and + - * / **, such as "m2 + m3"."""
+    level: Level | None = None
+    """Of "quantile": the share that stays below; default 0.95."""
+    limit: float | None = None
+    """Of "exceedance": the value of f, SI."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Goal":
+        if (self.statistic is None) == (self.formula is None):
+            raise invalid(
+                "either a statistic or a formula is expected here", 'Write statistic = "mean", say'
+            )
+        if self.formula is not None:
+            try:
+                names_in(self.formula)
+            except FormulaError as error:
+                raise invalid(
+                    str(error), "Write, say, m2 + m3", "formula", self.formula[:80]
+                ) from None
+        if self.statistic == "exceedance" and self.limit is None:
+            raise invalid("what is exceeded is not said", "Add limit, a value of f", "limit", None)
+        for key, owner in (("level", "quantile"), ("limit", "exceedance")):
+            if getattr(self, key) is not None and self.statistic != owner:
+                raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
+        return self
+
+    @property
+    def order(self) -> float:
+        """Of a quantile: the share that stays below."""
+        return 0.95 if self.level is None else self.level
+
+    def words(self, unit: str) -> str:
+        """What it is, for people: "95th percentile of f", "share with f above 0.3 mm" by the `unit` of f."""
+        if self.formula is not None:
+            return self.formula
+        if self.statistic == "quantile":
+            return f"{100 * self.order:g}th percentile of f"
+        if self.statistic == "exceedance":
+            return f"share with f above {self.limit:g} {unit}"
+        return f"{self.statistic} of f"
+
+    def unit(self, unit: str) -> str:
+        """Its unit, "" for none known, by the `unit` of f."""
+        return unit if self.statistic in ("mean", "deviation", "quantile") else ""
+
+
+class Constraint(Goal):
+    """What a design must keep to."""
+
+    most: float
+    """The largest value that is allowed, SI; a share for "exceedance"."""
+
+
+MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
+
+
+def in_si(case: Any, objective: object, key: str) -> Any:
+    """A case's row with words as goals, and `limit` and `most` in SI by the unit of the study's objective.
+
+    Raises
+    ------
+    PydanticCustomError
+        A limit is no number of that unit; its key begins with `key`.
+    """
+    if not isinstance(case, Mapping):
+        return case
+    found = OBJECTIVES.get(objective) if isinstance(objective, str) else None
+    unit = "" if found is None else found.unit
+    made = dict(case)
+    for table in ("objectives", "constraints"):
+        if isinstance(rows := made.get(table), (list, tuple)):
+            made[table] = [_goal(row, unit, f"{key}.{table}.{k}") for k, row in enumerate(rows)]
+    return made
+
+
+def _goal(row: Any, unit: str, key: str) -> Any:
+    if isinstance(row, str):
+        return {"statistic": row}
+    if not isinstance(row, Mapping):
+        return row
+    made = dict(row)
+    own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
+    for name, its in (("limit", unit), ("most", own)):
+        if name in made:
+            try:
+                made[name] = Quantity(its).convert(made[name])
+            except PydanticCustomError as error:
+                context = error.context or {}
+                raise invalid(
+                    context["reason"], context["remedy"], f"{key}.{name}", made[name]
+                ) from None
+    return made

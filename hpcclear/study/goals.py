@@ -1,0 +1,101 @@
+"""What a case asks of its designs: told from simulations, with limits, and guessed by the surrogate."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from hpcclear.base.arrays import Array
+from hpcclear.scene.cases import Case
+from hpcclear.scene.formula import value_of
+from hpcclear.scene.goals import Constraint, Goal
+from hpcclear.scene.stages import MomentAccuracy
+from hpcclear.statistics.random import replicates
+from hpcclear.statistics.random.replicates import Estimate, student
+
+SMOOTH = 0.1
+"""Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
+
+    value: float
+    lower: float
+    upper: float
+    shifts: Array
+
+
+def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: float) -> Told:
+    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
+    if goal.formula is not None:
+        value = float(value_of(goal.formula, design))
+        return Told(value, value, value, np.zeros(len(values)))
+    if goal.statistic == "quantile":
+        found = replicates.quantile(values, goal.order, confidence)
+    elif goal.statistic == "exceedance":
+        assert goal.limit is not None  # by validation
+        found = replicates.exceedance(values, goal.limit, confidence)
+    else:
+        mean, deviation = replicates.moments(values)
+        return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
+    return Told(found.value, found.lower, found.upper, found.shifts)
+
+
+def _symmetric(one: Estimate, confidence: float) -> Told:
+    reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
+    return Told(one.value, one.value - reach, one.value + reach, one.shifts)
+
+
+def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
+    """Half-width of its limits that is asked for, and whether it is relative; a formula is known."""
+    if goal.statistic == "mean":
+        return accuracy.mean, True
+    if goal.statistic == "deviation":
+        return accuracy.deviation, True
+    if goal.statistic == "quantile":
+        return accuracy.quantile or accuracy.deviation, True
+    if goal.statistic == "exceedance":
+        return accuracy.exceedance or 0.01, False
+    return 1e-6, True
+
+
+def accurate(goal: Goal, one: Told, accuracy: MomentAccuracy) -> bool:
+    """Whether its limits are as narrow as asked for."""
+    share, relative = wanted(goal, accuracy)
+    half = (one.upper - one.lower) / 2.0
+    return bool(half <= share * (abs(one.value) if relative else 1.0))
+
+
+def excess(kept: Sequence[Constraint], values: Array) -> Array:
+    """By how much constraints are broken, relative to their limits, the worst of them; (n, constraints) to (n,).
+
+    At most 0 where all are kept, NaN where one is not known, -inf without any.
+    """
+    if not kept:
+        return np.full(len(values), -np.inf)
+    most = np.array([one.most for one in kept])
+    return np.asarray(((values - most) / np.where(most != 0.0, abs(most), 1.0)).max(axis=1))
+
+
+def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
+    """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
+    if goal.formula is not None:
+        return np.broadcast_to(value_of(goal.formula, designs), len(drawn))
+    if goal.statistic == "mean":
+        return np.asarray(drawn.mean(axis=1))
+    if goal.statistic == "deviation":
+        return np.asarray(drawn.std(axis=1))
+    if goal.statistic == "quantile":
+        return np.asarray(np.quantile(drawn, goal.order, axis=1, method="hazen"))
+    assert goal.limit is not None  # by validation
+    width = SMOOTH * drawn.std(axis=1, keepdims=True) + 1e-300
+    return np.asarray(ndtr((drawn - goal.limit) / width).mean(axis=1))
+
+
+def names_of(case: Case, unit: str) -> tuple[str, str]:
+    """Both goals of a case in words, by the unit of f."""
+    first, second = (goal.words(unit) for goal in case.goals)
+    return first, second
