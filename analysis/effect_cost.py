@@ -69,6 +69,11 @@ PAIRS = [
     ),
     added("guide friction", "effects.guide_friction={coefficient=0.1}"),
     added("baumgarte formulation", "numerics.formulation='baumgarte'"),
+    added(
+        "wear of both joints",
+        "joints.crank_rod.wear={length=0.02, bearing={coefficient=1e-15}}",
+        "joints.rod_slider.wear={length=0.02, bearing={coefficient=1e-15}}",
+    ),
     added("energies", "numerics.energy=true"),
     added("further responses", "numerics.responses=true"),
 ]

@@ -1,10 +1,11 @@
 """Jumps against runs without any: clearances of random lives after many revolutions, what jumps cost, whether errors are held.
 
-    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40] [--chunk 10] [--truth FILE.npz]
+    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40] [--chunk 10] [--truth FILE.npz] [-o FIGURE]
 
 Without jumps every life runs on from where it is, and after every chunk of revolutions its clearances grow by what these wore.
 Wear coefficients are larger than those of jobs/wear.toml by as much as lives are shorter, so that clearances grow alike.
-The run without jumps is kept in FILE, if one is named, and taken from there another time.
+The run without jumps is kept in FILE, if one is named, and taken from there another time. FIGURE shows what errors of jumps
+cost: processor time against the error of the clearance, by the tolerance of a jump.
 """
 
 import argparse
@@ -21,9 +22,12 @@ from hpcclear.dynamics.views import Start
 from hpcclear.dynamics.wear.law import joints_of
 from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
 from hpcclear.ensemble.wear import States, inputs_of, waiting_longer
+from hpcclear.report.figures import style
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parents[1] / "jobs" / "wear.toml"
+TOLERANCES = (0.01, 0.003, 0.001, 0.0003, 0.0001)
+"""Of the figure."""
 WHOLE = 1e6
 """Revolutions of the starter's lives."""
 
@@ -142,6 +146,29 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
     return ends, stated, seconds, sum(one.simulations for one in done)
 
 
+@style.drawn
+def figure(ladder, truth, slow):  # type: ignore[no-untyped-def]
+    """Processor time of all lives against the error of their clearances, and what they state, a point a tolerance."""
+    fig, axes = style.grid(1, 1, 75.0)
+    ax, times = np.ravel(axes)[0], [row[3] for row in ladder]
+    errors = {
+        "error, median": [np.median(np.abs(row[1] - truth) / truth) for row in ladder],
+        "error, largest": [(np.abs(row[1] - truth) / truth).max() for row in ladder],
+        "stated, median": [np.median(row[2] / truth) for row in ladder],
+    }
+    for (words, values), colour, mark in zip(
+        errors.items(), ("blue", "orange", "grey"), "osx", strict=True
+    ):
+        ax.loglog(values, times, color=style.PALETTE[colour], marker=mark, label=words)
+    for row, error in zip(ladder, errors["error, median"], strict=True):
+        ax.annotate(f"{row[0]:g}", (error, row[3]), textcoords="offset points", xytext=(4, 4))
+    ax.axhline(slow, color="black", ls="--", label="without jumps")
+    ax.set_xlabel("error of the clearance at the end, relative (–)")
+    ax.set_ylabel("processor time of all lives (s)")
+    ax.legend(loc="center left")
+    return fig
+
+
 def main() -> None:
     """Print the comparison."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -149,6 +176,7 @@ def main() -> None:
     parser.add_argument("--lives", type=int, default=40)
     parser.add_argument("--chunk", type=int, default=10)
     parser.add_argument("--truth", type=Path)
+    parser.add_argument("-o", "--output", type=Path)
     asked = parser.parse_args()
     scene = scene_of(asked.lives, asked.revolutions)
     ends, stated, fast, simulations = jumped(scene)
@@ -166,6 +194,9 @@ def main() -> None:
     print(
         f"stated error holds the true one in {(off <= stated).all(axis=1).mean():.1%} of the lives"
     )
+    if asked.output is not None:
+        ladder = [(t, *jumped(scene.with_({"wear.tolerance": t}))) for t in TOLERANCES]
+        style.save(figure(ladder, truth, slow), asked.output)
     print(f"stated over true, median: {np.median(stated / np.maximum(off, 1e-300)):.3g}")
     print(
         f"without jumps {slow:.1f} s, with {fast:.2f} s ({simulations} simulations): {slow / fast:.0f} times less"

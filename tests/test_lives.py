@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from hpcclear.statistics.random.survival import quantiles, rank_correlation, sha
 
 SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
 PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
-ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12)))
+ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12, 0.0, 1.0)))
 
 
 def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK, settling=0.0):
@@ -62,6 +63,40 @@ def test_a_constant_rate_makes_linear_progress():
     assert found.limit[0] < 1e-15
 
 
+def test_running_in_is_an_exponential_of_the_work():
+    """At a constant rate W = 50 n: c = c0 + slope (W + (a - 1) W0 (1 - exp(-W / W0))), also between the ends of jumps."""
+    factor, fading = 6.0, 3e6
+    joints = replace(ONE, excess=np.array([factor - 1.0]), fading=np.array([fading]))
+    found = followed(joints, PLAN, lambda c: np.array([50.0]))
+    assert found.status is Status.OK
+    cycles = np.linspace(0.0, 1e6, 11)
+    seen, work = curves(found, joints, cycles), 50.0 * cycles
+    counted = work + (factor - 1.0) * fading * (1.0 - np.exp(-work / fading))
+    np.testing.assert_allclose(seen.clearance[:, 0], 3e-4 + 3e-12 * counted, rtol=1e-12)
+    np.testing.assert_allclose(seen.bearing[:, 0], 2e-12 * counted, atol=1e-18)
+    more = np.array([1e3])
+    grown = joints.worn(np.array([1e6]) + more)[0] - joints.worn(np.array([1e6]))[0]
+    np.testing.assert_allclose(joints.grown(np.array([1e6]), more), grown, rtol=1e-6)
+    np.testing.assert_allclose(joints.speed(np.array([1e6])), grown / more, rtol=1e-3)
+
+
+def test_jumps_follow_a_joint_that_runs_in():
+    """A rate that grows with the clearance, against a fine integration of the law itself."""
+    factor, fading = 8.0, 2e6
+    joints = replace(ONE, excess=np.array([factor - 1.0]), fading=np.array([fading]))
+    found = followed(joints, PLAN, lambda c: 50.0 * (c / 3e-4) ** 1.5)
+
+    def speed(_, y):
+        rate = 50.0 * (y[0] / 3e-4) ** 1.5
+        return [3e-12 * (1.0 + (factor - 1.0) * np.exp(-y[1] / fading)) * rate, rate]
+
+    ends = solve_ivp(speed, (0.0, 1e6), [3e-4, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y
+    end = joints.worn(found.nodes[-1].work)[0][0]
+    assert end == pytest.approx(ends[0, -1], rel=PLAN.tolerance)
+    assert abs(end - ends[0, -1]) <= found.error[0]
+    assert end > 1.5 * 3e-4
+
+
 def exact(joints, power, coefficient, cycles):
     """Clearances of joints whose rate is ``coefficient * (mean clearance / 0.3 mm)^power``, by a fine integration."""
 
@@ -79,7 +114,8 @@ def test_errors_of_jumps_stay_within_their_tolerance():
     within, off = 0, []
     for _ in range(40):
         joints = Joints(
-            rng.uniform(1e-4, 5e-4, 2), np.full(2, 0.02), rng.uniform(0.5e-12, 4e-12, 2), np.zeros(2)
+            rng.uniform(1e-4, 5e-4, 2), np.full(2, 0.02), rng.uniform(0.5e-12, 4e-12, 2), np.zeros(2),
+            np.zeros(2), np.ones(2),
         )  # fmt: skip
         power, coefficient = rng.uniform(-0.5, 1.5), rng.uniform(20.0, 80.0, 2)
         found = followed(joints, PLAN, lambda c, p=power, k=coefficient: k * (c.mean() / 3e-4) ** p)
@@ -174,6 +210,11 @@ def test_worn_volume_is_spread_over_the_surface():
     np.testing.assert_allclose(joints.bearing, [1e-15 / (around * 0.02), 0.0], rtol=1e-14)
     journal = 1e-6 / 2e9 / (around * (0.02 - 0.3e-3))
     np.testing.assert_allclose(joints.journal, [0.0, journal], rtol=1e-14)
+    assert (joints.excess == 0.0).all()
+    new = {"factor": 4.0, "work": "2 MJ"}
+    running_in = joints_of(scene_with({**WORN, "joints.rod_slider.wear.running_in": new}), None)[0]
+    np.testing.assert_array_equal(running_in.excess, [0.0, 3.0])
+    np.testing.assert_array_equal(running_in.fading, [1.0, 2e6])
     clearance, radius = joints.worn(np.array([1e6, 1e6]))
     np.testing.assert_allclose(radius - clearance, 0.0197 - joints.journal * 1e6, rtol=1e-12)
 

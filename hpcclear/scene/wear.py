@@ -36,6 +36,15 @@ class WornSurface(Table):
         return self
 
 
+class RunningIn(Table):
+    """How much faster a joint wears while it is new."""
+
+    factor: Annotated[float, Quantity("", least=1)]
+    """Of both coefficients at first."""
+    work: Annotated[float, Quantity("J", above=0)]
+    """Sliding work of the joint in which what is too much of it falls to 1/e, J."""
+
+
 class Wear(Table):
     """Archard wear of a joint; a surface that is left out does not wear."""
 
@@ -43,6 +52,7 @@ class Wear(Table):
     """Of the bearing, at right angles to the plane, m."""
     bearing: WornSurface | None = None
     journal: WornSurface | None = None
+    running_in: RunningIn | None = None
 
     @model_validator(mode="after")
     def _something_wears(self) -> "Wear":

@@ -16,6 +16,9 @@ NAME = "wear.nc"
 LEAST = 8
 """Clearances that a distribution is made of, at least."""
 
+MOST = 4096
+"""Values of a distribution, at most."""
+
 STATES = 8
 """States of wear that a life is simulated at, about: those of jobs/wear.toml took six to seven."""
 
@@ -88,4 +91,6 @@ def _values(scene: Scene, row: RandomInput, clearance: Array, endings: Array) ->
             f"lives have clearances from {found.min():.6g} to {found.max():.6g} m after {row.cycles:g} revolutions",
             "Widen it to hold them",
         )  # fmt: skip
+    if len(found) > MOST:  # evenly by rank
+        found = np.sort(found)[np.linspace(0, len(found) - 1, MOST).round().astype(int)]
     return np.sort(found)

@@ -49,8 +49,9 @@ def curves(found: Life, joints: Joints, cycles: Array) -> Curves:
     objective = np.interp(cycles, places, [node.objective for node in states])
     peak = np.stack([np.interp(cycles, places, column) for column in peaks.T], axis=-1)
     objective[beyond], peak[beyond] = np.nan, np.nan
+    counted = joints.counted(work)
     return Curves(
-        joints.bearing * work, joints.journal * work, joints.worn(work)[0], objective, peak
+        joints.bearing * counted, joints.journal * counted, joints.worn(work)[0], objective, peak
     )
 
 

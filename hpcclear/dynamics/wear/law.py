@@ -4,6 +4,9 @@ The worn volume of a surface is V = k W, W the integral of F_N |v_t| dt in J and
 rubbing of flat surfaces", J. Appl. Phys. 24 (1953), doi:10.1063/1.1721448; k = K/H with a dimensionless K and the
 hardness H). It is spread evenly over the whole surface as it was when new: the depth is V / (2 pi R L), R_B for the
 bearing and R_J for the journal. The true depth of a uniform layer differs from that by its share h / (2 R) of itself.
+
+While a joint runs in, k is larger by a factor that falls with the work done, 1 + (a - 1) exp(-W / W0); of its integral,
+W + (a - 1) W0 (1 - exp(-W / W0)), the depths are made.
 """
 
 import math
@@ -27,25 +30,43 @@ class Joints:
     clearance, bearing_radius : ndarray
         When new, m.
     bearing, journal : ndarray
-        Depth of wear for each joule of sliding work, m/J.
+        Depth of wear for each joule of sliding work, m/J, once run in.
+    excess, fading : ndarray
+        a - 1 and W0, J, of running in; 0 and 1 without.
     """
 
     clearance: Array
     bearing_radius: Array
     bearing: Array
     journal: Array
+    excess: Array
+    fading: Array
 
     def __getitem__(self, life: Any) -> "Joints":
         return Joints(*(array[life] for array in vars(self).values()))
 
     @property
     def slope(self) -> Array:
-        """Growth of the clearance for each joule, m/J."""
+        """Growth of the clearance for each joule once run in, m/J."""
         return self.bearing + self.journal
+
+    def counted(self, work: Array) -> Array:
+        """Sliding work (..., joints), J, that joints run in from the start would have to do for the same wear."""
+        return work - self.excess * self.fading * np.expm1(-work / self.fading)
+
+    def speed(self, work: Array) -> Array:
+        """Growth of the clearance for each joule after `work` (..., joints), J, is done, m/J."""
+        return self.slope * (1.0 + self.excess * np.exp(-work / self.fading))
+
+    def grown(self, work: Array, more: Array) -> Array:
+        """Growth of the clearance by `more` work after `work` is done, each (..., joints), J; m."""
+        early = self.excess * self.fading * np.exp(-work / self.fading)
+        return self.slope * (more - early * np.expm1(-more / self.fading))
 
     def worn(self, work: Array) -> tuple[Array, Array]:
         """Clearance and bearing radius after so much sliding work (J), each of the shape of `work`, m."""
-        return self.clearance + self.slope * work, self.bearing_radius + self.bearing * work
+        counted = self.counted(work)
+        return self.clearance + self.slope * counted, self.bearing_radius + self.bearing * counted
 
 
 def joints_of(scene: Scene, points: Points | None) -> Joints:
@@ -60,8 +81,17 @@ def joints_of(scene: Scene, points: Points | None) -> Joints:
             _coefficient(scene, get, name, surface) / (around * size)
             for surface, size in (("bearing", radius), ("journal", radius - clearance))
         ]
-        columns.append((clearance, radius, *depths))
+        columns.append((clearance, radius, *depths, *_running_in(scene, get, name)))
     return Joints(*(np.stack(parts, axis=-1) for parts in zip(*columns, strict=True)))
+
+
+def _running_in(scene: Scene, get: Numbers, joint: str) -> tuple[Array, Array]:
+    """Excess factor and work (J) of a joint for each point."""
+    wear: Any = scene.clearance_joint(joint).wear
+    if wear.running_in is None:
+        return np.zeros(get.size), np.ones(get.size)
+    key = f"{scene.joint_key(joint)}.wear.running_in"
+    return get(f"{key}.factor") - 1.0, get(f"{key}.work")
 
 
 def _coefficient(scene: Scene, get: Numbers, joint: str, surface: str) -> Array:

@@ -152,10 +152,10 @@ def life(joints: Joints, plan: Plan) -> Asking:
             if end is not None:
                 found.halves.append(half)
                 found.nodes.append(end)
-                variance += (joints.slope * length * half.rate_limit) ** 2
+                variance += joints.grown(here.work, length * half.rate_limit) ** 2
                 # rates that rise and fall again within a jump are told by its end as well
                 apart = np.maximum(np.abs(half.rate - here.rate), np.abs(end.rate - half.rate))
-                found.error = found.error + 0.5 * length * joints.slope * apart
+                found.error = found.error + joints.grown(here.work, 0.5 * length * apart)
                 here = end
     except _EndedError as stop:
         found.status = stop.status
@@ -166,7 +166,7 @@ def life(joints: Joints, plan: Plan) -> Asking:
 
 def _growing(joints: Joints, here: Node, growth: float) -> float:
     """Revolutions in which a clearance grows by that much, relative; no end where nothing wears."""
-    speed = joints.slope * here.rate / joints.worn(here.work)[0]
+    speed = joints.speed(here.work) * here.rate / joints.worn(here.work)[0]
     return growth / float(speed.max()) if speed.max() > 0.0 else math.inf
 
 
@@ -179,9 +179,10 @@ def _jump(
     gone = here.work + length * half.rate
     clearance = joints.worn(gone)[0]
     allowed = plan.tolerance * clearance
-    half_slope = 0.5 * length * joints.slope
-    apart = half_slope * np.abs(half.rate - here.rate)
-    open_ = half_slope * np.hypot(half.rate_limit, here.rate_limit)
+    apart, open_ = (
+        joints.grown(here.work, 0.5 * length * one)
+        for one in (np.abs(half.rate - here.rate), np.hypot(half.rate_limit, here.rate_limit))
+    )
     error = float((np.maximum(apart - open_, 0.0) / allowed).max())
     if error > 1.0:
         return half, None, error
@@ -225,16 +226,18 @@ def _look(
         seen.append(answer)
         done = wanted
         node = _node(cycle, work, seen)
-        drift = node.drift[:-1] * node.rate
+        # what limit and drift of the rate leave open of the next jump
         if length is None:
-            ahead = FIRST_GROWTH / np.maximum(node.rate, 1e-300) * clearance
+            first = FIRST_GROWTH * clearance / np.maximum(node.rate, 1e-300)
+            open_, drifted = first * node.rate_limit, first * node.drift[:-1] * node.rate
         else:
-            ahead = joints.slope * length
+            open_ = joints.grown(work, length * node.rate_limit)
+            drifted = joints.grown(work, length * node.drift[:-1] * node.rate)
         allowed = 0.5 * plan.tolerance * clearance
-        sure = (ahead * node.rate_limit <= allowed).all()
+        sure = (open_ <= allowed).all()
         sure &= node.objective_limit <= plan.tolerance * abs(node.objective)
         # more copies do not end a transient
-        moving = (ahead * drift > allowed).any() or node.drift[-1] > plan.tolerance
+        moving = (drifted > allowed).any() or node.drift[-1] > plan.tolerance
         if sure or moving or done >= plan.most_copies:
             found.certain &= bool(sure)
             found.drift = max(found.drift, float(node.drift.max()))
