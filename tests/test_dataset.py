@@ -100,6 +100,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
         "timing": "busy idle compile write command",
         "wear": "clearance bearing_depth objective lifetime survival survival_lower exceedance ending",
+        "effects": "off change limit decision recommended work samples failed objective",
         "accuracy": "error seconds evaluations averaging_error r2 moment_error strong_seconds lost_seconds",
     }
     dims = {
@@ -115,6 +116,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "statistics": "joint bin edge",
         "timing": "rank stage",
         "wear": "life joint cycle quantile",
+        "effects": "variant effect response",
         "accuracy": "integrator rung quantity",
     }
     assert set(KINDS) == set(contract)

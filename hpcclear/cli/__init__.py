@@ -395,6 +395,86 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: _How) -> int
     return _on_ranks(program, how.time_limit)
 
 
+@cli.command(short_help="Say which effects a scene can do without.")
+@_FILE
+@_SET
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="NetCDF file to write; by default NAME-effects.nc here.",
+)
+@click.option(
+    "--tolerance",
+    default="1%",
+    show_default=True,
+    metavar="CHANGE",
+    help="Relative change of what the study asks that is allowed.",
+)
+@click.option(
+    "--samples",
+    type=click.IntRange(min=64),
+    metavar="N",
+    help="Samples of a variant at most; by default as many as a twentieth of the study allows.",
+)
+@click.option(
+    "--forces",
+    is_flag=True,
+    help="Hold peak contact forces to the tolerance, too, not only tell them.",
+)
+@click.option(
+    "--scene",
+    "reduced",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the cheapest scene there, whole.",
+)
+@_with_how
+def effects(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path | None,
+    tolerance: str,
+    samples: int | None,
+    forces: bool,
+    reduced: Path | None,
+    how: _How,
+) -> int:
+    """Measure what each effect of a scene changes and costs (play in each joint, friction, gravity, loads, ...), and print
+    the cheapest scene that stays within the tolerance.
+
+    Example: mpiexec -n 2 hpcclear effects jobs/quickstart.toml --tolerance 2% -o results/effects.nc
+    """
+
+    def program(ranks: "Ranks") -> int:
+        from hpcclear.cli.effects import describe, tolerance_of
+        from hpcclear.ensemble.effects import run_effects
+        from hpcclear.ensemble.session import Options
+        from hpcclear.study.extent import certificate_samples
+
+        allowed = tolerance_of(tolerance)
+        scene = _scene(file, overrides)
+        if reduced is not None:
+            _check_free(reduced)
+        found = run_effects(
+            scene,
+            _place(output or Path(f"{file.stem}-effects.nc")),
+            ranks,
+            Options(how.fresh, how.interval, how.progress),
+            tolerance=allowed,
+            samples=certificate_samples(scene) if samples is None else samples,
+            forces=forces,
+        )
+        code = describe(found, scene, file)
+        if reduced is not None:
+            from hpcclear.results import files
+
+            files.write_bytes(_place(reduced), found.content.attrs["reduced_scene"].encode())
+        return code
+
+    return _on_ranks(program, how.time_limit)
+
+
 @cli.command(short_help="Carry a whole study.")
 @_FILE
 @_SET

@@ -4,6 +4,7 @@ Figures need matplotlib (the extra ``analysis``), which is imported when the fir
 """
 
 from hpcclear.report.figures.designs import comparison_figure, front_figure
+from hpcclear.report.figures.effects import effects_figure
 from hpcclear.report.figures.portraits import (
     force_polar_figure,
     orbit_figure,
@@ -33,6 +34,7 @@ from hpcclear.report.figures.wear import fan_figure, survival_figure
 __all__ = [
     "bifurcation_figure",
     "comparison_figure",
+    "effects_figure",
     "energy_figure",
     "fan_figure",
     "fit_figure",

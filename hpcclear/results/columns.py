@@ -391,6 +391,27 @@ WEAR: Columns = {
         "rank correlation of the growth of the clearance at the end with the random input", required=True),
 }
 
+EFFECTS: Columns = {
+    "variant": count(("variant",), "number of the variant; 0 is the whole scene"),
+    "effect": text(("effect",), "effect that may be off"),
+    "response": text(("response",), "what changes"),
+    "off": flag(("variant", "effect"), "whether the effect is off in the variant", required=True),
+    "change": number(("variant", "response"), "1", "relative change against the whole scene", required=True),
+    "limit": number(("variant", "response"), "1", "half-width of its confidence limits", required=True),
+    "told": flag(("variant", "response"), "what the change is to the tolerance", required=True),
+    "decision": flag(("variant",), "the same of all changes that count", required=True),
+    "point_change": number(("variant",), "1",
+        "root mean square change of single samples, relative to the mean", required=True),
+    "judged": flag(("response",), "whether its change counts", required=True),
+    "recommended": flag(("variant",), "the cheapest within the tolerance", required=True),
+    "work": number(("variant",), "1", "evaluations times size of one, over those of the whole scene", required=True),
+    "evaluations": number(("variant",), "1", "mean number of evaluations of the equations of motion", required=True),
+    "coordinates": count(("variant",), "coordinates that are integrated", required=True),
+    "samples": count(("variant",), "number of simulations", required=True),
+    "failed": count(("variant",), "number of simulations that failed", required=True),
+    "objective": number(("variant",), "objective", f"mean objective f, {MEAN_GAP.words}", required=True),
+}
+
 ACCURACY: Columns = {
     "integrator": text(("integrator",), "way of integrating"),
     "rung": count(("rung",), "rung of the ladder of tolerances"),

@@ -34,6 +34,12 @@ DESIGN_VARIABLES = {
 }
 """Units and long names of the design variables of the paper (its Table 3)."""
 
+SECONDS_PER_SAMPLE = "seconds_per_sample"
+"""Attribute of the file of times: processor time of a sample by the names of the effects that are off, as JSON."""
+
+ALL_ON = "all on"
+"""Name of the whole scene there."""
+
 _NO_YES = np.array([0, 1], np.int8)
 
 FURTHER: dict[str, dict[str, object]] = {
@@ -64,6 +70,14 @@ FURTHER: dict[str, dict[str, object]] = {
     "surface_accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
     "verified": {"flag_values": _NO_YES, "flag_meanings": "not_simulated simulated"},
+    "off": {"flag_values": _NO_YES, "flag_meanings": "on off"},
+    "told": {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": "within beyond untold"},
+    "decision": {
+        "flag_values": np.arange(3, dtype=np.int8),
+        "flag_meanings": "within beyond untold",
+    },
+    "judged": {"flag_values": _NO_YES, "flag_meanings": "told judged"},
+    "recommended": {"flag_values": _NO_YES, "flag_meanings": "not_recommended recommended"},
     "dominated": {"flag_values": _NO_YES, "flag_meanings": "not_surely dominated"},
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -105,6 +119,7 @@ KINDS = {
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples, streamed", columns.STATISTICS),
     "wear": _kind("Lives of a mechanism whose joints wear", columns.WEAR, ("life",)),
+    "effects": _kind("Which effects a scene can do without", columns.EFFECTS),
     "timing": _kind("Where the time went", columns.TIMING),
     "accuracy": _kind("What accuracy costs in time", columns.ACCURACY),
 }

@@ -6,7 +6,7 @@ them; names never decide a default, only what a variable drives does.
 
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from hpcclear.scene.fields import Count, Quantity, Table, invalid
 
@@ -82,6 +82,17 @@ class Surrogate(Table):
     """How often an interval may be halved where a model is refused."""
     restarts: Annotated[int, Count(0, 100)] = 2
     """Further starts of the likelihood search."""
+
+
+class CertificateOfEffects(Table):
+    """Which effects the study could do without, told before it begins; the study itself is carried out with all of them."""
+
+    tolerance: Annotated[float, Quantity("", above=0, below=1)] = 0.01
+    """Relative change that is allowed in mean and deviation of the objective."""
+    samples: Annotated[int, Count(64, 10**9)] | None = None
+    """Simulations of each variant at most; default as many as make a twentieth of the study."""
+    forces: Annotated[bool, Field(strict=True)] = False
+    """Whether peak contact forces must stay within the tolerance, too."""
 
 
 class Swarm(Table):

@@ -12,7 +12,14 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.formula import names_in
-from hpcclear.scene.stages import Names, Sensitivity, Surrogate, Swarm, Verification
+from hpcclear.scene.stages import (
+    CertificateOfEffects,
+    Names,
+    Sensitivity,
+    Surrogate,
+    Swarm,
+    Verification,
+)
 from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
 
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
@@ -50,6 +57,8 @@ class Study(Table):
     surrogate: Surrogate = Surrogate()
     swarm: Swarm = Swarm()
     verification: Verification = Verification()
+    certificate: CertificateOfEffects | None = None
+    """Left out, the stage is."""
 
     @model_validator(mode="before")
     @classmethod

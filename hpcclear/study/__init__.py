@@ -1,6 +1,7 @@
 """The study, from a scene to verified designs: read this after the README.
 
 0. Lives, where a clearance is random as wear leaves it: they are followed, and what their joints come to is the distribution.
+0. On request the certificate of effects: what the scene could do without.
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
 2. Kriging: models of the objective; the swarm searches one of them.
@@ -34,6 +35,7 @@ from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study import (
+    certificate,
     chaos,
     lives,
     optimisation,
@@ -99,17 +101,18 @@ def run_study(
         tell(f"Results go to {place.output}.")
     options = Options(fresh, style=progress_style)
     with Session(place, run_key(scene, "run"), ranks, options, tell) as session:
+        times: dict[str, str] = {}
         followed = all((place.output / name).exists() for name in lives.files(scene))
         if session.has_all(_results(scene)) and followed and not unfinished(place.parts):
             tell(f"{place.output} holds the finished study.")
         else:
-            _carry_out(scene, session)
-        session.close(session.attributes)
+            times = _carry_out(scene, session)
+        session.close(session.attributes | times)
     return place.output
 
 
-def _carry_out(scene: Scene, session: Session) -> None:
-    """Go on from what is there, to the end."""
+def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
+    """Go on from what is there, to the end; what stages measured of time."""
     study, style = scene.required_study, session.options.style
     session.describe(scene)
     units = {variable.name: variable.unit for variable in study.variables}
@@ -122,13 +125,15 @@ def _carry_out(scene: Scene, session: Session) -> None:
     scene = lives.known(scene, session)
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
-    _tell_the_story(
-        StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
-    )
+    run = StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
+    _tell_the_story(run)
+    return run.times
 
 
 def _tell_the_story(run: StudyRun) -> None:
     sensitivity: Result | None = None
+    if run.study.certificate is not None:
+        certificate.certify(run)
     if run.study.groups:
         sensitivity = run.stage("sensitivity", sensitivities.analyse)
         sensitivities.write(run, sensitivity)
@@ -184,4 +189,5 @@ def _results(scene: Scene) -> list[str]:
     """Files of a study that is finished."""
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
     names += ["sensitivity.nc"] if scene.required_study.groups else []
+    names += ["effects.nc"] if scene.required_study.certificate is not None else []
     return names + paper.files(scene)

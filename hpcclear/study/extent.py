@@ -1,6 +1,8 @@
 """How much a study simulates, from what each of its stages says of itself."""
 
+from hpcclear.ensemble import effects
 from hpcclear.scene import Scene
+from hpcclear.scene.switches import switches
 from hpcclear.study import (
     chaos,
     lives,
@@ -54,3 +56,20 @@ def responses_of(scene: Scene) -> int:
         If the scene has no study.
     """
     return responses.simulations(scene.required_study) + readings.simulations(scene)[1]
+
+
+CERTIFICATE_SHARE = 0.05
+"""Of a study's samples that its certificate of effects may take."""
+
+
+def certificate_samples(scene: Scene) -> int:
+    """Samples of a variant at most, for a certificate of effects that takes a small share of the study it serves.
+
+    Half of the variants go that far, as a rule; never fewer than a first look needs.
+    """
+    study = scene.study
+    if study is None:
+        return effects.SAMPLES
+    total = sum(samples_of(scene).values()) if study.cases else study.samples
+    variants = len(switches(scene)) + 2
+    return int(min(max(2 * CERTIFICATE_SHARE * total / variants, effects.LEAST), effects.SAMPLES))

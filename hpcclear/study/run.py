@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,8 @@ class StudyRun:
         Gets what the user should know, a sentence at a time.
     announce : callable
         Gets the name of each stage when it begins.
+    times : dict of str to str
+        What stages measured of time, for the file of times: no result has time in it.
     """
 
     scene: Scene
@@ -45,6 +47,7 @@ class StudyRun:
     simulations: Simulations
     tell: Callable[[str], object]
     announce: Callable[[str], object] = lambda name: None
+    times: dict[str, str] = field(default_factory=dict)
 
     @property
     def study(self) -> Study:

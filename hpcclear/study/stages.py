@@ -9,6 +9,7 @@ from hpcclear.study import paper
 
 _WORDS = {
     "wear": "lives of joints that wear",
+    "effects": "which effects could be left out",
     "sensitivity": "which variables matter",
     "kriging": "models of the objective",
     "optimisation": "the swarm on the model",
@@ -30,6 +31,7 @@ class Stages:
     def __init__(self, scene: Scene) -> None:
         steps = ["kriging", "optimisation", "verification", "responses"]
         steps = (["sensitivity"] if scene.required_study.groups else []) + steps
+        steps = (["effects"] if scene.required_study.certificate is not None else []) + steps
         steps = (["wear"] if scene.required_study.worn else []) + steps
         self._steps = steps + (["readings"] if "readings.nc" in paper.files(scene) else [])
         self._began = time.monotonic()

@@ -12,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
     accuracy,
     designs,
+    effects,
     labels,
     motion,
     portraits,
@@ -100,6 +101,10 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     """Every figure that there may be: what it shows, and what makes its picture and caption."""
     for kind, draw, caption in _RESULTS:
         yield from _of_file(draw, content.get(kind), caption)
+    certificate, times = content.get("effects"), content.get("timing")
+    if certificate is not None:
+        told = "Change of f with each effect off, with its limits and the tolerance; the time that leaving it out saves."
+        yield told, lambda: _shown(effects.effects_figure(certificate, times), told)
     front = content.get("front")
     if front is not None:
         verified = content.get("verification")

@@ -147,7 +147,7 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    for kind in ("accuracy", "wear"):
+    for kind in ("accuracy", "wear", "effects"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:
             return troubles or None  # a directory of that command lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]

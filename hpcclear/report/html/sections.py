@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.report.figures import labels
+from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
@@ -26,6 +26,7 @@ def summary(content: Content) -> dict[str, object]:
     words = [
         *_lives_words(content),
         *_samples_words(content),
+        *_effects_words(content),
         *_designs_words(content),
         *_claims_words(content),
         *costs.words(content),
@@ -71,6 +72,15 @@ def _samples_words(content: Content) -> list[str]:
             f"The objective f, {labels.objective(samples)}, lies between {low} and {high}."
         )
     return words
+
+
+def _effects_words(content: Content) -> list[str]:
+    certificate = content.get("effects")
+    return (
+        []
+        if certificate is None
+        else effects.statements(certificate, effects.seconds_of(content.get("timing")))
+    )
 
 
 def _designs_words(content: Content) -> list[str]:

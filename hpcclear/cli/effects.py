@@ -1,0 +1,129 @@
+"""What `effects` prints: by how much each effect changes what is asked, and the cheapest scene within the tolerance."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import tomli_w
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli.printing import _load, console, fitting, objective_of, table
+from hpcclear.ranks.stopping import Exit
+from hpcclear.report.figures.effects import (
+    named,
+    saving,
+    seconds_of,
+    shown,
+    statements,
+)
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.loading import parse
+from hpcclear.scene.units import UnitError, to_si
+
+if TYPE_CHECKING:
+    from hpcclear.ensemble.session import Finished
+
+
+def tolerance_of(words: str) -> float:
+    """A relative change: 0.01, or 1%.
+
+    Raises
+    ------
+    InputError
+        If it is no number.
+    """
+    try:
+        return float(words)
+    except ValueError:
+        pass
+    try:
+        return to_si(words, "")
+    except UnitError as error:
+        raise InputError("--tolerance", words, error.reason, "Write 1%, or 0.01") from None
+
+
+def describe(found: "Finished", scene: Scene, file: Path) -> int:
+    """Print changes, verdicts and the reduced scene; the exit code."""
+    out, content = console(), found.content
+    seconds = seconds_of(_times(found.timing))
+    tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
+    out.print(_changes(content, seconds, tolerance))
+    for text in statements(content, seconds):
+        out.print(fitting(text))
+    for name, reason in json.loads(content.attrs["kept"]).items():
+        out.print(f"{name} stays on: {reason}")
+    what, _ = objective_of(content)
+    rows = [
+        ("f", what),
+        ("limits", f"{float(content.attrs['confidence']):.0%}, of averages over the same points"),
+        ("samples", f"{int(content['samples'].sum())}, {_failed(content)} failed"),
+    ]
+    out.print(table("Certificate", rows + _load(found)))
+    out.print(f"effects  {found.output}")
+    out.file.write("\n" + recommendation(content, scene, file, tolerance, seconds))
+    return Exit.DONE
+
+
+def _times(place: Path) -> xr.Dataset | None:
+    try:
+        return dataset.read(place, "timing")
+    except InputError:
+        return None  # or written over by another command: savings are told by evaluations
+
+
+def _failed(content: xr.Dataset) -> str:
+    count = int(content["failed"].sum())
+    return str(count) if count else "none"
+
+
+def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> Table:
+    """A row a variant: what is off, changes with limits, time, verdict."""
+    what = f"Changes in %, each effect off against all on; tolerance {tolerance}"
+    made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made.add_column("off", overflow="fold")
+    kept = [k for k in range(content.sizes["response"]) if _is_told(content, k)]
+    labels = [str(content["response"].to_numpy()[k]) for k in kept]
+    for name in labels:
+        made.add_column(name.replace("mean", "mean f"), justify="right", no_wrap=True)
+    made.add_column("time", justify="right", no_wrap=True)
+    made.add_column("within", overflow="fold")
+    for k in range(1, content.sizes["variant"]):
+        one = content.isel(variant=k)
+        changes = [
+            shown(float(one["change"][r]), float(one["limit"][r])).removesuffix(" %") for r in kept
+        ]
+        verdict = ("yes", "no", "cannot be told")[int(one["decision"])]
+        share = saving(content, k, seconds)
+        row = [" + ".join(named(content, k)), *changes, f"{-100 * share:+.0f}", verdict]
+        made.add_row(*(fitting(text) for text in row))
+    return made
+
+
+def _is_told(content: xr.Dataset, response: int) -> bool:
+    return bool(np.isfinite(content["change"].isel(response=response)[1:]).any())
+
+
+def recommendation(
+    content: xr.Dataset, scene: Scene, file: Path, tolerance: str, seconds: dict[str, float]
+) -> str:
+    """The tables of the scene that change, as TOML to paste, with what they save."""
+    chosen = int(np.argmax(content["recommended"].to_numpy()))
+    if chosen == 0:
+        return f"# Nothing can be left out of {file} within {tolerance}.\n"
+    reduced = parse(content.attrs["reduced_scene"], "reduced scene")
+    whole = scene.resolved()
+    changed = {key: value for key, value in reduced.items() if whole.get(key) != value}
+    share = saving(content, chosen, seconds)
+    gone = [key for key in whole if key not in reduced]
+    lines = [
+        f"# Within {tolerance}, without {', '.join(named(content, chosen))}: "
+        f"saves {100 * share:.0f} %, {1 / max(1 - share, 1e-9):.1f} times faster.",
+        f"# These tables stand in place of those of {file}"
+        + (f"; [{'], ['.join(gone)}] goes." if gone else "."),
+    ]
+    return "\n".join(lines) + "\n" + tomli_w.dumps(changed)

@@ -1,0 +1,283 @@
+"""Which effects a scene can do without: what is asked for, and what follows from the answers.
+
+A certificate is a generator. It yields the variants it wants simulated, a variant being the effects that are off, over so many
+replicates of the points; it is sent what came of them, and returns what it found. It knows no scene: effects are numbers.
+
+Singly at first: replicates double until each effect's change is surely within the tolerance, surely beyond it, or cannot be
+told. What is within it singly is then left out together, the cheapest set first, and only a set whose own change is within
+the tolerance is recommended. Where a set fails, pairs tell which of its effects are more together than alone.
+"""
+
+import itertools
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Integers
+from hpcclear.statistics.random.paired import (
+    Change,
+    deviation_change,
+    mean_change,
+    point_change,
+)
+
+Variant = tuple[int, ...]
+"""Effects that are off, ascending; () is the whole scene."""
+
+FIRST = 16
+"""Replicates that are looked at first."""
+
+MOST_TOGETHER = 10
+"""Effects that sets are made of at most: those that save the most."""
+
+TRIES = 8
+"""Sets that are simulated before the best single effect is taken."""
+
+MOST_PAIRS = 10
+"""Pairs that are simulated at most, when a set has failed."""
+
+LEAST_SAVING = 0.99
+"""What leaving an effect out counts as at most: it is left out even where it costs no evaluations."""
+
+MORE_WORK = 1.02
+"""Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
+
+
+class Verdict(IntEnum):
+    """What a change is to the tolerance."""
+
+    WITHIN = 0
+    BEYOND = 1
+    UNTOLD = 2
+
+
+class Asked(NamedTuple):
+    """A variant over replicates `first` to `last`."""
+
+    off: Variant
+    first: int
+    last: int
+
+
+class Seen(NamedTuple):
+    """What came of it: objective (r, s); peak contact force (r, s, joints) by the whole scene's joints, NaN where there is
+    none; evaluations (r, s)."""
+
+    objective: Array
+    force: Array
+    evaluations: Integers
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked of a certificate.
+
+    Attributes
+    ----------
+    effects : int
+    tolerance : float
+        Relative change that is allowed.
+    confidence : float
+        Of each change's limits.
+    most : int
+        Replicates of a variant at most.
+    scattered : bool
+        Whether replicates have scatter in them, so that the deviation counts.
+    forces : bool
+        Whether peak forces count.
+    possible : callable
+        Whether such effects can be off together.
+    size : callable
+        How much one evaluation of the motion of a variant is, relative.
+    """
+
+    effects: int
+    tolerance: float
+    confidence: float
+    most: int
+    scattered: bool
+    forces: bool
+    possible: Callable[[Variant], bool]
+    size: Callable[[Variant], float]
+
+
+class Changes(NamedTuple):
+    """Of one variant: changes of mean and deviation of the objective and of the peak force, and of single points."""
+
+    mean: Change
+    deviation: Change
+    force: Change
+    point: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was found.
+
+    Attributes
+    ----------
+    variants : tuple of Variant
+        All that were simulated, the whole scene first, in the order of asking.
+    recommended : Variant
+        Effects to leave out; () if none.
+    book : Book
+    """
+
+    variants: tuple[Variant, ...]
+    recommended: Variant
+    book: "Book"
+
+
+class Book:
+    """What is known of each variant."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.seen: dict[Variant, list[Seen]] = {}
+
+    def replicates(self, off: Variant) -> int:
+        """Replicates that were simulated."""
+        return sum(len(one.objective) for one in self.seen.get(off, ()))
+
+    def all(self, off: Variant) -> Seen:
+        """All that was seen of a variant."""
+        objective, force, evaluations = zip(*self.seen[off], strict=True)
+        return Seen(np.concatenate(objective), np.concatenate(force), np.concatenate(evaluations))
+
+    def changes(self, off: Variant) -> Changes:
+        """By how much a variant differs from the whole scene, over the replicates of both."""
+        here = self.all(off)
+        count = len(here.objective)
+        whole = self.all(())
+        objective, force = whole.objective[:count], whole.force[:count]
+        level = self.plan.confidence
+        nothing = Change(np.nan, np.nan)
+        return Changes(
+            mean_change(objective, here.objective, level),
+            deviation_change(objective, here.objective, level) if self.plan.scattered else nothing,
+            mean_change(*_largest(force, here.force), level),
+            point_change(objective, here.objective),
+        )
+
+    def verdict(self, off: Variant) -> Verdict:
+        """What the changes that count come to."""
+        found = self.changes(off)
+        counted = [found.mean]
+        counted += [found.deviation] if self.plan.scattered else []
+        counted += [found.force] if self.plan.forces else []
+        return judged(counted, self.plan.tolerance)
+
+    def work(self, off: Variant) -> float:
+        """Mean work of a sample, over that of the whole scene: evaluations by the size of one."""
+        return self._work(off) / (self._work(()) or 1.0)
+
+    def _work(self, off: Variant) -> float:
+        return float(self.all(off).evaluations.mean()) * self.plan.size(off)
+
+
+def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
+    """Within the tolerance if all are, beyond it if any is; NaN cannot be told."""
+    if any(change.beyond(tolerance) for change in changes):
+        return Verdict.BEYOND
+    return Verdict.WITHIN if all(c.within(tolerance) for c in changes) else Verdict.UNTOLD
+
+
+def _largest(on: Array, off: Array) -> tuple[Array, Array]:
+    """Largest force at each point (r, s) over the joints that have one in both."""
+    shared = np.isfinite(on).any(axis=(0, 1)) & np.isfinite(off).any(axis=(0, 1))
+    if not shared.any():
+        return np.full(on.shape[:2], np.nan), np.full(off.shape[:2], np.nan)
+    return on[..., shared].max(axis=2), off[..., shared].max(axis=2)
+
+
+Asking = Generator[list[Asked], list[Seen], Certificate]
+Part = Generator[list[Asked], list[Seen], None]
+
+
+def certificate(plan: Plan) -> Asking:
+    """The procedure; see the module."""
+    book = Book(plan)
+    singles = [(k,) for k in range(plan.effects) if plan.possible((k,))]
+    yield from _told(book, [()])
+    yield from _told(book, singles)
+    good = [one for one in singles if book.verdict(one) is Verdict.WITHIN]
+    good = sorted(sorted(good, key=lambda one: (book.work(one), one))[:MOST_TOGETHER])
+    recommended = yield from _together(book, [one[0] for one in good])
+    return Certificate(tuple(book.seen), recommended, book)
+
+
+def _told(book: Book, variants: Sequence[Variant]) -> Part:
+    """Simulate variants, more and more replicates of those that cannot be told."""
+    count = min(FIRST, book.plan.most)
+    pending = [one for one in variants if book.replicates(one) < count]
+    while pending:
+        asked = [
+            Asked(one, done, count) for one in dict.fromkeys([(), *pending])
+            if (done := book.replicates(one)) < count
+        ]  # fmt: skip
+        for one, seen in zip(asked, (yield asked), strict=True):
+            book.seen.setdefault(one.off, []).append(seen)
+        pending = [one for one in pending if one and book.verdict(one) is Verdict.UNTOLD]
+        if count >= book.plan.most:
+            return
+        count = min(2 * count, book.plan.most)
+
+
+def _together(book: Book, good: list[int]) -> Generator[list[Asked], list[Seen], Variant]:
+    """The cheapest set of effects, each within the tolerance singly, that is so together."""
+    failed: list[Variant] = []
+    while len(failed) < TRIES:
+        best = _cheapest(book, good, failed)
+        if best is None:
+            return ()
+        yield from _told(book, [best])
+        if book.verdict(best) is Verdict.WITHIN:
+            return best
+        if not failed and len(best) > 2:
+            pairs = [p for p in itertools.combinations(best, 2) if book.plan.possible(p)]
+            yield from _told(book, pairs[:MOST_PAIRS])
+        failed.append(best)
+    return min([(k,) for k in good], key=book.work)
+
+
+def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | None:
+    """The set that is expected to be cheapest of those that may pass."""
+    sets = [one for k in range(1, len(good) + 1) for one in itertools.combinations(good, k)]
+    for chosen in sorted(sets, key=lambda one: (_expected_work(book, one), -len(one), one)):
+        if any(set(one) <= set(chosen) for one in failed) or not _may_pass(book, chosen):
+            continue
+        if book.plan.possible(chosen):
+            return chosen
+    return None
+
+
+def _expected_work(book: Book, chosen: Variant) -> float:
+    """As if each effect saved by itself what it saves alone."""
+    alone = [book.work((k,)) for k in chosen]
+    return float(np.prod([one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]))
+
+
+def _may_pass(book: Book, chosen: Variant) -> bool:
+    """Whether changes that add up, with what pairs are known to be more than that, stay within the tolerance."""
+    if chosen in book.seen:
+        return book.verdict(chosen) is Verdict.WITHIN
+    total = sum((_values(book, (k,)) for k in chosen), np.zeros(3))
+    for pair in itertools.combinations(chosen, 2):
+        if pair in book.seen:
+            total += interaction(book, pair)
+    counted = np.array([True, book.plan.scattered, book.plan.forces])
+    return bool((np.abs(total[counted]) <= book.plan.tolerance).all())
+
+
+def interaction(book: Book, off: Variant) -> Array:
+    """By how much the changes (mean, deviation, force) of effects together exceed their sum."""
+    together: Array = _values(book, off) - sum((_values(book, (k,)) for k in off), np.zeros(3))
+    return together
+
+
+def _values(book: Book, off: Variant) -> Array:
+    found = book.changes(off)
+    return np.array([found.mean.value, found.deviation.value, found.force.value])

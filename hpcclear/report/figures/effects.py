@@ -1,0 +1,145 @@
+"""Which effects a scene can do without (kind ``effects``): a bar each, cost beside change, and the sentences that say it."""
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import style
+from hpcclear.results.names import ALL_ON, SECONDS_PER_SAMPLE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def named(content: xr.Dataset, variant: int) -> list[str]:
+    """Names of the effects that are off in a variant."""
+    off = content["off"].to_numpy()[variant].astype(bool)
+    return [str(name) for name in content["effect"].to_numpy()[off]]
+
+
+def label(names: list[str]) -> str:
+    """A variant in words."""
+    return " + ".join(names) if names else ALL_ON
+
+
+def seconds_of(timing: xr.Dataset | None) -> dict[str, float]:
+    """Processor time of a sample of each variant, s, by `label`; empty where it was not measured."""
+    found: dict[str, float] = json.loads(
+        "{}" if timing is None else timing.attrs.get(SECONDS_PER_SAMPLE, "{}")
+    )
+    return found
+
+
+def saving(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> float:
+    """Share of a sample's time that a variant saves, negative if it takes longer: measured, else by evaluations."""
+    here, whole = seconds.get(label(named(content, variant))), seconds.get(label([]))
+    if here is None or not whole:
+        return 1.0 - float(content["work"][variant])
+    return 1.0 - here / whole
+
+
+def shown(value: float, limit: float) -> str:
+    """A relative change with its limits in per cent, as many digits as the limits are worth."""
+    if not np.isfinite(value):
+        return "-"
+    value, limit = 100.0 * value, 100.0 * limit
+    digits = int(np.clip(1 - np.floor(np.log10(max(limit, 1e-2))), 0, 2))
+    return f"{value:+.{digits}f} ± {limit:.{digits}f} %"
+
+
+def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> str:
+    """What leaving an effect out changes and saves, in a sentence."""
+    one = content.isel(variant=variant)
+    share = saving(content, variant, seconds)
+    change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
+    text = f"{label(named(content, variant))} changes f by {change.replace(' ± ', ' % ± ')}"
+    cost = f"off saves {100 * share:.0f} %" if share >= 0.005 else "off saves nothing"
+    verdict = ("", "; needed", "; cannot be told")[int(one["decision"])]
+    counted = one["judged"].to_numpy() == 1
+    if int(one["decision"]) == 1 and int(one["told"][0]) != 1:
+        worst = one["response"].to_numpy()[counted & (one["told"].to_numpy() == 1)][0]
+        verdict = f"; needed for the {worst}"
+    return f"{text}: {cost}{verdict}."
+
+
+def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
+    """A sentence for each effect by itself, for pairs that are more than their sum, and for what may be left out."""
+    singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
+    chosen = int(np.argmax(content["recommended"].to_numpy()))
+    tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
+    last = f"Nothing can be left out within {tolerance}."
+    if chosen:
+        share = saving(content, chosen, seconds)
+        last = f"Within {tolerance} the scene can do without {', '.join(named(content, chosen))}: saves {100 * share:.0f} %."
+    return [*(statement(content, k, seconds) for k in singles), *told_apart(content), last]
+
+
+def told_apart(content: xr.Dataset) -> list[str]:
+    """Pairs whose change of f is surely not the sum of the two, a sentence each."""
+    off = content["off"].to_numpy()
+    single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
+    found = []
+    for k, row in enumerate(off):
+        parts = np.flatnonzero(row).tolist()
+        if len(parts) != 2 or any(p not in single for p in parts):
+            continue
+        rows = [k, *(single[p] for p in parts)]
+        change = content["change"].to_numpy()[rows, 0]
+        limit = np.sqrt((content["limit"].to_numpy()[rows, 0] ** 2).sum())
+        more = change[0] - change[1:].sum()
+        if abs(more) > limit:
+            found.append(
+                f"{label(named(content, k))} interact: together they change f by {100 * change[0]:+.2g} %, "
+                f"not {100 * change[1:].sum():+.2g} %."
+            )
+    return found
+
+
+@style.drawn
+def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Figure":
+    """A bar an effect: change of f with its limits on a logarithmic scale, and beside it the time that it takes.
+
+    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is told by evaluations.
+    """
+    off = effects["off"].to_numpy()
+    seconds = seconds_of(timing)
+    rows = [k for k in range(1, len(off)) if off[k].sum() == 1]
+    chosen = int(np.argmax(effects["recommended"].to_numpy()))
+    rows += [chosen] if chosen not in (0, *rows) else []
+    figure, axes = style.grid(1, 2, 22.0 + 7.0 * len(rows), sharey=True, width_ratios=(3, 2))
+    change, limit = (100 * effects[name].to_numpy()[rows, 0] for name in ("change", "limit"))
+    colours = [
+        style.PALETTE[("green", "vermilion", "grey")[int(effects["decision"][k])]] for k in rows
+    ]
+    places = np.arange(len(rows))[::-1]
+    floor = 10.0 ** np.floor(np.log10(10.0 * float(effects.attrs["tolerance"])))
+    panel, cost = axes[0]
+    panel.barh(places, np.maximum(np.abs(change), floor), color=colours, height=0.6)
+    for place, value, half in zip(places, np.abs(change), limit, strict=True):
+        ends = np.maximum([value - half, value + half], floor)
+        panel.plot(ends, [place, place], color=style.PALETTE["black"], lw=0.9)
+    panel.set_xscale("log")
+    panel.set_xlim(floor, None)
+    panel.axvline(
+        100 * float(effects.attrs["tolerance"]), color=style.PALETTE["orange"], ls="--", lw=0.9
+    )
+    panel.set_yticks(places, [_wrapped(named(effects, k), k == chosen) for k in rows])
+    panel.set_xlabel("change of $f$ (%)")
+    cost.barh(
+        places, [100 * saving(effects, k, seconds) for k in rows], color=style.PALETTE["blue"],
+        height=0.6,
+    )  # fmt: skip
+    cost.set_xlim(
+        -50, 100
+    )  # what takes longer than half as much again is no saving, however much longer
+    cost.set_xlabel("time saved (%)")
+    style.settle(axes, 3)
+    return figure
+
+
+def _wrapped(names: list[str], recommended: bool) -> str:
+    """A label of few words a line, marked if it is what is recommended."""
+    lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
+    return "\n".join(lines) + (" (left out)" if recommended else "")

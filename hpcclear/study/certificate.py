@@ -1,0 +1,64 @@
+"""The certificate of effects as a stage of a study: which effects it could do without."""
+
+import json
+
+import numpy as np
+
+from hpcclear.base.arrays import Records
+from hpcclear.ensemble.effects import Trial, effects_dataset
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.report.figures.effects import statements
+from hpcclear.results.names import SECONDS_PER_SAMPLE
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+from hpcclear.study.extent import certificate_samples
+from hpcclear.study.run import Result, StudyRun
+
+
+def certify(run: StudyRun) -> None:
+    """Simulate with effects on and off, each design of it kept by itself; write effects.nc and tell what can be left out.
+
+    Raises
+    ------
+    InputError
+        No effect of the scene can be off, or its objective is nought.
+    """
+    asked = run.study.certificate
+    assert asked is not None
+    trial = Trial(run.scene)
+    samples = certificate_samples(run.scene) if asked.samples is None else asked.samples
+    count = 0
+
+    def simulate(scene: Scene, points: Points) -> Records:
+        nonlocal count
+        count += 1
+        kept = run.part(f"effects-{count}", _simulated, scene, points)
+        return _records(kept)
+
+    run.announce("effects")
+    with run.ranks.stage("effects"):
+        found = trial.certify(trial.plan(asked.tolerance, samples, asked.forces), simulate)
+    content = effects_dataset(trial, found, {})
+    run.write(content, "effects.nc")
+    with run.ranks.stage("effects: cost"):
+        seconds = trial.seconds(found.variants)
+    run.times[SECONDS_PER_SAMPLE] = json.dumps(seconds)
+    for text in statements(content, seconds):
+        run.tell(text)
+
+
+_KEPT = ("objective", "peak_contact_force", "rhs_evaluations")
+
+
+def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:
+    records = sample_points(scene, points, run.ranks, stage="effects: simulations")
+    return {name: records[name] for name in _KEPT}
+
+
+def _records(kept: Result) -> Records:
+    """What was kept of records, as records."""
+    types = [(name, kept[name].dtype, kept[name].shape[1:]) for name in _KEPT]
+    found = np.zeros(len(kept["objective"]), types)
+    for name in _KEPT:
+        found[name] = kept[name]
+    return found

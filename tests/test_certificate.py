@@ -1,0 +1,517 @@
+"""Certificates of effects: changes with limits, the procedure on formulas, scenes with effects off, command and stage."""
+
+import json
+import math
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray as xr
+from commands import finish, kill, overrides, ranks_of, result_files, run, start
+from margins import at_least, fewest
+from patience import crowded
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli.effects import tolerance_of
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.ensemble.certificate import Certificate, Plan, Seen, Verdict, certificate, interaction
+from hpcclear.ensemble.effects import Drawn, Trial
+from hpcclear.ranks.boundary import alone
+from hpcclear.report import effects_figure
+from hpcclear.report.figures.effects import saving, seconds_of, statements
+from hpcclear.report.html.page import write_report
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.names import SECONDS_PER_SAMPLE
+from hpcclear.scene import load_scene
+from hpcclear.scene.loading import parse
+from hpcclear.scene.switches import Off, switches
+from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
+from hpcclear.study import certificate as stage
+from hpcclear.study.extent import certificate_samples, samples_of
+from hpcclear.study.run import StudyRun
+from hpcclear.study.simulations import Simulations
+
+sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
+
+import formula
+
+JOBS = Path(__file__).parent.parent / "jobs"
+SCENE = JOBS / "slider_crank.toml"
+SETTINGS = ("joints.rod_slider.kind=ideal", "effects.gravity=9.81", "effects.slider_load=-0.5")
+"""What matters: play, contact damping. What does not, to 2 %: friction, gravity, load."""
+
+
+# ---- changes ---------------------------------------------------------------------------------------
+
+
+def test_changes_of_what_is_proportional_are_exact():
+    on = np.random.default_rng(0).uniform(1.0, 2.0, (16, 8))
+    for found in (mean_change(on, 1.03 * on, 0.95), deviation_change(on, 1.03 * on, 0.95)):
+        assert found.value == pytest.approx(0.03, rel=1e-12)
+        assert found.limit < 1e-14
+    shifted = mean_change(on, on + 0.1, 0.95)
+    assert shifted.value == pytest.approx(0.1 / on.mean(), rel=1e-12)
+    assert deviation_change(on, on + 0.1, 0.95).value == pytest.approx(0.0, abs=1e-12)
+    assert point_change(on, on + 0.1) == pytest.approx(0.1 / on.mean(), rel=1e-12)
+    nothing = mean_change(np.zeros((16, 1)), np.zeros((16, 1)), 0.95)
+    assert nothing == (0.0, 0.0)
+    assert not math.isfinite(mean_change(np.zeros((16, 1)), np.ones((16, 1)), 0.95).value)
+
+
+def test_limits_hold_the_change_as_often_as_they_say(shift):
+    """Designs that differ, pairs that share them, chaos on top: the true change lies within 95 % limits in 95 % of cases."""
+    rng, inside = np.random.default_rng(shift + 7), np.zeros(2, int)
+    for _ in range(400):
+        level = rng.uniform(1.0, 3.0, (16, 1))
+        scatter = rng.standard_normal((2, 16, 8))
+        chaos = 0.3 * rng.standard_normal((2, 16, 8))
+        on = level * (1.0 + 0.1 * scatter[0]) + 0.1 * chaos[0]
+        off = 1.02 * level * (1.0 + 0.1 * scatter[0]) + 0.1 * chaos[1]
+        found = mean_change(on, off, 0.95)
+        inside[0] += abs(found.value - 0.02) <= found.limit
+        same = level * (1.0 + 0.1 * scatter[1])  # independent of `on`, of the same deviation
+        found = deviation_change(level * (1.0 + 0.1 * scatter[0]), same, 0.95)
+        inside[1] += abs(found.value) <= found.limit
+    for count in inside:
+        at_least(count, fewest(400, 0.94))
+
+
+def test_pairs_that_fail_leave_a_change_unknown():
+    on = np.ones((16, 4))
+    off = 1.01 * on
+    off[0, 0] = np.nan
+    assert mean_change(on, off, 0.95).value == pytest.approx(0.01)
+    off[:4] = np.nan  # a quarter
+    assert math.isnan(mean_change(on, off, 0.95).value)
+
+
+# ---- the procedure ---------------------------------------------------------------------------------
+
+
+def followed(change, effects, tolerance=0.01, noise=0.0, most=256, saves=None) -> Certificate:
+    """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k]."""
+    saves = saves or [0.3] * effects
+    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, lambda off: 1.0)
+    asking = certificate(plan)
+    wanted = next(asking)
+    while True:
+        told = []
+        for one in wanted:
+            rows = np.arange(one.first, one.last)
+            design = 1.0 + 0.5 * np.sin(1.0 + rows)[:, None] * np.ones((1, 4))
+            rng = np.random.default_rng([*one.off, 99, one.first])
+            f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
+            work = 1000.0 * np.prod([1.0 - saves[k] for k in one.off])
+            told.append(
+                Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)))
+            )  # fmt: skip
+        try:
+            wanted = asking.send(told)
+        except StopIteration as end:
+            return end.value
+
+
+def test_what_is_within_the_tolerance_is_left_out_together():
+    sizes = [0.002, 0.2, -0.003, 0.004]
+    found = followed(lambda off: sum(sizes[k] for k in off), 4)
+    assert found.recommended == (0, 2, 3)
+    assert found.book.verdict((1,)) is Verdict.BEYOND
+    assert found.book.changes((0, 2, 3)).mean.value == pytest.approx(0.003, abs=1e-9)
+
+
+def test_a_sum_beyond_the_tolerance_drops_what_saves_least():
+    """Three changes of 0.4 % each are 1.2 %: the two that save most are left out."""
+    found = followed(lambda off: 0.004 * len(off), 3, saves=[0.5, 0.1, 0.3])
+    assert found.recommended == (0, 2)
+
+
+def test_an_effect_whose_absence_costs_more_stays_on():
+    found = followed(lambda off: 0.001 * len(off), 2, saves=[-0.5, 0.2])
+    assert found.recommended == (1,)
+    assert found.book.verdict((0,)) is Verdict.WITHIN
+
+
+def test_effects_that_are_one_another_s_substitute_stay_on():
+    """Either of 0 and 1 may go, both may not: alone each change is 0."""
+
+    def change(off):
+        return 0.3 if {0, 1} <= set(off) else 0.0
+
+    found = followed(change, 3, saves=[0.2, 0.4, 0.3])
+    assert found.recommended == (1, 2)
+    assert (0, 1) in found.variants  # the pair that explains it
+    assert interaction(found.book, (0, 1))[0] == pytest.approx(0.3, abs=1e-9)
+    assert interaction(found.book, (1, 2))[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not():
+    quiet = followed(lambda off: 0.002 * len(off), 1, noise=0.06)
+    assert quiet.recommended == (0,)
+    assert quiet.book.replicates((0,)) > 16  # it took more than a first look
+    loud = followed(lambda off: 0.0, 1, noise=0.5)
+    assert loud.recommended == ()
+    assert loud.book.verdict((0,)) is Verdict.UNTOLD
+    assert loud.book.replicates((0,)) == 256
+
+
+def test_the_cheapest_set_that_is_impossible_is_not_asked_for():
+    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), lambda off: 1.0)
+    asking = certificate(plan)
+    wanted = next(asking)
+    while True:
+        assert all(one.off != (0, 1) for one in wanted)
+        ones = [np.ones((one.last - one.first, 4)) for one in wanted]
+        try:
+            wanted = asking.send([Seen(x, np.ones((*x.shape, 1)), x.astype(int)) for x in ones])
+        except StopIteration as end:
+            found = end.value
+            break
+    assert found.recommended == (0,)
+
+
+# ---- scenes with effects off -----------------------------------------------------------------------
+
+
+def test_every_effect_of_a_slider_crank_is_found_and_its_entries_go():
+    scene = load_scene(
+        JOBS / "quickstart.toml",
+        ["effects.gravity=9.81", "effects.slider_load=20.0", "effects.guide_friction={coefficient=0.1}",
+         'drive={kind="torque", torque=1.0, initial_speed="3000 rpm"}'],
+    )  # fmt: skip
+    found = {one.name: one for one in switches(scene)}
+    assert list(found) == [
+        "play in crank_rod", "play in rod_slider", "friction in joints", "contact damping", "gravity",
+        "slider load", "guide friction", "speed fluctuation",
+    ]  # fmt: skip
+    off = {name: Off(scene, [one]).scene for name, one in found.items()}
+    assert off["play in crank_rod"].clearance_joints() == ("rod_slider",)
+    assert off["friction in joints"].effects.friction.law == "none"
+    assert off["contact damping"].effects.contact.law == "hertz"
+    assert off["gravity"].effects.gravity == 0.0
+    assert off["slider load"].effects.slider_load is None
+    assert off["guide friction"].effects.guide_friction is None
+    assert off["speed fluctuation"].drive.speed == scene.drive.initial_speed
+    for name, one in off.items():  # and nothing else
+        assert {k for k in one.resolved() if one.resolved()[k] != scene.resolved()[k]} <= {
+            "joints", "drive", "effects", "study",
+        }, name  # fmt: skip
+        assert load_scene(parse(one.to_toml(), name)) == one
+
+
+def test_without_any_play_friction_in_it_goes_too():
+    scene = load_scene(SCENE)
+    plays = [one for one in switches(scene) if one.joint is not None]
+    assert Off(scene, plays).scene.effects.friction.law == "none"
+
+
+def test_what_the_study_asks_about_is_not_tried():
+    scene = load_scene(SCENE, ['numerics.objective_joints=["crank_rod"]'])
+    assert "play in crank_rod" not in [one.name for one in switches(scene)]
+    assert "play in rod_slider" in [one.name for one in switches(scene)]
+
+
+def test_columns_drive_what_is_left_and_the_study_forgets_what_is_gone():
+    scene = load_scene(
+        JOBS / "quickstart.toml",
+        ["study.variables.g={path='effects.gravity', range=[1.0, 10.0]}", "effects.gravity=9.81",
+         "study.random.g={distribution='uniform', half_width=0.5}",
+         'study.cases.heavy=["g"]', 'study.surrogate.optimisation=["m2", "m3", "u2", "I2", "C", "g"]'],
+    )  # fmt: skip
+    found = {one.name: one for one in switches(scene)}
+    off = Off(scene, [found["play in rod_slider"], found["gravity"]])
+    assert off.paths(scene.study.variable("C").paths) == ("joints.crank_rod.clearance",)
+    assert off.paths(("effects.gravity",)) == ()
+    study = off.scene.study
+    assert "g" not in study.names
+    assert [case.name for case in study.cases] == ["deterministic", "robust"]
+    assert study.variable("C").paths == ("joints.crank_rod.clearance",)
+
+
+def test_correlations_of_what_is_left_stay():
+    correlation = '{inputs=["C", "m2", "g"], matrix=[[1, 0.5, 0.2], [0.5, 1, 0.1], [0.2, 0.1, 1]]}'
+    settings = [
+        "effects.gravity=9.81", f"study.correlation={correlation}",
+        "study.random.g={path='effects.gravity', distribution='uniform', half_width=0.5}",
+    ]  # fmt: skip
+    scene = load_scene(JOBS / "quickstart.toml", settings)
+    gravity = next(one for one in switches(scene) if one.name == "gravity")
+    left = Off(scene, [gravity]).scene.study.correlation
+    assert tuple(left.inputs) == ("C", "m2")
+    np.testing.assert_array_equal(left.matrix, [[1.0, 0.5], [0.5, 1.0]])
+
+
+def test_a_moved_number_is_found_where_it_stands():
+    scene = load_scene(SCENE, ['drive={kind="torque", torque=1.0, initial_speed="3000 rpm"}'])
+    drive = next(one for one in switches(scene) if one.name == "speed fluctuation")
+    assert Off(scene, [drive]).paths(("drive.initial_speed", "drive.torque")) == ("drive.speed",)
+
+
+def test_a_linkage_has_its_effects_by_name():
+    scene = load_scene(JOBS / "linkages" / "four_stroke.toml")
+    found = {one.name: one for one in switches(scene)}
+    assert {"play in big_end", "guide friction in bore", "force gas", "gravity"} <= set(found)
+    off = Off(
+        scene, [found["play in big_end"], found["guide friction in bore"], found["force gas"]]
+    )
+    joints = off.scene.resolved()["mechanism"]["joints"]
+    assert joints["big_end"]["kind"] == "revolute"
+    assert "friction" not in joints["bore"]
+    assert "gas" not in off.scene.resolved()["mechanism"].get("loads", {})
+
+
+def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
+    trial = Trial(load_scene(JOBS / "linkages" / "quick_return.toml"))
+    assert "play in o2" in trial.kept
+    assert "play in o2" not in [one.name for one in trial.switches]
+
+
+# ---- points ----------------------------------------------------------------------------------------
+
+
+def test_points_are_the_same_however_many_are_drawn():
+    for name, settings in (("quickstart.toml", ()), ("slider_crank.toml", ())):
+        drawn = Drawn(load_scene(JOBS / name, settings))
+        whole = drawn.points(0, 8).values
+        parts = np.concatenate([drawn.points(0, 4).values, drawn.points(4, 8).values])
+        np.testing.assert_array_equal(whole, parts)
+        assert len(whole) == 8 * drawn.size
+
+
+def test_replicates_scatter_about_designs_of_their_own():
+    scene = load_scene(JOBS / "quickstart.toml")
+    drawn = Drawn(scene)
+    values = drawn.points(0, 16)
+    mass = values.column("m2").reshape(16, drawn.size)
+    assert (np.ptp(mass, axis=1) <= 0.01).all()  # half-width 5 g
+    assert np.ptp(mass.mean(axis=1)) > 0.2  # all over the range
+    clearance = values.column("C").reshape(16, drawn.size)
+    assert (np.ptp(clearance, axis=1) > 0.4e-3).all()
+
+
+def test_a_certificate_takes_a_twentieth_of_its_study():
+    scene = load_scene(JOBS / "robust_slider_crank.toml")
+    effects, samples = len(switches(scene)), certificate_samples(scene)
+    assert samples * (effects + 2) <= 0.1 * sum(samples_of(scene).values())
+    assert samples >= 128
+
+
+# ---- bad input -------------------------------------------------------------------------------------
+
+
+def test_tolerances_in_words():
+    assert tolerance_of("1%") == tolerance_of("0.01") == 0.01
+    for words in ("much", "1 mm", ""):
+        with pytest.raises(InputError, match="tolerance"):
+            tolerance_of(words)
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["--tolerance", "0"], "--tolerance"),
+        (["--tolerance", "nan"], "--tolerance"),
+        (["--tolerance", "150%"], "--tolerance"),
+        (
+            overrides("joints.crank_rod.kind=ideal", "joints.rod_slider.kind=ideal", "effects.friction=none"),
+            "no effect",
+        ),
+        (["--samples", "3"], "--samples"),
+    ],
+)  # fmt: skip
+def test_bad_words_end_with_2(tmp_path, words, found):
+    code, output = run(["effects", str(SCENE), "-o", str(tmp_path / "e.nc"), *words], 0)
+    assert code == 2, output
+    assert found in output
+    assert not (tmp_path / "e.nc").exists()
+
+
+def test_an_objective_that_is_nought_is_refused(tmp_path):
+    ideal = overrides(
+        "joints.crank_rod.kind=ideal", "joints.rod_slider.kind=ideal", "effects.friction=none"
+    )
+    words = [
+        "effects",
+        str(SCENE),
+        "-o",
+        str(tmp_path / "e.nc"),
+        *ideal,
+        "--set",
+        "effects.gravity=9.81",
+    ]
+    code, output = run(words, 0)
+    assert code == 2, output
+    assert "mean-gap" in output
+    assert "peak-crank-moment" in output
+
+
+# ---- the command -----------------------------------------------------------------------------------
+
+
+def words(output: Path, *further: str) -> list[str]:
+    quick = ["--tolerance", "2%", "--samples", "64", *further]
+    return ["effects", str(SCENE), "-o", str(output), *overrides(*SETTINGS), *quick]
+
+
+@pytest.fixture(scope="module")
+def certified(tmp_path_factory):
+    """Folder and output of one run."""
+    place = tmp_path_factory.mktemp("effects")
+    code, output = run(words(place / "e.nc", "--scene", str(place / "reduced.toml")), 0)
+    assert code == 0, output
+    return place, output
+
+
+def test_the_scene_that_is_printed_stays_within_the_tolerance(certified):
+    """By points of its own, which the certificate has not seen."""
+    place, output = certified
+    content = dataset.read(place / "e.nc", "effects")
+    chosen = int(np.argmax(content["recommended"].to_numpy()))
+    off = content["off"].to_numpy()[chosen]
+    names = content["effect"].to_numpy()
+    assert set(names[off == 1]) == {"friction in joints", "gravity", "slider load"}
+    whole = load_scene(SCENE, SETTINGS)
+    pasted = tomllib.loads(output[output.index("# Within") :])
+    reduced = load_scene({**whole.resolved(), **pasted})
+    assert reduced == load_scene(place / "reduced.toml")
+    assert reduced.effects.gravity == 0.0
+    assert reduced.effects.friction.law == "none"
+    points = Drawn(whole).points(64, 80)
+    on, less = (evaluate_records(one, points)["objective"] for one in (whole, reduced))
+    assert abs(less.mean() / on.mean() - 1.0) < 0.02
+    assert float(content["change"][chosen, 0]) == pytest.approx(
+        less.mean() / on.mean() - 1.0, abs=2e-3
+    )
+
+
+def test_what_is_needed_is_said_so(certified):
+    place, output = certified
+    content = dataset.read(place / "e.nc", "effects")
+    needed = {str(name) for name, row in zip(content["effect"].to_numpy(), content["off"].T, strict=True)
+              if int(content["decision"][int(np.argmax(row.to_numpy()))]) == Verdict.BEYOND}  # fmt: skip
+    assert needed == {"play in crank_rod", "contact damping"}
+    assert "play in crank_rod changes f by -100.00 %" in output
+    assert "contact damping changes f by" in output
+    flat = " ".join(output.split())
+    assert "gravity changes f by 0.0" in flat
+    assert "without friction in joints, gravity, slider load" in flat
+
+
+def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
+    place, _ = certified
+    timing = dataset.read(place / "timing.nc", "timing")
+    seconds = seconds_of(timing)
+    assert set(seconds) >= {"all on", "gravity", "friction in joints + gravity + slider load"}
+    assert all(0.0 < value < 10.0 for value in seconds.values())
+    content = dataset.read(place / "e.nc", "effects")
+    assert "seconds" not in " ".join([*content.variables, *content.attrs])
+    assert saving(content, 1, {}) == pytest.approx(1.0 - float(content["work"][1]))
+    assert saving(content, 1, {"all on": 4.0, "play in crank_rod": 1.0}) == 0.75
+
+
+def test_figure_and_page(certified):
+    place, _ = certified
+    content, timing = (dataset.read(place / name) for name in ("e.nc", "timing.nc"))
+    figure = effects_figure(content, timing)
+    bars = figure.axes[0].patches
+    names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
+    assert len(bars) == len(names) == 6  # five effects and the set
+    change = 100 * abs(float(content["change"][1, 0]))
+    assert bars[0].get_width() == pytest.approx(change)
+    assert effects_figure(content) is not None
+    page = write_report(place).read_text(encoding="utf-8")
+    assert "play in crank_rod changes f by" in page
+    assert "time that leaving it out saves" in page
+
+
+@pytest.mark.mpi
+def test_ranks_and_a_kill_change_no_byte(certified, tmp_path):
+    place, _ = certified
+    expected = (place / "e.nc").read_bytes()
+    for ranks in (2, 3):
+        out = tmp_path / str(ranks) / "e.nc"
+        out.parent.mkdir()
+        code, output = run(words(out), ranks)
+        assert code == 0, output
+        assert out.read_bytes() == expected
+    out = tmp_path / "killed" / "e.nc"
+    out.parent.mkdir()
+    job = start([*words(out), "--checkpoint-interval", "0"], 2)
+    deadline = time.time() + crowded(60.0)
+    while not result_files(out.parent):
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.01)
+    kill(ranks_of(job)[1])
+    finish(job)
+    assert not out.exists()
+    code, output = run(words(out), 2)
+    assert code == 0, output
+    assert out.read_bytes() == expected
+
+
+def test_a_linkage_is_certified(tmp_path):
+    """A crank-rocker with one soft, well damped pin, which moves regularly: a breath of a torque does not matter."""
+    scene = load_scene(JOBS / "linkages" / "crank_rocker.toml", ["study.cases={}"]).with_(
+        {"study": None}
+    )
+    content = scene.resolved()
+    content["numerics"] |= {"transient_revolutions": 1, "averaged_revolutions": 1}
+    content["mechanism"]["joints"]["o3"] = {
+        "kind": "revolute",
+        "journal": "coupler.b",
+        "bearing": "rocker.b",
+    }
+    content["mechanism"]["joints"]["o2"]["materials"]["bearing"]["youngs_modulus"] = 5e7
+    content["effects"]["contact"] = {"law": "hunt-crossley", "damping": 20.0}
+    content["mechanism"]["loads"] = {"breath": {"kind": "torque", "body": "rocker", "torque": 1e-9}}
+    file = tmp_path / "linkage.toml"
+    file.write_text(tomli_w.dumps(content), encoding="utf-8")
+    code, output = run(["effects", str(file), "-o", str(tmp_path / "e.nc"), "--samples", "64"], 0)
+    assert code == 0, output
+    found = dataset.read(tmp_path / "e.nc", "effects")
+    rows = {str(name): k + 1 for k, name in enumerate(found["effect"].to_numpy())}
+    assert set(rows) >= {"play in o2", "friction in joints", "gravity", "torque breath"}
+    assert float(found["change"][rows["play in o2"], 0]) == -1.0  # no other gap is left
+    assert int(found["decision"][rows["torque breath"]]) == Verdict.WITHIN
+    chosen = found.isel(variant=int(np.argmax(found["recommended"].to_numpy())))
+    assert int(chosen["off"].sel(effect="torque breath")) == 1
+    assert int(chosen["off"].sel(effect="play in o2")) == 0
+
+
+# ---- the stage of a study --------------------------------------------------------------------------
+
+
+def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
+    """On a mechanism that is a formula, which no effect changes but the clearance that it reads."""
+    formula.replace_dynamics(monkeypatch.setattr)
+    monkeypatch.setattr(Trial, "seconds", lambda trial, variants: {"all on": 2.0})
+    settings = [
+        "study.certificate={tolerance=0.05, samples=128}",
+        'numerics.objective_joints=["crank_rod"]',
+    ]
+    scene = load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), settings)
+    told: list[str] = []
+
+    def once():
+        checkpoint = Checkpoint(tmp_path / "checkpoint", {"a": "b"}, names=scene.study.names)
+        ranks = alone()
+        simulations = Simulations(scene, ranks, checkpoint, "quiet")
+        run = StudyRun(scene, tmp_path, ranks, checkpoint, simulations, told.append)
+        stage.certify(run)
+        return run, (tmp_path / "effects.nc").read_bytes()
+
+    first, written = once()
+    assert json.loads(first.times[SECONDS_PER_SAMPLE]) == {"all on": 2.0}
+    content = dataset.read(tmp_path / "effects.nc", "effects")
+    chosen = content.isel(variant=int(np.argmax(content["recommended"].to_numpy())))
+    assert int(chosen["off"].sum()) == 2  # the other play, and contact damping
+    assert any("can do without play in rod_slider, contact damping" in text for text in told)
+    monkeypatch.setattr(stage, "sample_points", None)  # all is kept: nothing is simulated again
+    assert once()[1] == written
+    assert statements(content, {}) is not None
+    assert isinstance(content, xr.Dataset)
