@@ -296,7 +296,7 @@ def test_replicates_scatter_about_designs_of_their_own():
 def test_a_certificate_takes_a_twentieth_of_its_study():
     scene = load_scene(JOBS / "robust_slider_crank.toml")
     effects, samples = len(switches(scene)), certificate_samples(scene)
-    assert samples * (effects + 2) <= 0.1 * sum(samples_of(scene).values())
+    assert samples * (effects + 2) <= 0.05 * sum(samples_of(scene).values())
     assert samples >= 128
 
 

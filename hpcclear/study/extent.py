@@ -65,11 +65,11 @@ CERTIFICATE_SHARE = 0.05
 def certificate_samples(scene: Scene) -> int:
     """Samples of a variant at most, for a certificate of effects that takes a small share of the study it serves.
 
-    Half of the variants go that far, as a rule; never fewer than a first look needs.
+    Counted are the whole scene, each effect by itself and one set of them; never fewer than a first look needs.
     """
     study = scene.study
     if study is None:
         return effects.SAMPLES
     total = sum(samples_of(scene).values()) if study.cases else study.samples
     variants = len(switches(scene)) + 2
-    return int(min(max(2 * CERTIFICATE_SHARE * total / variants, effects.LEAST), effects.SAMPLES))
+    return int(min(max(CERTIFICATE_SHARE * total / variants, effects.LEAST), effects.SAMPLES))
