@@ -3,8 +3,8 @@
 python analysis/effects_kept.py --scenes 60      (an hour or two on one core: most of it to compare with)
 
 Each scene is a slider-crank of ordinary size (that of target_error.py) with a random set of effects, a random objective and a
-study of its masses and clearances (1 um to 0.8 mm) with default sizes. The reduced scene is judged at points that the certificate
-has not seen. Results are kept scene by scene, a line of JSON each; the same command goes on from there.
+study of its masses and clearances (1 um to 0.8 mm) with default sizes. The reduced scene is judged at points that the
+certificate has not seen. Results are kept scene by scene, a line of JSON each; the same command goes on from there.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.ensemble.certificate import Asked
-from hpcclear.ensemble.effects import CONFIDENCE, Trial
+from hpcclear.ensemble.trial import CONFIDENCE, Trial
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.paired import Change, deviation_change, mean_change
@@ -179,7 +179,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument(
-        "--replicates", type=int, default=512, help="of fresh points, a power of two"
+        "--replicates", type=int, default=256, help="of fresh points, a power of two"
     )
     parser.add_argument(
         "-o", "--output", type=Path, default=JOB.parent.parent / "results" / "effects_kept.jsonl"

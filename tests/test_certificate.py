@@ -16,10 +16,19 @@ from margins import at_least, fewest
 from patience import crowded
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.ensemble.certificate import Certificate, Plan, Seen, Verdict, certificate, interaction
-from hpcclear.ensemble.effects import Drawn, Trial
+from hpcclear.ensemble.certificate import (
+    Asked,
+    Certificate,
+    Plan,
+    Seen,
+    Verdict,
+    certificate,
+    interaction,
+)
+from hpcclear.ensemble.trial import Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import effects_figure
 from hpcclear.report.figures.effects import saving, seconds_of, statements
@@ -268,6 +277,26 @@ def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
     trial = Trial(load_scene(JOBS / "linkages" / "quick_return.toml"))
     assert "play in o2" in trial.kept
     assert "play in o2" not in [one.name for one in trial.switches]
+
+
+def test_what_is_far_dearer_without_an_effect_ends_as_failed():
+    """Of a motion that the explicit method takes long over, friction stands for the effect."""
+    scene = load_scene(SCENE, ["numerics.max_steps=1000000"])
+    trial = Trial(scene)
+    records = np.zeros(4, OUTCOME)
+    records["rhs_evaluations"] = 600
+    assert trial.simulated((0,)).numerics.max_steps == 1_000_000  # nothing is known yet
+    for off in ((), (0,)):
+        trial.seen(Asked(off, 0, 1), records)
+    assert trial.simulated((0,)).numerics.max_steps == 10 * 600 // 6 + 1000
+    assert trial.simulated(()).numerics.max_steps == 1_000_000
+    assert (
+        trial.variant((0,)).scene.numerics.max_steps == 1_000_000
+    )  # what is recommended has its own
+    aimed = Trial(load_scene(SCENE, ["numerics.target_error=0.01"]))
+    records["steady_revolutions"] = 50.0
+    aimed.seen(Asked((), 0, 1), records)
+    assert aimed.simulated((0,)).numerics.target_revolutions == 600
 
 
 # ---- points ----------------------------------------------------------------------------------------

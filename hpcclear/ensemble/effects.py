@@ -5,8 +5,9 @@ for every variant, simulated on all ranks and kept in the checkpoint.
 """
 
 import json
+import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,39 +17,17 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
-from hpcclear.dynamics.problem import coordinate_count, problem_of
-from hpcclear.ensemble.certificate import (
-    Asked,
-    Certificate,
-    Changes,
-    Plan,
-    Seen,
-    Variant,
-    certificate,
-    judged,
-)
+from hpcclear.dynamics.problem import coordinate_count
+from hpcclear.ensemble.certificate import Certificate, Changes, Plan, Seen, judged
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points, saving
+from hpcclear.ensemble.trial import Trial
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.names import ALL_ON, SECONDS_PER_SAMPLE
-from hpcclear.scene import Scene
+from hpcclear.results.names import SECONDS_PER_SAMPLE
+from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import generator, monte_carlo
-from hpcclear.scene.switches import Off, Switch, switches
-
-CONFIDENCE = 0.99
-"""Of each change's limits: several are looked at, and each more than once."""
-
-SCATTER = 8
-"""Points of a replicate about its design, where the study has random inputs."""
-
-TOGETHER = 4
-"""Points of a replicate where it has none."""
-
-VICINITY = 0.01
-"""Relative half-width of the clearances about a scene without a study, so that a chaotic motion shows as scatter."""
 
 SAMPLES = 4096
 """Samples of a variant at most, unless another number is asked for."""
@@ -56,183 +35,12 @@ SAMPLES = 4096
 LEAST = 128
 """Samples of a variant at least: a first look."""
 
-Simulate = Callable[[Scene, Points], Records]
 
-
-class Drawn:
-    """The points at which all variants are compared, replicate by replicate.
-
-    With a study, designs all over its variables and, about each, its random inputs; without, clearances about the scene's.
-
-    Attributes
-    ----------
-    size : int
-        Points of a replicate.
-    scattered : bool
-        Whether they scatter about one design.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self.scattered = scene.study is not None and bool(scene.study.random)
-        self.size = SCATTER if self.scattered else TOGETHER
-
-    def points(self, first: int, last: int) -> Points:
-        """Points of replicates `first` to `last`, replicate by replicate."""
-        count = last - first
-        if self._scene.study is None:
-            return self._vicinity(first, count)
-        designs = monte_carlo(
-            self._scene, count * (1 if self.scattered else self.size), random=(),
-            purpose="designs of effects", scrambling=0, first=first * (1 if self.scattered else self.size),
-        )  # fmt: skip
-        if not self.scattered:
-            return designs
-        parts = [
-            monte_carlo(
-                self._scene, self.size, purpose="effects", scrambling=first + k,
-                design=dict(zip(designs.names, row.tolist(), strict=True)),
-            )
-            for k, row in enumerate(designs.values)
-        ]  # fmt: skip
-        return Points(parts[0].names, np.concatenate([one.values for one in parts]), parts[0].paths)
-
-    def _vicinity(self, first: int, count: int) -> Points:
-        scene = self._scene
-        paths = [f"{scene.joint_key(name)}.clearance" for name in scene.clearance_joints()]
-        own = np.array([scene.number(path) for path in paths])
-        rows = [
-            generator(0, "effects", str(first + k)).uniform(-1.0, 1.0, (self.size, len(paths)))
-            for k in range(count)
-        ]
-        values = own * (1.0 + VICINITY * np.concatenate(rows))
-        return Points(tuple(paths), values, tuple((path,) for path in paths))
-
-
-class Trial:
-    """A scene, the effects that it might do without, and how variants of it are simulated.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Attributes
-    ----------
-    switches : tuple of Switch
-        Effects that are tried.
-    kept : dict of str to str
-        Effects that cannot be off by themselves, by name, and why.
-
-    Raises
-    ------
-    InputError
-        The scene has no effect that could be off.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.drawn = Drawn(scene)
-        self.kept: dict[str, str] = {}
-        self.switches: tuple[Switch, ...] = ()
-        for one in switches(scene):
-            try:
-                problem_of(Off(scene, [one]).scene)
-                self.switches += (one,)
-            except InputError as error:
-                self.kept[one.name] = error.reason
-        if not self.switches:
-            raise InputError(
-                "effects", None, "the scene has no effect that could be left out",
-                "See hpcclear check for what is on",
-            )  # fmt: skip
-        self._variants: dict[Variant, Off | None] = {}
-
-    def names(self, off: Variant) -> tuple[str, ...]:
-        """Names of the effects that are off."""
-        return tuple(self.switches[k].name for k in off)
-
-    def possible(self, off: Variant) -> bool:
-        """Whether such effects can be off together."""
-        if off not in self._variants:
-            try:
-                made = Off(self.scene, [self.switches[k] for k in off])
-                problem_of(made.scene)
-                self._variants[off] = made
-            except InputError:
-                self._variants[off] = None
-        return self._variants[off] is not None
-
-    def variant(self, off: Variant) -> Off:
-        """The scene with them off."""
-        if not self.possible(off):
-            raise ValueError(f"{self.names(off)} cannot be off together")
-        made = self._variants[off]
-        assert made is not None
-        return made
-
-    def plan(self, tolerance: float, samples: int, forces: bool) -> Plan:
-        """What is asked of the certificate."""
-        most = max(samples // self.drawn.size, 4)
-        return Plan(
-            len(self.switches), tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
-            forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
-        )  # fmt: skip
-
-    def points(self, asked: Asked) -> Points:
-        """Its points: the same columns for every variant, which drive what is there of it."""
-        return self._seen_by(asked.off, self.drawn.points(asked.first, asked.last))
-
-    def _seen_by(self, off: Variant, points: Points) -> Points:
-        made = self.variant(off)
-        return Points(points.names, points.values, tuple(made.paths(row) for row in points.paths))
-
-    def seen(self, asked: Asked, records: Records) -> Seen:
-        """What the certificate is told of records."""
-        scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
-        force = np.full((len(records), len(labels)), np.nan)
-        for name in scene.clearance_joints():
-            place = scene.joint_labels.index(name)
-            force[:, labels.index(name)] = records["peak_contact_force"][:, place]
-        shape = (asked.last - asked.first, self.drawn.size)
-        return Seen(
-            records["objective"].reshape(shape), force.reshape(*shape, len(labels)),
-            records["rhs_evaluations"].reshape(shape),
-        )  # fmt: skip
-
-    def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
-        """Follow the certificate to its end; raises what `simulate` does."""
-        asking = certificate(plan)
-        wanted = next(asking)
-        while True:
-            told = [
-                self.seen(one, simulate(self.variant(one.off).scene, self.points(one)))
-                for one in wanted
-            ]
-            try:
-                wanted = asking.send(told)
-            except StopIteration as end:
-                found: Certificate = end.value
-                return found
-
-    def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
-        """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""
-        from hpcclear.dynamics.evaluator import DEFAULT_LANES
-
-        replicates = max(2 * DEFAULT_LANES // self.drawn.size, 1)
-        points = self.drawn.points(0, 2 ** int(np.log2(replicates)))
-        least = dict.fromkeys(variants, np.inf)
-        for _ in range(rounds):
-            for off in variants:
-                evaluator = evaluator_of(self.variant(off).scene, self._seen_by(off, points))
-                evaluator.submit(np.arange(len(points)), points.values)
-                began = time.process_time()
-                while evaluator.pending:
-                    evaluator.advance(0.2)
-                spent = time.process_time() - began
-                least[off] = min(least[off], spent / len(points))
-            if sum(least.values()) * len(points) > 2.0:
-                break  # long enough for noise not to count
-        return {" + ".join(self.names(off)) or ALL_ON: float(value) for off, value in least.items()}
+def compile_share(payloads: Sequence[Mapping[str, Any]], ranks: Ranks) -> None:
+    """Compile this rank's share of some variants; what one rank has compiled the others on its node load from disk."""
+    for payload in payloads[ranks.rank :: ranks.size]:
+        columns = Points(payload["names"], np.empty((0, len(payload["names"]))), payload["paths"])
+        evaluator_of(load_scene(payload["scene"]), columns, payload["lanes"]).advance(0.0)
 
 
 def run_effects(
@@ -296,6 +104,9 @@ def _certified(trial: Trial, plan: Plan, session: Session) -> xr.Dataset:
     units = dict(zip(points.names, points.units, strict=True))
     checkpoint = session.opened(points.names, units)
     first = 0
+    if session.options.style != "quiet":
+        print(f"compiling {len(trial.switches) + 1} variants", file=sys.stderr, flush=True)
+    session.ranks.everywhere("compile", compile_share, trial.payloads())
 
     def simulate(variant: Scene, design: Points) -> Records:
         nonlocal first

@@ -5,8 +5,9 @@ import json
 import numpy as np
 
 from hpcclear.base.arrays import Records
-from hpcclear.ensemble.effects import Trial, effects_dataset
+from hpcclear.ensemble.effects import effects_dataset
 from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.trial import Trial
 from hpcclear.report.figures.effects import statements
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
@@ -47,7 +48,7 @@ def certify(run: StudyRun) -> None:
         run.tell(text)
 
 
-_KEPT = ("objective", "peak_contact_force", "rhs_evaluations")
+_KEPT = ("objective", "peak_contact_force", "rhs_evaluations", "steady_revolutions")
 
 
 def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:
