@@ -241,6 +241,17 @@ def test_columns_drive_what_is_left_and_the_study_forgets_what_is_gone():
     assert study.variable("C").paths == ("joints.crank_rod.clearance",)
 
 
+def test_cases_keep_what_they_ask_for():
+    settings = [
+        'study.cases={play={random=["C", "m2"], objectives=["mean", {statistic="quantile", level=0.9}]}}'
+    ]
+    scene = load_scene(JOBS / "quickstart.toml", settings)
+    play = next(one for one in switches(scene) if one.name == "play in rod_slider")
+    left = Off(scene, [play]).scene.study.cases[0]
+    assert left.goals == scene.study.cases[0].goals
+    assert left.random == ("C", "m2")
+
+
 def test_correlations_of_what_is_left_stay():
     correlation = '{inputs=["C", "m2", "g"], matrix=[[1, 0.5, 0.2], [0.5, 1, 0.1], [0.2, 0.1, 1]]}'
     settings = [

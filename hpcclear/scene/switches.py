@@ -169,7 +169,10 @@ class Off:
                     same = paths == row.paths
                     left[table][row.name] = own if same else {**own, "paths": list(paths)}
         cases = {
-            case.name: {"random": [name for name in case.random if name in left["random"]]}
+            case.name: {
+                **content["cases"][case.name],
+                "random": [name for name in case.random if name in left["random"]],
+            }
             for case in study.cases
         }
         cases = {name: case for name, case in cases.items() if case["random"]}
