@@ -46,7 +46,7 @@ def windows(count, rtol, feedback):
     return validated(Scene, {**content, "effects": {"gravity": 9.81}})
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_flat_loops_are_passed_with_their_energy_or_told(count):
     for rtol in (1e-6, 1e-8, 1e-10):
         for feedback in (0.0, 250.0):
