@@ -10,6 +10,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.likelihood import negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
 from hpcclear.statistics.surrogate.predictor import gaussian
@@ -65,6 +66,28 @@ def test_likelihood_is_at_its_maximum(model):
     oracle.fit(model.to_unit(model.inputs), model.values)
     theta = np.log([model.signal_variance, *model.length_scales, model.noise_variance])
     assert oracle.log_marginal_likelihood(theta) > oracle.log_marginal_likelihood_value_ - 0.1
+
+
+@pytest.mark.parametrize(("dims", "count", "noise"), [(1, 30, 1e-8), (5, 80, 1e-3), (20, 120, 1.0)])
+def test_likelihood_and_gradient_are_those_of_scikit_learn(dims, count, noise):
+    rng = np.random.default_rng(dims)
+    points, values = rng.random((count, dims)), rng.standard_normal(count)
+    points[1] = points[0]  # twice the same design
+    theta = np.log([2.0, *rng.uniform(0.05, 3.0, dims), noise])
+    kernel = ConstantKernel(1.0) * RBF(np.ones(dims)) + WhiteKernel(1.0)
+    peer = GaussianProcessRegressor(kernel, alpha=0.0, optimizer=None).fit(points, values)
+    value, gradient = peer.log_marginal_likelihood(theta, eval_gradient=True)
+    found, slopes = negative_likelihood(theta, points - 0.5, values)
+    assert found == pytest.approx(-value, rel=1e-6)
+    np.testing.assert_allclose(slopes, -gradient, rtol=1e-6, atol=1e-6 * abs(gradient).max())
+
+
+def test_what_cannot_be_factored_is_never_the_best():
+    points = np.zeros((5, 2))  # five times the same design, and no noise to speak of
+    theta = np.log([1e3, 1.0, 1.0, 1e-20])
+    value, gradient = negative_likelihood(theta, points, np.arange(5.0))
+    assert value == np.inf
+    assert (gradient == 0.0).all()
 
 
 def test_exponential_is_accurate_to_the_last_digits():

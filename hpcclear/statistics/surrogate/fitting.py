@@ -1,16 +1,17 @@
-"""Kriging models fitted by maximum likelihood, with scikit-learn; sources: `kriging`."""
+"""Kriging models fitted by maximum likelihood (`likelihood`); sources: `kriging`."""
 
-import warnings
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.kriging import Kriging, inside
+from hpcclear.statistics.surrogate.likelihood import maximise
 
 LENGTH_BOUNDS = (1e-2, 1e2)
-"""Length scales in the unit cube; over scikit-learn's own (1e-5 to 1e5) noisy fits can collapse."""
+"""Length scales in the unit cube; over 1e-5 to 1e5 noisy fits can collapse."""
 SIGNAL_BOUNDS = (1e-3, 1e3)
 """Signal variance, in units of the variance of the values."""
 NOISE_BOUNDS = (1e-8, 1e1)
@@ -79,32 +80,16 @@ def _maximise_likelihood(
     lengths: tuple[float, float],
 ) -> dict[str, Any]:
     """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
-    # Imported here: only fitting needs scikit-learn, and loading it takes a second.
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     dims = unit.shape[1]
-    signal = ConstantKernel(1.0, SIGNAL_BOUNDS)
-    first = np.full(dims, min(0.5, lengths[1]))
-    kernel = signal * RBF(first, lengths) + WhiteKernel(1e-3, NOISE_BOUNDS)
+    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), 1e-3])
+    bounds = np.array([SIGNAL_BOUNDS, *[lengths] * dims, NOISE_BOUNDS])
     seed = int(rng.integers(2**31))
-    regressor = GaussianProcessRegressor(
-        kernel, alpha=0.0, n_restarts_optimizer=restarts, random_state=seed
-    )
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
-    with warnings.catch_warnings(), threadpool_limits(limits=1, user_api="blas"):
-        # An input without influence rightly takes its length scale to the upper bound.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        regressor.fit(unit, normalised)
-    product, white = regressor.kernel_.k1, regressor.kernel_.k2
-    return {
-        "length_scales": np.atleast_1d(product.k2.length_scale),
-        "signal_variance": float(product.k1.constant_value),
-        "noise_variance": float(white.noise_level),
-        "alpha": regressor.alpha_,
-    }
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = maximise(unit, normalised, start, bounds, restarts, seed)
+    return asdict(found)
 
 
 def _check_shapes(

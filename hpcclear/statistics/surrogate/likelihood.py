@@ -1,0 +1,130 @@
+"""Maximum likelihood of Kriging's length scales and variances, with gradients that cost no more than the likelihood.
+
+For W = (alpha alpha' - K^-1) * S, elementwise, S the covariance without noise, the derivative by the logarithm of a
+length scale is half the sum of W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is
+a product of W and z for all length scales at once, in place of a matrix of derivatives for each.
+
+Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 5.8 and 5.9; the search
+is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, further starts uniform in these).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.blas import dsymm, dsyr
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
+from scipy.spatial.distance import cdist
+
+from hpcclear.base.arrays import Array
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What maximises the likelihood.
+
+    Attributes
+    ----------
+    length_scales : array, shape (d,)
+        In the unit cube.
+    signal_variance, noise_variance : float
+        In units of the variance of the values.
+    alpha : array, shape (n,)
+        ``K^-1 values``, noise in K.
+    """
+
+    length_scales: Array
+    signal_variance: float
+    noise_variance: float
+    alpha: Array
+
+
+def maximise(
+    unit: Array, values: Array, start: Array, bounds: Array, restarts: int, seed: int
+) -> Fitted:
+    """The most likely signal variance, length scales and noise variance of values at points.
+
+    Parameters
+    ----------
+    unit : array, shape (n, d)
+        Points in the unit cube.
+    values : array, shape (n,)
+        Of mean 0.
+    start : array, shape (d + 2,)
+        Signal variance, length scales, noise variance from which the search begins.
+    bounds : array, shape (d + 2, 2)
+        Their limits.
+    restarts : int
+        Further starts.
+    seed : int
+        Of these.
+    """
+    from scipy.optimize import minimize  # only fitting needs it
+
+    centred, limits = unit - 0.5, np.log(bounds)
+    draws = np.random.RandomState(seed)
+    starts = [np.log(start)]
+    starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
+    found = [
+        minimize(
+            lambda theta: negative_likelihood(theta, centred, values),
+            one,
+            method="L-BFGS-B",
+            jac=True,
+            bounds=limits,
+        )
+        for one in starts
+    ]
+    best = np.exp(min(found, key=lambda one: float(one.fun)).x)
+    scaled = unit / best[1:-1]
+    covariance = best[0] * np.exp(-0.5 * cdist(scaled, scaled, "sqeuclidean"))
+    covariance[np.diag_indices_from(covariance)] += best[-1]
+    factor, _ = dpotrf(covariance, lower=1)
+    alpha, _ = dpotrs(factor, values, lower=1)
+    return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
+
+
+def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[float, Array]:
+    """Minus the log likelihood, and its gradient.
+
+    Parameters
+    ----------
+    theta : array, shape (d + 2,)
+        Logarithms of signal variance, length scales and noise variance.
+    centred : array, shape (n, d)
+        Points.
+    values : array, shape (n,)
+
+    Returns
+    -------
+    (float, array of shape (d + 2,))
+        Infinite, and 0, where the covariance matrix cannot be factored.
+    """
+    noise, count = np.exp(theta[-1]), len(values)
+    scaled = centred / np.exp(theta[1:-1])
+    halves, ones = -0.5 * np.einsum("ij,ij->i", scaled, scaled), np.ones(count)
+    # the exponents, -|z_i - z_j|^2 / 2 + log signal, as one product
+    smooth = np.column_stack([scaled, halves + theta[0], ones]) @ np.vstack(
+        [scaled.T, ones, halves]
+    )
+    np.minimum(smooth, theta[0], out=smooth)
+    np.exp(smooth, out=smooth)
+    np.fill_diagonal(smooth, np.exp(theta[0]))
+    covariance = smooth.copy()
+    covariance[np.diag_indices(count)] += noise
+    # LAPACK and BLAS take the transpose without a copy, and touch its lower triangle only
+    factor, failed = dpotrf(covariance.T, lower=1, overwrite_a=1, clean=0)
+    if failed:
+        return np.inf, np.zeros_like(theta)
+    alpha, _ = dpotrs(factor, values, lower=1)
+    logarithm = np.log(np.diag(factor)).sum()
+    inverse, _ = dpotri(factor, lower=1, overwrite_c=1)
+    trace = np.trace(inverse)
+    weights = dsyr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)  # K^-1 - alpha alpha'
+    weights *= smooth.T
+    table = np.column_stack([scaled, ones])
+    products = dsymm(-1.0, weights, table, lower=1)
+    rows = products[:, -1]
+    lengths = rows @ scaled**2 - np.einsum("ij,ij->j", scaled, products[:, :-1])
+    gradient = [0.5 * rows.sum(), *lengths, 0.5 * noise * (alpha @ alpha - trace)]
+    constant = 0.5 * count * np.log(2.0 * np.pi)
+    return float(0.5 * values @ alpha + logarithm + constant), -np.array(gradient)
