@@ -31,7 +31,7 @@ from hpcclear.ensemble.certificate import (
 from hpcclear.ensemble.trial import Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import effects_figure
-from hpcclear.report.figures.effects import saving, seconds_of, statements
+from hpcclear.report.figures.effects import saving, seconds_of, statement, statements
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -338,6 +338,9 @@ def test_a_certificate_takes_a_twentieth_of_its_study():
     effects, samples = len(switches(scene)), certificate_samples(scene)
     assert samples * (effects + 2) <= 0.05 * sum(samples_of(scene).values())
     assert samples >= 128
+    asked = scene.with_({"study.certificate": {"samples": 256}})
+    assert samples_of(asked) == {**samples_of(scene), "effects": 256 * (effects + 2)}
+    assert certificate_samples(asked) == samples
 
 
 # ---- bad input -------------------------------------------------------------------------------------
@@ -451,6 +454,22 @@ def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     assert "seconds" not in " ".join([*content.variables, *content.attrs])
     assert saving(content, 1, {}) == pytest.approx(1.0 - float(content["work"][1]))
     assert saving(content, 1, {"all on": 4.0, "play in crank_rod": 1.0}) == 0.75
+
+
+def test_what_cannot_be_told_says_what_would_tell(certified):
+    place, _ = certified
+    content = dataset.read(place / "e.nc", "effects")
+    gravity = int(np.argmax(content["off"].sel(effect="gravity").to_numpy()))
+    row = {"variant": gravity, "response": 0}
+    for name, value in (("change", 0.01), ("limit", 0.03), ("told", 2)):
+        content[name][row] = value
+    content["decision"][gravity] = int(Verdict.UNTOLD)
+    # 64 samples whose limits are three times too wide
+    assert "cannot be told by 64 samples, about 600 would do" in statement(content, gravity, {})
+    content["change"][row] = 0.025
+    assert statement(content, gravity, {}).endswith("cannot be told by 64 samples.")
+    content["change"][row] = np.nan
+    assert "cannot be told: 0 of 64 samples failed" in statement(content, gravity, {})
 
 
 def test_figure_and_page(certified):

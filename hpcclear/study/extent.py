@@ -28,6 +28,16 @@ def samples_of(scene: Scene) -> dict[str, int]:
     InputError
         If the scene has no study.
     """
+    found = _of_stages(scene)
+    asked = scene.required_study.certificate
+    if asked is not None:
+        most = certificate_samples(scene) if asked.samples is None else asked.samples
+        found["effects"] = most * _variants(scene)
+    return found
+
+
+def _of_stages(scene: Scene) -> dict[str, int]:
+    """The same of all stages but the certificate, whose size goes by theirs."""
     study = scene.required_study
     extremes, spread = optimisation.chosen_in_all(study)
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
@@ -70,6 +80,11 @@ def certificate_samples(scene: Scene) -> int:
     study = scene.study
     if study is None:
         return effects.SAMPLES
-    total = sum(samples_of(scene).values()) if study.cases else study.samples
-    variants = len(switches(scene)) + 2
-    return int(min(max(CERTIFICATE_SHARE * total / variants, effects.LEAST), effects.SAMPLES))
+    total = sum(_of_stages(scene).values()) if study.cases else study.samples
+    share = CERTIFICATE_SHARE * total / _variants(scene)
+    return int(min(max(share, effects.LEAST), effects.SAMPLES))
+
+
+def _variants(scene: Scene) -> int:
+    """Variants that a certificate simulates as a rule."""
+    return len(switches(scene)) + 2

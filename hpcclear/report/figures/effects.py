@@ -56,12 +56,26 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
     text = f"{label(named(content, variant))} changes f by {change.replace(' ± ', ' % ± ')}"
     cost = f"off saves {100 * share:.0f} %" if share >= 0.005 else "off saves nothing"
-    verdict = ("", "; needed", "; cannot be told")[int(one["decision"])]
-    counted = one["judged"].to_numpy() == 1
-    if int(one["decision"]) == 1 and int(one["told"][0]) != 1:
-        worst = one["response"].to_numpy()[counted & (one["told"].to_numpy() == 1)][0]
-        verdict = f"; needed for the {worst}"
-    return f"{text}: {cost}{verdict}."
+    return f"{text}: {cost}{_verdict(one, float(content.attrs['tolerance']))}."
+
+
+def _verdict(one: xr.Dataset, tolerance: float) -> str:
+    """What a single variant's changes come to, as the end of its sentence."""
+    counted, told = one["judged"].to_numpy() == 1, one["told"].to_numpy()
+    if int(one["decision"]) == 0:
+        return ""
+    if int(one["decision"]) == 1:
+        worst = one["response"].to_numpy()[counted & (told == 1)][0]
+        return "; needed" if told[0] == 1 else f"; needed for the {worst}"
+    open_ = counted & (told == 2)
+    room = tolerance - np.abs(one["change"].to_numpy()[open_])
+    count = int(one["samples"])
+    if np.isnan(room).any():
+        return f"; cannot be told: {int(one['failed'])} of {count} samples failed"
+    if room.min() <= 0.0:
+        return f"; cannot be told by {count} samples"
+    more = count * float((one["limit"].to_numpy()[open_] / room).max()) ** 2
+    return f"; cannot be told by {count} samples, about {float(f'{more:.1g}'):.0f} would do"
 
 
 def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
