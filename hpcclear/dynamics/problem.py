@@ -13,8 +13,9 @@ from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.parts import Harmonic, TorqueDrive
+from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
+from hpcclear.dynamics.linkage.table_drive import PARTS, cells_of
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
@@ -191,7 +192,8 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     if scene.is_planar:
         first = second = False
         main = planar.linkage_of(scene).mechanism.period
-        free, swings = isinstance(main, TorqueDrive), isinstance(main, Harmonic)
+        free = isinstance(main, TorqueDrive)
+        swings = isinstance(main, Harmonic) or (isinstance(main, TableDrive) and not main.advance)
     else:
         first, second, free = topology(scene)
     contact_law = e.contact.law if e.contact is not None and count else None
@@ -335,12 +337,30 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
                 'set numerics.formulation = "minimal" or another method',
             )
         return True
-    curves = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
+    curves: tuple[Any, ...] = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
     if scene.is_planar:
+        linkage = planar.linkage_of(scene)
         curves = tuple(curves_of(planar.tables_of(scene)).values())
+        curves += tuple(
+            drive.rows for drive in linkage.mechanism.drives if isinstance(drive, TableDrive)
+        )
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
     return single and automatic and smooth and scene.numerics.rtol <= TIGHT
+
+
+def _cells_of_curves(linkage: Linkage, tables: dict[str, Any], turns: int) -> tuple[Array, ...]:
+    """Cells of a linkage's curves, in the order of their rows."""
+    driven = {
+        f"{drive.name}.{part}": cells
+        for drive in linkage.mechanism.drives
+        if isinstance(drive, TableDrive)
+        for part, cells in zip(PARTS, cells_of(drive), strict=True)
+    }
+    return tuple(
+        driven[name] if name in driven else periodic_cells(tables[name], turns=turns)
+        for name in linkage.curve_rows
+    )
 
 
 def problem_of(
@@ -353,7 +373,7 @@ def problem_of(
     if scene.is_planar:
         linkage, tables = planar.linkage_of(scene), planar.tables_of(scene)
         turns = turns_of(tables)
-        curves = tuple(periodic_cells(curve, turns=turns) for curve in curves_of(tables).values())
+        curves = _cells_of_curves(linkage, curves_of(tables), turns)
     averaged: Any = scene.numerics.averaged_revolutions
     auto = averaged == "auto"
     return Problem(

@@ -266,6 +266,51 @@ def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: st
         )
 
 
+LEAST_ROWS = 4
+
+
+@dataclass(frozen=True)
+class MotionTable(Converted):
+    """A motion that repeats, ``[[time, angle], ...]`` in s and rad, from time 0 on."""
+
+    def convert(self, value: Any) -> tuple[tuple[float, float], ...]:
+        """Pairs in (s, rad); raises PydanticCustomError."""
+        remedy = "Write pairs [[time, angle], ...] from 0 s to where the motion repeats"
+        if not isinstance(value, (list, tuple)) or not LEAST_ROWS <= len(value) <= LONGEST_CURVE:
+            raise invalid(
+                f"a table of from {LEAST_ROWS} to {LONGEST_CURVE} pairs is expected here", remedy
+            )
+        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
+            raise invalid("every row of a table is a pair [time, angle]", remedy)
+        time, angle = Quantity("s"), Quantity("rad")
+        pairs = tuple((time.convert(row[0]), angle.convert(row[1])) for row in value)
+        if pairs[0][0] != 0.0 or any(b[0] <= a[0] for a, b in itertools.pairwise(pairs)):
+            raise invalid(
+                "the times must rise from 0 from row to row",
+                "Sort the rows by time, the first at 0",
+            )
+        gained = pairs[-1][1] - pairs[0][1]
+        if not any(abs(gained - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
+            raise invalid(
+                f"the last angle is {gained:.6g} rad from the first, and the motion repeats there",
+                "Let it end where it began, or a turn further on",
+            )
+        return pairs
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        entry = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+        pair = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
+        return {
+            "type": "array",
+            "items": pair,
+            "minItems": LEAST_ROWS,
+            "maxItems": LONGEST_CURVE,
+            "description": "[[time in s, angle in rad], ...], until the motion repeats",
+        }
+
+
 @dataclass(frozen=True)
 class NamedRows:
     """A table of named rows, kept in file order as a tuple, because a dict would not be frozen."""

@@ -11,6 +11,7 @@ from hpcclear.scene.fields import (
     CurveOf,
     Length,
     Mass,
+    MotionTable,
     NamedRows,
     PositiveLength,
     Quantity,
@@ -233,6 +234,18 @@ class PlanarHarmonic(Table):
     period: bool = False
 
 
+class PlanarTable(Table):
+    """A body follows a table of angles."""
+
+    name: str
+    kind: Literal["table"]
+    body: str
+    angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
+    """``[[time, angle], ...]``, s and rad: the first time is 0, and the motion repeats at the last, where the angle is the
+    first one again or a turn further on. A cubic spline between, smooth where it repeats."""
+    period: bool = False
+
+
 class PlanarTorque(Table):
     """A torque acts on a free body."""
 
@@ -247,7 +260,9 @@ class PlanarTorque(Table):
     turns: Annotated[int, Count(least=1, most=64)] = 1
 
 
-PlanarDrive = Annotated[PlanarSpeed | PlanarHarmonic | PlanarTorque, Field(discriminator="kind")]
+PlanarDrive = Annotated[
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
+]
 
 
 class Components(PairTable):

@@ -9,7 +9,7 @@ from types import ModuleType
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.generator import Motion
-from hpcclear.dynamics.linkage.parts import ConstantSpeed, Force, Torque, TorqueDrive
+from hpcclear.dynamics.linkage.parts import ConstantSpeed, Force, TableDrive, Torque, TorqueDrive
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
@@ -58,18 +58,20 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     """The text of that module; `joints`: the rows of the joints with clearance, in the mechanism's order."""
     rows = ", ".join(f"at.{joint!r}" for joint in joints)
     looked_up = "".join(
-        _LOOK_UP.format(row=row, first=first, angle=_turned(motion))
-        for row, first in _curves(motion)
+        _LOOK_UP.format(row=row, first=first, angle=angle) for row, first, angle in _curves(motion)
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"
     return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
 
 
-def _curves(motion: Motion) -> list[tuple[int, int]]:
-    """Rows of tabulated values, and where their tables begin."""
+def _curves(motion: Motion) -> list[tuple[int, int, str]]:
+    """Rows of tabulated values, where their tables begin, and the angles that they are looked up at."""
     if motion.curves:
-        return [(row, 4 * at.CELLS * (row - at.CURVES)) for row in motion.curves.values()]
+        return [
+            (row, 4 * at.CELLS * (row - at.CURVES), _looked_up_at(motion, name))
+            for name, row in motion.curves.items()
+        ]
     mechanism = motion.forest.mechanism
     tabulated = [
         load for load in mechanism.loads if isinstance(load, (Force, Torque)) and load.table
@@ -77,7 +79,18 @@ def _curves(motion: Motion) -> list[tuple[int, int]]:
     found = [(at.LOAD_VALUE, at.LOAD_TABLE)] if tabulated else []
     if any(isinstance(drive, TorqueDrive) and drive.table for drive in mechanism.drives):
         found.append((at.TORQUE_VALUE, at.TORQUE_TABLE))
-    return found
+    return [(*one, _turned(motion)) for one in found]
+
+
+def _looked_up_at(motion: Motion, name: str) -> str:
+    """Of a curve: the angle of the body whose turn is the revolution, or the time of a table that drives a body."""
+    drives = {drive.name: drive for drive in motion.forest.mechanism.drives}
+    drive = drives.get(name.partition(".")[0]) if "." in name else None
+    if drive is None:
+        return _turned(motion)
+    main = motion.forest.mechanism.period
+    share = main.seconds / drive.seconds / getattr(main, "turns", 1)
+    return f"par[{at.SPEED} * W + i] * work[{at.STAGE_TIME} * W + i] * {share!r}"
 
 
 def _turned(motion: Motion) -> str:
@@ -89,8 +102,10 @@ def _turned(motion: Motion) -> str:
     if k is not None:
         turned = f"work[{at.QS + k} * W + i]"
     else:
-        rate = "speed" if isinstance(drive, ConstantSpeed) else "rate"
-        speed = motion.parameters[f"{drive.name}_{rate}"]
+        speed = at.SPEED
+        if not isinstance(drive, TableDrive):
+            rate = "speed" if isinstance(drive, ConstantSpeed) else "rate"
+            speed = motion.parameters[f"{drive.name}_{rate}"]
         turned = f"par[{speed} * W + i] * work[{at.STAGE_TIME} * W + i]"
         start = motion.parameters.get(f"{frame}_start")
         turned = turned if start is None else f"par[{start} * W + i] + {turned}"

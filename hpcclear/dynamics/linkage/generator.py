@@ -114,7 +114,7 @@ class _Generator:
         self.forest = forest(mechanism, cartesian)
         self.writer = Writer(rows.parameters, rows.free, hoist)
         self.kinematics = Kinematics(
-            self.forest, self.writer, rows.coordinates, rows.velocities, rows.time
+            self.forest, self.writer, rows.coordinates, rows.velocities, rows.time, rows.curves
         )
         self.balance = Balance(self.forest, self.kinematics, self.writer, on.gravity)
         self.closing = Closing(self.kinematics, self.writer)

@@ -4,7 +4,8 @@ A point is a sum of vectors, each held in a rotating frame: what does not change
 has only products with the frames' angular velocities, and the mass matrix only cosines and sines of differences of angles.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import (
@@ -23,6 +24,7 @@ from hpcclear.dynamics.linkage.parts import (
     ConstantSpeed,
     Harmonic,
     Slide,
+    TableDrive,
     TorqueDrive,
     split,
 )
@@ -58,9 +60,11 @@ class Kinematics:
     """Points, velocities and accelerations of a forest, as terms; `first` and `velocities`: rows of the stage in `work`."""
 
     def __init__(
-        self, forest: Forest, writer: Writer, coordinates: int, velocities: int, time: int
-    ) -> None:
+        self, forest: Forest, writer: Writer, coordinates: int, velocities: int, time: int,
+        curves: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
         self.forest = forest
+        self._curves = curves
         self.writer = writer
         self._points: dict[str, Point] = {}
         self._spins: dict[str, Term] = {}
@@ -107,6 +111,8 @@ class Kinematics:
                 text, needs = f"{frame}_start + {text}", (start, speed, time)
             write.when_needed((name,), f"{name} = {text}", needs)
             return named(name), speed, ZERO
+        if isinstance(drive, TableDrive):
+            return self._tabulated(drive, frame)
         assert isinstance(drive, Harmonic)
         spin, acceleration, phase = f"spin_{frame}", f"turn_{frame}", f"phase_{frame}"
         mean, amplitude, rate, shift = (
@@ -120,6 +126,27 @@ class Kinematics:
         needs = (mean, amplitude, rate, named(f"s_{phase}"))
         write.when_needed((name, spin, acceleration), line, needs)
         return named(name), named(spin), named(acceleration)
+
+    def _tabulated(self, drive: TableDrive, frame: str) -> tuple[Term, Term, Term]:
+        write, time = self.writer, named("time")
+        parts = [f"{part}_{drive.name}" for part in ("given_angle", "given_spin", "given_turn")]
+        rows = [self._curves.get(f"{drive.name}.{part}") for part in ("angle", "spin", "turn")]
+        if None in rows:
+            line = f"{', '.join(parts)} = table_of_{drive.name}(time)"
+            write.when_needed(tuple(parts), line, (time,))
+        else:
+            for part, row in zip(parts, rows, strict=True):
+                write.when_needed((part,), f"{part} = work[{row} * W + i]")
+        angle, spin, turn = map(named, parts)
+        gained = self._number(f"{drive.name}_rate", drive.advance)
+        shift = self._number(f"{drive.name}_shift", self.forest.offsets[drive.body])
+        name, text, needs = f"angle_{frame}", angle.name, [angle]
+        if gained:
+            text, needs = f"{text} + {gained.name} * time", [*needs, gained, time]
+        if shift:
+            text, needs = f"{text} - {shift.name}", [*needs, shift]
+        write.when_needed((name,), f"{name} = {text}", tuple(needs))
+        return named(name), spin + gained, turn
 
     def start_of(self, drive: ConstantSpeed | TorqueDrive, frame: str) -> float:
         """Angle of a driven frame at time 0, rad."""

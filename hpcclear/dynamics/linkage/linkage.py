@@ -14,8 +14,9 @@ from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import TorqueDrive
+from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.poses import Poses
+from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
@@ -99,9 +100,9 @@ class Linkage:
     def curve_rows(self) -> dict[str, int]:
         """Rows of tabulated values at the stage, by drive or load; raises InputError if there are too many."""
         tabled = [
-            one.name
+            name
             for one in (*self.mechanism.drives, *self.mechanism.loads)
-            if getattr(one, "table", False)
+            for name in _curves_of(one)
         ]
         if len(tabled) > at.MAX_CURVES:
             raise InputError(
@@ -151,6 +152,13 @@ class Linkage:
     def turning(self) -> bool:
         """Whether the angle that gives the period is the last coordinate, and goes round."""
         return isinstance(self.mechanism.period, TorqueDrive)
+
+
+def _curves_of(part: object) -> list[str]:
+    """Names of the curves that a drive or load has."""
+    if isinstance(part, TableDrive):
+        return [f"{part.name}.{one}" for one in PARTS]
+    return [part.name] if getattr(part, "table", False) else []  # type: ignore[attr-defined]
 
 
 def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:

@@ -16,6 +16,7 @@ from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
+from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.physics.friction import saturated
 
@@ -84,7 +85,7 @@ class Loops:
         self.owners = tuple(owners)
         self._places = tuple(np.array(places, int).reshape(-1, 2).T)
         lines = "\n    ".join([*writer.lines, *texts, "pass"])
-        names: dict[str, Any] = dict(WORDS)
+        names: dict[str, Any] = WORDS | words_of(mechanism)
         exec(f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}", names)
         self._evaluate = names["closed"]
         base = values(mechanism, cartesian=True)

@@ -18,6 +18,7 @@ from hpcclear.dynamics.linkage.parts import (
     Pair,
     Revolute,
     Slide,
+    TableDrive,
     split,
 )
 
@@ -247,6 +248,11 @@ def _one_period(m: Mechanism) -> None:
         )  # fmt: skip
     main = m.period
     for drive in m.drives:
+        if drive is not main and isinstance(drive, TableDrive) and drive.advance:
+            raise InputError(
+                f"drives.{drive.name}.angle", drive.advance, "goes round, and another drive gives the period",
+                "Let it end at the angle where it began, or set period = true here",
+            )  # fmt: skip
         if drive is main or not (drive.prescribed and main.prescribed):
             continue
         times = main.seconds / drive.seconds

@@ -14,6 +14,7 @@ from hpcclear.dynamics.linkage.parts import (
     Harmonic,
     Slide,
     Spring,
+    TableDrive,
     Torque,
     TorqueDrive,
     split,
@@ -88,6 +89,9 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
                 found[f"{drive.name}_amplitude"] = drive.amplitude
                 found[f"{drive.name}_rate"] = 2 * math.pi * drive.frequency
                 found[f"{drive.name}_phase"] = drive.phase
+            case TableDrive():
+                found[f"{drive.name}_rate"] = drive.advance / drive.seconds
+                found[f"{drive.name}_shift"] = trees.offsets[drive.body]
             case TorqueDrive():
                 found[f"{drive.name}_torque"] = drive.torque
                 found[f"{drive.name}_speed"] = drive.initial_speed

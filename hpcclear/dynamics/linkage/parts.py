@@ -134,6 +134,30 @@ class Harmonic:
 
 
 @dataclass(frozen=True)
+class TableDrive:
+    """The body's angle is prescribed by rows (time in s, angle in rad), the first at 0, the last where it repeats.
+
+    A cubic spline that is smooth where it repeats as well. The last angle is the first, or a turn further on.
+    """
+
+    name: str
+    body: str
+    rows: tuple[Pair, ...]
+    period: bool = False
+    prescribed: ClassVar[bool] = True
+
+    @property
+    def seconds(self) -> float:
+        """Until it repeats, s."""
+        return self.rows[-1][0]
+
+    @property
+    def advance(self) -> float:
+        """What is gained until then, rad."""
+        return self.rows[-1][1] - self.rows[0][1]
+
+
+@dataclass(frozen=True)
 class TorqueDrive:
     """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle."""
 
@@ -153,7 +177,7 @@ class TorqueDrive:
         return 2 * math.pi * self.turns / abs(self.initial_speed)
 
 
-Drive = ConstantSpeed | Harmonic | TorqueDrive
+Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
 @dataclass(frozen=True)

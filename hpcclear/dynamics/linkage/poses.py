@@ -13,6 +13,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Pair, Slide, split
+from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
 
@@ -59,7 +60,7 @@ class Poses:
                 text = writer.text(journal[axis] - bearing[axis])
                 lines.append(f"out[{first + 2 * k + axis}] = {text}")
         self.size = first + 2 * len(forest.mechanism.clearances)
-        names: dict[str, Any] = dict(WORDS)
+        names: dict[str, Any] = WORDS | words_of(forest.mechanism)
         body_text = "\n    ".join([*writer.lines, *lines, "pass"])
         exec(f"def poses(work, par, out, i=0, W=1):\n    {body_text}", names)
         self._evaluate = names["poses"]

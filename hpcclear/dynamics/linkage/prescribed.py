@@ -18,6 +18,7 @@ from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
+from hpcclear.dynamics.linkage.table_drive import words_of
 
 FARTHEST = (
     0.05  # rad, or of the typical length: how far Newton may go from where the step was to end
@@ -156,7 +157,7 @@ def _reactions(
     )
     on = On(gravity=gravity != 0.0, ledger=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
-    names: dict[str, Any] = dict(WORDS)
+    names: dict[str, Any] = WORDS | words_of(mechanism)
     exec(text.source, names)
     work = np.zeros((rates + at.RATES + 2 + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times

@@ -12,7 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TorqueDrive, split
+from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TableDrive, TorqueDrive, split
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
@@ -131,6 +131,8 @@ def check_columns(scene: Scene, points: Points | None) -> None:
 def period_of(mechanism: Any) -> Any:
     """Length of a revolution, s; of samples, (m,)."""
     drive = mechanism.period
+    if isinstance(drive, TableDrive):
+        return drive.seconds
     if isinstance(drive, Harmonic):
         return 1.0 / drive.frequency
     speed = drive.initial_speed if isinstance(drive, TorqueDrive) else drive.speed

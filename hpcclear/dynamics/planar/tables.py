@@ -22,6 +22,7 @@ from hpcclear.scene.planar import (
     PlanarRevolute,
     PlanarSlide,
     PlanarSpeed,
+    PlanarTable,
     PlanarTorque,
     SpringLoad,
 )
@@ -121,6 +122,8 @@ def _drive(drive: Any) -> parts.Drive:
             drive.name, drive.body, drive.amplitude, drive.frequency, drive.mean, drive.phase,
             drive.period,
         )  # fmt: skip
+    if isinstance(drive, PlanarTable):
+        return parts.TableDrive(drive.name, drive.body, drive.angle, drive.period)
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
     return parts.TorqueDrive(
