@@ -183,17 +183,46 @@ def test_designs_are_judged_by_the_clearances_of_lives(study):
     assert float(found.deviation_true) == pytest.approx(f.std(ddof=1), rel=0.1)
 
 
+def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
+    """Against the same lives by the other command, their f averaged by a finer rule."""
+    found = dataset.read(study / "verification.nc").sel(design="worn alpha")
+    masses = (
+        f"mechanism.rod.mass={float(found.m2)!r}",
+        f"mechanism.slider.mass={float(found.m3)!r}",
+    )
+    words = ["wear", str(SCENE), "-o", str(tmp_path / "own.nc"), *overrides(*SMALL, *masses)]
+    code, output = run(words, 0)
+    assert code == 0, output
+    own = dataset.read(tmp_path / "own.nc")
+    np.testing.assert_array_equal(
+        own.objective, dataset.read(study / "lives" / "worn_alpha.nc").objective
+    )
+    each = own.objective.interp(cycle=np.linspace(0.0, 1e6, 4001))
+    assert float(found.life_mean) == pytest.approx(float(each.mean()), rel=1e-3)
+    assert float(found.life_deviation) == pytest.approx(float(each.std()), rel=0.05)
+    lives_ = each.mean("cycle").values
+    half = stats.t.ppf(0.975, 11) * lives_.std(ddof=1) / np.sqrt(12)
+    assert float(found.life_mean_upper - found.life_mean) == pytest.approx(half, rel=0.01)
+    others = dataset.read(study / "verification.nc")
+    assert np.isfinite(others.life_mean.sel(design="worn original"))
+    told = [
+        str(name) for name in others.design.values if np.isfinite(others.life_mean.sel(design=name))
+    ]
+    assert sorted(told) == ["worn alpha", "worn beta", "worn original"]
+
+
 def test_the_page_tells_lives(study):
     page = write_report(study).read_text()
     assert "12 lives of 1e+06 revolutions were followed; none failed." in page
     assert "Lives that have passed no limit" in page
+    assert "mean over own life" in page
     (study / "report.html").unlink()
 
 
 @pytest.mark.mpi
 def test_ranks_and_a_kill_among_the_lives_change_no_byte(study, tmp_path):
     expected = files(study)
-    assert {"wear.nc", "verification.nc", "front.nc"} <= expected.keys()
+    assert {"wear.nc", "verification.nc", "lives/worn_beta.nc"} <= expected.keys()
     folder = tmp_path / "two"
     code, output = run(words(folder), 2)
     assert code == 0, output

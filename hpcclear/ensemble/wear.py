@@ -6,6 +6,7 @@ simulated on all ranks and kept in the checkpoint; who goes on after a kill asks
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -207,7 +208,11 @@ def _seen(records: Records, worn: list[int], joints: int) -> Seen:
 
 
 def run_wear(
-    scene: Scene, output: Path, ranks: Ranks, options: Options = DEFAULT_OPTIONS
+    scene: Scene,
+    output: Path,
+    ranks: Ranks,
+    options: Options = DEFAULT_OPTIONS,
+    timing: Path | None = None,
 ) -> Finished:
     """Follow the lives of a scene on all ranks and write them; on root.
 
@@ -219,6 +224,8 @@ def run_wear(
         NetCDF file of kind ``wear``.
     ranks : Ranks
     options : Options
+    timing : Path, optional
+        Where the times go, beside the output by default.
 
     Raises
     ------
@@ -227,6 +234,7 @@ def run_wear(
     began = time.perf_counter()
     check_worn(scene)
     place = Place.of_file(output, options.fresh)
+    place = place if timing is None else replace(place, timing=timing)
     inputs = inputs_of(scene)
     joints = joints_of(scene, inputs)
     states = States(scene, inputs, joints)

@@ -79,6 +79,8 @@ _TOLD = {
     "mean": "mean_true",
     "deviation": "deviation_true",
     "95 % below": "percentile",
+    "mean, own life": "life_mean",
+    "deviation, own life": "life_deviation",
 }
 """Lines of the table of a case, and the variables they show."""
 
@@ -93,6 +95,7 @@ def beside_original(verified: xr.Dataset) -> Iterator[tuple[str, list[tuple[str,
         lines = [
             (words, *(_against(one, designs[0], name) for one in designs))
             for words, name in _TOLD.items()
+            if name in verified or not name.startswith("life_")
         ]
         for name in _asked(designs[0]):
             words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")

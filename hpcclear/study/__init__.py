@@ -122,15 +122,16 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     compile_ahead(scene, session.ranks, points, style)
     announce = Stages(scene).announced if style != "quiet" else Stages.silent
     announce("wear")
-    scene = lives.known(scene, session)
-    simulations = Simulations(scene, session.ranks, checkpoint, style)
+    known = lives.known(scene, session)
+    simulations = Simulations(known, session.ranks, checkpoint, style)
     directory = session.place.output
-    run = StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
-    _tell_the_story(run)
+    run = StudyRun(known, directory, session.ranks, checkpoint, simulations, session.tell, announce)
+    _tell_the_story(run, scene)
     return run.times
 
 
-def _tell_the_story(run: StudyRun) -> None:
+def _tell_the_story(run: StudyRun, written: Scene) -> None:
+    """All stages after the lives; `written` is the scene as it was, without what these told."""
     sensitivity: Result | None = None
     if run.study.certificate is not None:
         certificate.certify(run)
@@ -156,7 +157,10 @@ def _tell_the_story(run: StudyRun) -> None:
     for text in remarks:
         run.tell(text)
     printed = paper.printed_moments(run.scene, table.choices)
-    verification.write(run, table, true, model, remarks, printed)
+    over_life: Result = {}
+    if written.required_study.worn:
+        over_life = run.stage("lives", lives.of_designs, written, table.choices)
+    verification.write(run, table, true, model, remarks, printed, over_life)
 
     scatter = run.stage("chaos", chaos.simulate, designs)
     chaos.write(run, table.choices, {name: one[table.rows] for name, one in scatter.items()})

@@ -52,6 +52,7 @@ def _of_stages(scene: Scene) -> dict[str, int]:
         "check": begun,
         "infill": rounds,
         "verification": (extremes + verified) * count,
+        "lives": lives.simulations_of_designs(scene),
         "chaos": (extremes + verified) * 2 * chaos.PAIRS,
         "readings": readings.simulations(scene)[0],
     }

@@ -1,4 +1,10 @@
-"""Random clearances of a study that come of wear: lives are followed first, and their clearances stand for the input."""
+"""Lives in a study whose clearances are random as wear leaves them.
+
+Those of the scene are followed first, and their clearances stand for the input; at the end those of the original and the
+best designs, for what each comes to over lives of its own.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,9 +15,21 @@ from hpcclear.ensemble.session import Options, Session
 from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import RandomInput
+from hpcclear.statistics.random.replicates import moments, student
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+
+ENDS = ("original", "alpha", "beta")
+"""Designs of a case whose lives are followed."""
 
 NAME = "wear.nc"
 """Where lives are kept, in the directory of the study."""
+
+FOLDER = "lives"
+"""Where those of designs are kept, in there."""
+
+AGES = 64
+"""Ages of a life that mean and deviation are taken over, evenly up to the largest that an input is taken at."""
 
 LEAST = 8
 """Clearances that a distribution is made of, at least."""
@@ -39,6 +57,59 @@ def simulations(scene: Scene) -> int:
     if scene.wear is None or not scene.required_study.worn:
         return 0
     return scene.wear.lives * scene.wear.copies * STATES
+
+
+def simulations_of_designs(scene: Scene) -> int:
+    """How many follow the designs; the original's lives are those of the scene."""
+    return 2 * len(scene.required_study.cases) * simulations(scene)
+
+
+def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result:
+    """What the original, alpha and beta of each case come to over lives of their own.
+
+    Parameters
+    ----------
+    run : StudyRun
+    scene : Scene
+        As it was written: clearances that wear are not known yet.
+    designs : sequence of Choice
+
+    Returns
+    -------
+    dict of arrays, shape (n,)
+        ``mean`` and ``deviation`` of f over lives and ages, and their ``_reach`` (half-width of the limits); NaN of other
+        designs.
+    """
+    (run.directory / FOLDER).mkdir(exist_ok=True)
+    ends = [f"{case.name} {end}" for case in run.study.cases for end in ENDS]
+    rows = [
+        _over_life(run, scene, choice) if choice.name in ends else (np.nan,) * 4
+        for choice in designs
+    ]
+    names = ("mean", "mean_reach", "deviation", "deviation_reach")
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]:
+    """Mean, its half-width, deviation and its half-width of a design; each life is a replicate."""
+    paths = {name: run.study.variable(name).paths for name in choice.design}
+    own = scene.with_({path: choice.design[name] for name in paths for path in paths[name]})
+    name = NAME if own == scene else f"{FOLDER}/{choice.name.replace(' ', '_')}.nc"
+    options = Options(style=run.simulations.style)
+    timing = run.directory / "timing.nc"
+    found = run_wear(own, run.directory / name, run.ranks, options, timing).content
+    oldest = max(row.cycles or 0.0 for row in scene.required_study.worn)
+    ages = (np.arange(AGES) + 0.5) / AGES * oldest
+    at = found["cycle"].to_numpy()
+    values = np.array([np.interp(ages, at, one) for one in found["objective"].to_numpy()])
+    told: list[float] = []
+    for one in moments(values):
+        sure = one.freedom > 0
+        reach = (
+            one.error * student(run.study.verification.confidence, one.freedom) if sure else np.nan
+        )
+        told += [one.value, reach]
+    return tuple(told)
 
 
 def known(scene: Scene, session: Session) -> Scene:

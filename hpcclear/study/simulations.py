@@ -34,6 +34,7 @@ class Simulations:
 
     Attributes
     ----------
+    style : str
     next : int
         Number of the next sample. A stage that is not done again sets it to where it had ended.
     """
@@ -45,7 +46,7 @@ class Simulations:
         self.next = 0
         self._ranks = ranks
         self._checkpoint = checkpoint
-        self._style = style
+        self.style = style
         self._variables = scene.required_study.variables
 
     def designs(self, names: Sequence[str], coordinates: Array) -> Points:
@@ -103,7 +104,7 @@ class Simulations:
         InputError
             If every single simulation failed.
         """
-        style = self._style if len(points) >= 1000 else "quiet"
+        style = self.style if len(points) >= 1000 else "quiet"
         progress = Progress(stage, style=style)
         records = sample_points(
             self.scene,

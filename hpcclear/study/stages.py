@@ -16,6 +16,7 @@ _WORDS = {
     "check": "its designs by direct simulation",
     "infill": "more designs where the front is decided",
     "verification": "the best designs by direct simulation",
+    "lives": "lives of the original and the best designs",
     "responses": "responses of the original and the best designs",
     "readings": "the printed designs under readings of the text",
 }
@@ -32,7 +33,8 @@ class Stages:
         steps = ["kriging", "optimisation", "verification", "responses"]
         steps = (["sensitivity"] if scene.required_study.groups else []) + steps
         steps = (["effects"] if scene.required_study.certificate is not None else []) + steps
-        steps = (["wear"] if scene.required_study.worn else []) + steps
+        if scene.required_study.worn:
+            steps = ["wear", *steps[:-1], "lives", steps[-1]]
         self._steps = steps + (["readings"] if "readings.nc" in paper.files(scene) else [])
         self._began = time.monotonic()
 

@@ -195,6 +195,7 @@ def write(
     model: PiecewiseKriging,
     remarks: Sequence[str],
     printed: Mapping[str, Array],
+    over_life: Mapping[str, Array],
 ) -> None:
     """Write verification.nc.
 
@@ -210,6 +211,8 @@ def write(
         What a reader should know, a sentence each.
     printed : mapping of str to array, shape (n,)
         ``mean`` and ``deviation`` of the same designs in a publication, to stand beside ours.
+    over_life : mapping of str to array, shape (n,)
+        Of `hpcclear.study.lives.of_designs`; empty where nothing wears.
     """
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)
@@ -224,6 +227,10 @@ def write(
         data[f"{name}_upper"] = true[name] + true[f"{name}_reach"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
+        if over_life:
+            value, reach = over_life[name], over_life[f"{name}_reach"]
+            data[f"life_{name}"] = value
+            data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):

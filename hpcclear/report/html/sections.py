@@ -218,6 +218,8 @@ def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
 _MOMENTS = (
     ("mean_true", "mean of f"),
     ("deviation_true", "deviation of f"),
+    ("life_mean", "mean over own life"),
+    ("life_deviation", "deviation over own life"),
     ("mean_surrogate", "surrogate: mean"),
     ("deviation_surrogate", "surrogate: deviation"),
     ("mean_paper", "printed: mean"),
@@ -245,8 +247,8 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
 
 def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
     """Half of the confidence interval of a true moment, as text behind it."""
-    word, _, ending = name.partition("_")
-    if ending != "true" or f"{word}_lower" not in one or f"{word}_upper" not in one:
+    word = name.removesuffix("_true")
+    if f"{word}_lower" not in one or f"{word}_upper" not in one:
         return ""
     half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
     return f" ± {half:.2g}" if np.isfinite(half) else ""
