@@ -279,6 +279,37 @@ def test_swarm_finds_a_narrow_feasible_band(shift):
     at_most(moocore.igd_plus(front.values, known), 1e-3)
 
 
+def osy(x):
+    """Osyczka and Kundu's problem: six constraints, a front of five pieces on their borders."""
+    a, b, c, d, e, f = x.T
+    first = -(25 * (a - 2) ** 2 + (b - 2) ** 2 + (c - 1) ** 2 + (d - 4) ** 2 + (e - 1) ** 2)
+    kept = [
+        a + b - 2,
+        6 - a - b,
+        2 - b + a,
+        2 - a + 3 * b,
+        4 - (c - 3) ** 2 - d,
+        (e - 3) ** 2 + f - 4,
+    ]
+    violations = np.maximum(-np.stack(kept, axis=1) / [2, 6, 2, 2, 4, 4], 0.0)
+    return np.stack([first, (x**2).sum(axis=1)], axis=1), violations
+
+
+def test_no_piece_of_the_front_of_osy_is_lost(shift):
+    """16 700 for the reference (0, 80) is the whole front; two thirds of it is what one of five pieces alone comes to."""
+    bounds = [[0, 10], [0, 10], [1, 5], [0, 6], [1, 5], [0, 10]]
+    for seed in (
+        0,
+        3,
+        10,
+    ):  # without children of their own these ended with 11 221, 11 234 and 11 134
+        front = minimise(osy, bounds, iterations=250, rng=np.random.default_rng(seed + shift))
+        at_least(hypervolume(front.values, np.array([0.0, 80.0])), 0.95 * 16700)
+        values, violations = osy(front.points)
+        assert (violations == 0.0).all()
+        np.testing.assert_array_equal(values, front.values)
+
+
 def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
     def far_corner(x):  # feasible where all ten are at most 0.02: a share of 1e-17 of the box
         return x[:, :2], x - 0.02

@@ -17,6 +17,9 @@ setting for all problems:
 - **Constraints** (Deb 2000, doi:10.1016/S0045-7825(99)00389-8): feasible beats infeasible, among
   infeasible points the smaller total violation wins. A point whose objectives are not all finite
   is infeasible, without limit if no violation was given. Only feasible points enter the archive.
+  Once one was broken the feasible region may be thin or in pieces, which flying past it misses: then
+  `BROKEN_SHARE` of the particles continue from children, made by simulated binary crossover (Deb & Agrawal
+  1995), and `BROKEN_ANEW` of these get one coordinate anew from its whole range.
 - **Front**: the archive cut to the size asked for (`pareto.cut`).
 
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
@@ -41,6 +44,13 @@ from hpcclear.statistics.search.pareto import (
 )
 
 _SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
+BROKEN_SHARE = 0.7
+"""Share of the particles that continue from children where constraints were broken, if any do."""
+BROKEN_ANEW = 0.3
+"""Share of these children that get a coordinate anew."""
+CROSSOVER_INDEX = 15.0
+"""Of simulated binary crossover; larger is nearer to the parents."""
+
 _ARRAYS = (
     "positions",
     "velocities",
@@ -317,10 +327,22 @@ class ParticleSwarm:
         self._velocities = np.where(left, -speed, speed)
         self._positions = np.clip(moved, 0.0, 1.0)
 
-        chosen = np.flatnonzero(rng.random(particles) < s.mutation_share)
+        broken = self.infeasible > 0
+        share = (
+            max(s.mutation_share, BROKEN_SHARE) if broken and s.mutation_share else s.mutation_share
+        )
+        chosen = np.flatnonzero(rng.random(particles) < share)
         partner = elite[rng.integers(len(elite), size=len(chosen))]
-        mixed = np.where(rng.random(partner.shape) < 0.5, leader[chosen], partner)
-        self._positions[chosen] = _mutated(mixed, s.mutation_index, rng)
+        if broken:
+            mixed = _crossed(leader[chosen], partner, rng)
+        else:
+            mixed = np.where(rng.random(partner.shape) < 0.5, leader[chosen], partner)
+        children = _mutated(mixed, s.mutation_index, rng)
+        if broken:
+            wild = np.flatnonzero(rng.random(len(chosen)) < BROKEN_ANEW)
+            columns = rng.integers(children.shape[1], size=len(wild))
+            children[wild, columns] = rng.random(len(wild))
+        self._positions[chosen] = children
 
     def _gain(self) -> float:
         """Share of the hypervolume won in the last tenth of the iterations."""
@@ -395,6 +417,15 @@ def _checked_bounds(bounds: ArrayLike) -> tuple[Array, Array]:
             remedy = "Give lower < upper, and leave out a variable that is fixed."
             raise InputError(f"bounds[{row}]", (float(lower), float(upper)), reason, remedy)
     return table[:, 0].copy(), table[:, 1].copy()
+
+
+def _crossed(first: Array, second: Array, rng: np.random.Generator) -> Array:
+    """Simulated binary crossover (Deb & Agrawal 1995) in the unit cube, of half the coordinates: the children near `first`."""
+    u = rng.random(first.shape)
+    power = 1.0 / (CROSSOVER_INDEX + 1.0)
+    spread = np.where(u < 0.5, 2.0 * u, 1.0 / (2.0 * (1.0 - u))) ** power
+    child = 0.5 * ((1.0 + spread) * first + (1.0 - spread) * second)
+    return np.clip(np.where(rng.random(first.shape) < 0.5, child, first), 0.0, 1.0)
 
 
 def _mutated(unit: Array, index: float, rng: np.random.Generator) -> Array:
