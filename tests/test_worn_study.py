@@ -10,6 +10,7 @@ from patience import crowded
 from scipy import stats
 
 import hpcclear
+from hpcclear.accuracy.plan import ladder
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.samples import design
 from hpcclear.report.html.page import write_report
@@ -21,6 +22,7 @@ from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.study import lives
+from hpcclear.study.extent import samples_of
 
 SCENE = Path(__file__).parent.parent / "jobs" / "worn_study.toml"
 SMALL = (
@@ -141,6 +143,16 @@ def test_only_a_study_follows_lives():
     assert len(design(scene, None)) == 100  # a hypercube needs no distribution
     with pytest.raises(InputError, match="hpcclear run"):
         monte_carlo(scene, 4)
+
+
+def test_a_plan_is_of_the_settings_of_the_file():
+    assert ladder(load_scene(SCENE), None) == ()
+    with pytest.raises(InputError, match="Leave it out"):
+        ladder(load_scene(SCENE), 1e-3)
+    counted = samples_of(load_scene(SCENE))
+    assert counted["lives"] == 2 * counted["wear"] > 0
+    with pytest.raises(InputError):
+        ladder(load_scene(SCENE).with_({"wear.lives": 1}), None)
 
 
 # ---- the study -----------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
 from hpcclear.base.arrays import Records
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.steady import telling
@@ -20,7 +21,7 @@ from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.study import extent
+from hpcclear.study import extent, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -215,6 +216,20 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
         evaluator.advance(0.2)
 
 
-def ladder(error: float | None) -> tuple[float, ...]:
-    """Errors to measure: `TARGETS`, and the one asked for."""
+def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
+    """Errors to measure: `TARGETS`, and the one asked for; none where lives are followed, which have copies of their own.
+
+    Raises
+    ------
+    InputError
+        Lives cannot be followed, or an error was asked for that these have no use for.
+    """
+    lives.check(scene)
+    if scene.study is not None and scene.study.worn:
+        if error is not None:
+            raise InputError(
+                "--error", error, "lives of worn joints are followed at the settings of the file",
+                "Leave it out, and set wear.tolerance and wear.copies",
+            )  # fmt: skip
+        return ()
     return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))

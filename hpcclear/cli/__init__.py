@@ -579,7 +579,8 @@ def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: i
         from hpcclear.cli.plan import describe
 
         planned = ranks.size if workers is None else workers
-        made = measure(_scene(file, overrides), ranks, ladder(error), planned)
+        scene = _scene(file, overrides)
+        made = measure(scene, ranks, ladder(scene, error), planned)
         describe(made, str(file), error, planned)
 
     return _on_ranks(program)
