@@ -269,3 +269,11 @@ def test_ages_that_lives_do_not_reach_are_told(tmp_path):
     code, output = run(words(tmp_path / "gone", *fast), 0)
     assert code == 2, output
     assert "study.random.C12.cycles" in output
+
+
+def test_a_study_says_that_its_lives_had_not_settled(tmp_path):
+    hasty = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1", "wear.copies=4")
+    narrow = "study.variables.C23.range=[0.28e-3,0.35e-3]"  # it ends behind its lives
+    code, output = run(words(tmp_path / "hasty", *hasty, narrow), 0)
+    assert code == 2, output
+    assert "raise numerics.transient_revolutions" in output

@@ -6,8 +6,9 @@ import click
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import _load, console, table
+from hpcclear.ensemble.wear import doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
 
@@ -28,11 +29,7 @@ def describe(found: "Finished") -> int:
         count = int((codes == status).sum())
         if count and not status.valid:
             rows.append((status.name.lower(), f"{count}: {status.message}. {status.remedy}"))
-    unsure = int((content["flags"] == Flag.TARGET_MISSED).sum())
-    if unsure:
-        text = f"{unsure} lives whose wear rate or f scatters more than wear.tolerance; see clearance_limit"
-        rows.append(("unsure", text))
-    rows += _settling(content)
+    rows += [("unsure", text) for text in doubts(content)]
     rows += [*_ends(content), *_lifetimes(content), *_causes(content)]
     out.print(table("Wear", rows + _load(found)))
     out.print(f"wear     {found.output}")
@@ -40,16 +37,6 @@ def describe(found: "Finished") -> int:
         return Exit.DONE
     click.echo("Error: every life failed", err=True)
     return Exit.FAILED
-
-
-def _settling(content: xr.Dataset) -> list[tuple[str, str]]:
-    """Lives whose motion had not settled when it was measured."""
-    drift = content["drift"].to_numpy()
-    moving = int((drift > content.attrs["tolerance"]).sum())
-    if not moving:
-        return []
-    text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
-    return [("transient", f"{text}; raise numerics.transient_revolutions")]
 
 
 def _ends(content: xr.Dataset) -> list[tuple[str, str]]:

@@ -322,6 +322,22 @@ def lives_dataset(
     return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
 
 
+def doubts(content: xr.Dataset) -> list[str]:
+    """What to mind of lives in a file, a sentence each: rates that scatter too much, motion that had not settled."""
+    texts = []
+    unsure = int((content["flags"] == Flag.TARGET_MISSED).sum())
+    if unsure:
+        texts.append(
+            f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
+        )
+    drift = content["drift"].to_numpy()
+    moving = int((drift > content.attrs["tolerance"]).sum())
+    if moving:
+        text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
+        texts.append(f"{text}; raise numerics.transient_revolutions")
+    return texts
+
+
 def _stacked(found: list[Curves], name: str) -> Array:
     return np.stack([getattr(one, name) for one in found])
 

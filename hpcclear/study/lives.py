@@ -12,7 +12,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.session import Options, Session
-from hpcclear.ensemble.wear import check_worn, run_wear
+from hpcclear.ensemble.wear import check_worn, doubts, run_wear
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import RandomInput
 from hpcclear.statistics.random.replicates import moments, student
@@ -128,6 +128,8 @@ def known(scene: Scene, session: Session) -> Scene:
     lives = run_wear(
         scene, session.place.output / NAME, session.ranks, Options(style=style)
     ).content  # fmt: skip
+    for text in doubts(lives):
+        session.tell(f"Lives: {text}.")
     changes = {}
     for row in study.worn:
         joints = [path.split(".")[-2] for path in row.paths]
