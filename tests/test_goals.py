@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.formula import FormulaError, names_in, value_of
@@ -307,6 +308,14 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
     ]
     assert "m2 + m3" in output
     assert "constraints" in output
+
+
+def test_the_page_tells_what_was_asked_for(study: tuple[Path, str]) -> None:
+    page = write_report(study[0]).read_text()
+    (study[0] / "report.html").unlink()
+    assert "95th percentile of f: 0." in page
+    assert ">made small<" in page
+    assert "share with f above 0.0004 m" in page
 
 
 @pytest.mark.mpi

@@ -233,6 +233,7 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
     columns += [(verified[name], words) for name, words in _MOMENTS if name in verified]
     scales = [labels.of(variable) for variable, _ in columns]
     header = ["design", *(s.label(words) for s, (_, words) in zip(scales, columns, strict=True))]
+    header += _ASKED if "first_goal" in verified else []
     rows = []
     for k in range(verified.sizes["design"]):
         row: list[object] = [verified["design"].to_numpy()[k]]
@@ -241,8 +242,23 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
             row.append(
                 Number(shown + _half_width(verified.isel(design=k), str(variable.name), scale))
             )
-        rows.append(row)
+        rows.append([*row, *_asked(verified.isel(design=k))])
     return Table(header, rows, caption)
+
+
+_ASKED = ["made small", "and", "constraints"]
+"""Columns of what the case of a design asks for, where that is not mean and deviation alone."""
+
+
+def _asked(one: xr.Dataset) -> list[object]:
+    """Cells of these columns: each case asks for its own, so the cells say what it is."""
+    if "first_goal" not in one:
+        return []
+    cells: list[object] = []
+    for name in ("first", "second"):
+        value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
+        cells.append(f"{one[f'{name}_goal'].item()}: {value}")
+    return [*cells, str(one["constraints"].item()) or "none"]
 
 
 def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
