@@ -112,11 +112,13 @@ class Lanes:
         texts = [problem.motion_text(effects, width) for width in widths if width]
         apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)] if blocks else []
         apart += [OBSERVING] if blocks and self.record is not None else []
-        with compiled_beside([f"{IMPLICIT}:{n}"] if stiff else apart):  # either is half of it
+        open_joints = self._rules.begin, self._rules.end
+        beside = f"{IMPLICIT}:{n}:{open_joints[0]}:{open_joints[1]}"
+        with compiled_beside([beside] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, stiff).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
         if blocks:
-            implicit = implicit_code(n).address if stiff else 0
+            implicit = implicit_code(n, *open_joints).address if stiff else 0
             self._codes = (n, Codes(special_code().address, explicit, implicit))
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0

@@ -15,7 +15,7 @@ from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
-from hpcclear.dynamics.linkage.table_drive import PARTS, cells_of
+from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
@@ -355,7 +355,7 @@ def _cells_of_curves(linkage: Linkage, tables: dict[str, Any], turns: int) -> tu
         f"{drive.name}.{part}": cells
         for drive in linkage.mechanism.drives
         if isinstance(drive, TableDrive)
-        for part, cells in zip(PARTS, cells_of(drive), strict=True)
+        for part, cells in zip(PARTS, drive.cells, strict=True)
     }
     return tuple(
         driven[name] if name in driven else periodic_cells(tables[name], turns=turns)

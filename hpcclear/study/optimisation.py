@@ -34,6 +34,9 @@ from hpcclear.study.goals import excess, guessed, names_of
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
 
+Draws = tuple[int, np.random.Generator] | dict[str, Array] | None
+"""How many Monte Carlo draws of which generator, the draws themselves, or none for an exact rule."""
+
 PROBES = 64
 """Designs, beside the corners, at which the rules of derived random inputs are chosen."""
 
@@ -100,7 +103,8 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
 
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
     the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
-    for inputs that vary together. Such a case is averaged by Monte Carlo.
+    for inputs that vary together, or for a model whose length scales are a small part of a random input's range (it has
+    found noise). Such a case is averaged by Monte Carlo.
     """
     study = scene.required_study
     names = study.design_variables(case)
@@ -120,7 +124,7 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
         any(set(one.of) & set(random) for one in derived)
         or any(isinstance(one.distribution, Tabled) for one in inputs)
     )
-    draws: tuple[int, np.random.Generator] | dict[str, Array] | None = None
+    draws: Draws = None
     joint = None
     if study.correlation is not None and len(set(study.correlation.inputs) & set(random)) > 1:
         draws = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
@@ -130,15 +134,24 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
 
     elif askew or study.swarm.statistics == "monte-carlo":
         draws = (study.swarm.monte_carlo_samples, rng)
-    objective = RobustObjective(
-        model,
-        names,
-        inputs,
-        derived=derived,
-        probes=to_physical(scene, names, probes),
-        draws=draws,
-        joint=joint,
-    )
+
+    def averaged(draws: Draws) -> RobustObjective:
+        return RobustObjective(
+            model,
+            names,
+            inputs,
+            derived=derived,
+            probes=to_physical(scene, names, probes),
+            draws=draws,
+            joint=joint,
+        )
+
+    try:
+        objective = averaged(draws)
+    except InputError:  # no rule has nodes enough for a model as short of breath as its noise
+        if draws is not None:
+            raise
+        objective = averaged((study.swarm.monte_carlo_samples, rng))
     rng = generator(study.seed, "goals", case)
     points = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
     return Problem(names, region, objective, scene, study.case(case), points)

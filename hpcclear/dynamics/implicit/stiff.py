@@ -382,11 +382,11 @@ def leave(n, lane, W, work, m):
 
 
 @scalar_function
-def implicit_steps(n, numbers, work, stages, par, settings, tables, measures, memory):
-    """`implicit_step` of one lane, with arrays at addresses."""
+def implicit_steps(n, begin, end, numbers, work, stages, par, settings, tables, measures, memory):
+    """`implicit_step` of one lane, with arrays at addresses; the joints from `begin` to `end` are open."""
     of = carray(numbers, NUMBERS)
     W = of[WIDTH]
-    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
+    effects = at.Stepped(rules_in(of, begin, end), carray(measures, of[MEASURES]))
     block = at.Block(
         carray(work, at.WORK * W),
         carray(stages, at.MAX_COORDINATES * W),
@@ -404,9 +404,10 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
 
 
 @cache
-def implicit_code(n: int) -> Any:
-    """The compiled implicit step of n coordinates, for any joints and lanes; its ``address`` is what steppers take."""
-    text = one_text(implicit_steps, f"implicit_{n}", n=n)
+def implicit_code(n: int, begin: int, end: int) -> Any:
+    """The compiled implicit step of n coordinates and the open joints from `begin` to `end`, for any lanes; its ``address`` is
+    what steppers take. Loops over so few joints are dear unless their ends are known."""
+    text = one_text(implicit_steps, f"implicit_{n}_{begin}_{end}", n=n, begin=begin, end=end)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 

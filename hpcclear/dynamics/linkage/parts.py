@@ -7,7 +7,7 @@ angles count counter-clockwise.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 GROUND = "ground"
 Pair = tuple[float, float]
@@ -137,12 +137,14 @@ class Harmonic:
 class TableDrive:
     """The body's angle is prescribed by rows (time in s, angle in rad), the first at 0, the last where it repeats.
 
-    A cubic spline that is smooth where it repeats as well. The last angle is the first, or a turn further on.
+    A cubic spline that is smooth where it repeats as well; `cells`: what the kernel reads of it (`planar.spline`). The last
+    angle is the first, or a turn further on.
     """
 
     name: str
     body: str
     rows: tuple[Pair, ...]
+    cells: Any = field(compare=False, repr=False)
     period: bool = False
     prescribed: ClassVar[bool] = True
 

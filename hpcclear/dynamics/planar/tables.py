@@ -11,6 +11,7 @@ from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.physics.contact import contact_stiffness, reduced_compliance
+from hpcclear.dynamics.planar.spline import angle_cells
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
 from hpcclear.scene.planar import (
@@ -123,7 +124,9 @@ def _drive(drive: Any) -> parts.Drive:
             drive.period,
         )  # fmt: skip
     if isinstance(drive, PlanarTable):
-        return parts.TableDrive(drive.name, drive.body, drive.angle, drive.period)
+        return parts.TableDrive(
+            drive.name, drive.body, drive.angle, angle_cells(drive.angle), drive.period
+        )
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
     return parts.TorqueDrive(
