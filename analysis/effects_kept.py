@@ -1,6 +1,7 @@
 """Random scenes with random sets of effects: does the reduced scene stay within the tolerance, what is saved, at what cost?
 
-python analysis/effects_kept.py --scenes 60      (an hour or two on one core: most of it to compare with)
+python analysis/effects_kept.py --scenes 60      (three quarters of an hour on one core: most of it to compare with)
+python analysis/effects_kept.py --linkages --scenes 20 -o results/linkages.jsonl      (four-bars and six-bars)
 
 Each scene is a slider-crank of ordinary size (that of target_error.py) with a random set of effects, a random objective and a
 study of its masses and clearances (1 um to 0.8 mm) with default sizes. The reduced scene is judged at points that the
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from scenes import JOB
-from target_error import random_scene
+from target_error import random_linkage, random_scene
 
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
@@ -34,13 +35,13 @@ OBJECTIVES = (
 FRESH = 4096  # replicates from here on the certificate never comes to
 
 
-def scene_of(number: int) -> tuple[str, float, Scene]:
+def scene_of(number: int, linkages: bool) -> tuple[str, float, Scene]:
     """Objective, tolerance and scene of a number."""
     rng = np.random.default_rng([2028, number])
-    _, scene = random_scene(number)
-    free = scene.drive.kind == "torque"  # whose moment is given
-    objective = str(rng.choice([name for name in OBJECTIVES if not (free and "moment" in name)]))
-    tolerance = TOLERANCES[number % 3]
+    _, scene = random_linkage(number) if linkages else random_scene(number)
+    free = not linkages and scene.drive.kind == "torque"  # whose moment is given
+    objectives = OBJECTIVES[:-1] if linkages else OBJECTIVES
+    objective = str(rng.choice([name for name in objectives if not (free and "moment" in name)]))
     changes: dict[str, object] = {
         "numerics.target_error": None,
         "numerics.transient_revolutions": 5,
@@ -48,31 +49,38 @@ def scene_of(number: int) -> tuple[str, float, Scene]:
         "numerics.max_steps": 2_000_000,
         "effects.gravity": 9.81 if rng.random() < 0.7 else 0.0,
     }
-    force = scene.slider_crank.slider.mass * scene.slider_crank.crank.length
-    speed = scene.number(
-        "drive.speed" if scene.drive.kind == "constant-speed" else "drive.initial_speed"
-    )
     for name in scene.clearance_joints():  # from a fit without play to speak of to a worn bearing
         changes[f"{scene.joint_key(name)}.clearance"] = 10.0 ** rng.uniform(-6.0, -3.1)
-    if rng.random() < 0.5:  # from a breath to as much as inertia
-        changes["effects.slider_load"] = force * speed**2 * 10.0 ** rng.uniform(-4.0, 0.0)
-    if rng.random() < 0.5:
-        changes["effects.guide_friction"] = {"coefficient": 10.0 ** rng.uniform(-3.0, -0.7)}
+    if not linkages:
+        changes |= loads(scene, rng)
     if rng.random() < 0.3:
         changes["effects.friction"] = {"law": "none"}
     if objective.endswith("one joint"):
-        open_joints = scene.clearance_joints()
-        changes["numerics.objective_joints"] = [str(rng.choice(open_joints))]
+        changes["numerics.objective_joints"] = [str(rng.choice(scene.clearance_joints()))]
     changes["study"] = study(scene.with_(changes), objective.partition(" ")[0])
-    return objective, tolerance, scene.with_(changes)
+    return objective, TOLERANCES[number % 3], scene.with_(changes)
+
+
+def loads(scene: Scene, rng: np.random.Generator) -> dict[str, object]:
+    """What acts on the slider of a slider-crank, from a breath to as much as inertia."""
+    crank = scene.slider_crank.crank.length
+    free = scene.drive.kind == "torque"
+    speed = scene.number("drive.initial_speed" if free else "drive.speed")
+    changes: dict[str, object] = {}
+    if rng.random() < 0.5:
+        inertia = scene.slider_crank.slider.mass * crank * speed**2
+        changes["effects.slider_load"] = inertia * 10.0 ** rng.uniform(-4.0, 0.0)
+    if rng.random() < 0.5:
+        changes["effects.guide_friction"] = {"coefficient": 10.0 ** rng.uniform(-3.0, -0.7)}
+    return changes
 
 
 def study(scene: Scene, objective: str) -> dict[str, object]:
-    """Masses of rod and slider as design variables, each clearance random by 20 %."""
-    paths = {"rod": "mechanism.rod.mass", "slider": "mechanism.slider.mass"}
+    """Masses of two bodies as design variables, each clearance random by 20 %."""
+    masses = [path for path in scene.numeric_paths() if path.endswith(".mass")][-2:]
     variables = {
-        name: {"path": path, "range": [0.8 * scene.number(path), 1.25 * scene.number(path)]}
-        for name, path in paths.items()
+        f"mass{k}": {"path": path, "range": [0.8 * scene.number(path), 1.25 * scene.number(path)]}
+        for k, path in enumerate(masses)
     }
     random = {}
     for name in scene.clearance_joints():
@@ -106,9 +114,9 @@ class Simulated:
         return asked(records[np.argsort(records["sample"])], scene.objective)
 
 
-def judged(number: int, replicates: int) -> dict[str, object]:
+def judged(number: int, replicates: int, linkages: bool) -> dict[str, object]:
     """One scene: certificate, its cost, and the reduced scene at fresh points."""
-    objective, tolerance, scene = scene_of(number)
+    objective, tolerance, scene = scene_of(number, linkages)
     trial, spent = Trial(scene), Simulated()
     plan = trial.plan(tolerance, certificate_samples(scene), False)
     found = trial.certify(plan, spent)
@@ -178,6 +186,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--linkages", action="store_true")
     parser.add_argument(
         "--replicates", type=int, default=256, help="of fresh points, a power of two"
     )
@@ -196,7 +205,7 @@ def main() -> None:
         if number in done:
             continue
         try:
-            row = judged(number, options.replicates)
+            row = judged(number, options.replicates, options.linkages)
         except InputError as error:
             print(f"scene {number}: {error}", flush=True)
             continue

@@ -32,8 +32,8 @@ def pytest_generate_tests(metafunc):
 
 LONGEST = (
     "survival", "docs", "accuracy", "release", "limits", "stiff", "collocation", "linkage_scenes", "further_responses",
-    "effects", "cli", "reference", "jacobian", "llvm", "fuzz", "hard_cases", "ideal", "motion", "run", "baumgarte", "comm",
-    "study",
+    "effects", "certificate", "cli", "reference", "jacobian", "llvm", "fuzz", "hard_cases", "ideal", "motion", "run",
+    "baumgarte", "comm", "study",
 )  # fmt: skip
 """Files that take a minute or more, the longest first: one that begins last keeps a single worker busy at the end."""
 

@@ -97,7 +97,7 @@ def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> 
         changes = [
             shown(float(one["change"][r]), float(one["limit"][r])).removesuffix(" %") for r in kept
         ]
-        verdict = ("yes", "no", "cannot be told")[int(one["decision"])]
+        verdict = ("yes", "no", "?")[int(one["decision"])]
         share = saving(content, k, seconds)
         row = [" + ".join(named(content, k)), *changes, f"{-100 * share:+.0f}", verdict]
         made.add_row(*(fitting(text) for text in row))
