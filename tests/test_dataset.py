@@ -131,7 +131,11 @@ def test_units_are_read_by_pint_and_every_variable_is_described(kind):
     for name, variable in example(kind).variables.items():
         assert len(variable.attrs["long_name"]) > 3, name
         if variable.dtype in (np.float64, np.int64):
-            registry.parse_units(variable.attrs["units"])
+            # what a case makes small may be another thing for each design: its unit stands beside it
+            if name.startswith(("first_", "second_")) and kind == "verification":
+                assert f"{name.partition('_')[0]}_unit" in example(kind)
+            elif name not in ("searched_first", "searched_second"):
+                registry.parse_units(variable.attrs["units"])
         else:
             assert "units" not in variable.attrs
 

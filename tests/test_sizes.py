@@ -118,7 +118,7 @@ def test_what_is_measured_goes_by_the_effects():
     everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS)
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
     responses = at.Effects(crank_rod=1, rod_slider=1, responses=1)
-    followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE]
+    followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
     assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
     assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
     assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
@@ -169,7 +169,8 @@ def test_no_stepper_names_a_rate_of_its_own():
     names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
     rows = {one.rate for one in at.MEASURES}
     powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
-    own = powers | {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FORCE_12", "FORCE_23"}
+    followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
+    own = powers | followed | {"FORCE_12", "FORCE_23"}
     of_joints = {row for joint in at.JOINTS for row in (joint.force, joint.sliding_power)}
     assert {getattr(at, name) for name in own} | of_joints == rows
     own |= {"SLIDING_POWERS", "sliding_power"}

@@ -110,6 +110,8 @@ only_sample = pytest.mark.parametrize("undisturbed", ["sample"], indirect=True)
 @pytest.mark.timeout(3600)
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
     dice, done, states = random.Random(kills), 0, Counter()
+    if undisturbed.words is study_words:
+        kills = -(-kills // 2)  # a study takes longer than all samples
     found: list[Loss] = []
     for turn in itertools.count():
         if done >= kills:
@@ -160,6 +162,8 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
 def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed, how, moments):
     dice, slowest, late = random.Random(how), 0.0, 0
     if undisturbed.words is study_words:
+        if moments == 2 and how in ("SIGINT", "SIGUSR1"):
+            pytest.skip("of a study in the long profile: signals of any name end in the same place")
         moments //= 2  # a study takes longer than all samples
     for moment in range(moments):
         folder = tmp_path / str(moment) / "results"

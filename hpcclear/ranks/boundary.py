@@ -182,8 +182,8 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
     if begins:
         with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
             warnings.filterwarnings("ignore", "suspicious MPI execution environment")
-            # it holds the interpreter while others are missing: only this clock runs on
-            faulthandler.dump_traceback_later(patience, exit=True)
+            # it holds the interpreter while others are missing: only this clock runs on (2: sys.stderr may be no file)
+            faulthandler.dump_traceback_later(patience, exit=True, file=2)
             mpi.Init_thread()
             faulthandler.cancel_dump_traceback_later()
     variable, copies = launcher.launched_size()
