@@ -239,17 +239,14 @@ def test_ranks_and_a_kill_among_the_lives_change_no_byte(study, tmp_path):
     code, output = run(words(folder), 2)
     assert code == 0, output
     assert files(folder) == expected
-    for attempt in range(
-        5
-    ):  # lives are short here: a quick machine may be through before it is looked at
-        folder = tmp_path / f"killed{attempt}"
-        job, deadline = start(words(folder), 3), time.time() + crowded(120.0)
-        while job.poll() is None and not any(folder.glob(".wear.nc*/*")):
-            assert time.time() < deadline
-            time.sleep(0.005)
-        if job.poll() is None:
-            break
-        assert finish(job)[0] == 0
+    folder = tmp_path / "killed"
+    job, deadline = start(words(folder), 3), time.time() + crowded(120.0)
+    # the lives have begun; a quick machine is through before it saves any
+    while not (folder / ".wear.nc.parts").exists():
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.005)
+    time.sleep(0.5)
     kill(ranks_of(job)[1])
     finish(job)
     assert not (folder / "verification.nc").exists()
