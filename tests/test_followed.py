@@ -58,6 +58,13 @@ def test_a_point_leaves_its_path_by_no_more_than_play_allows():
         assert 0.1 * play < off.max() < 10 * play + 2e-5
 
 
+def test_the_path_of_a_crank_under_a_torque_begins_where_the_crank_does():
+    motor = {"kind": "torque", "body": "crank", "torque": 0.5, "initial_speed": 60.0}
+    free = {"mechanism.drives": {"motor": {**motor, "flywheel_inertia": 1e-2}}, "study": None}
+    response = simulate(ROCKER.with_({**dict.fromkeys(PLAYS, 1e-6), **free}))
+    assert response["path_error"].to_numpy().max() < 3e-5
+
+
 def test_without_play_the_point_stays_on_its_path():
     pins = {
         f"mechanism.joints.{name}": {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}

@@ -9,10 +9,11 @@ from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_o
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import periodic_cells, problem_of
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome

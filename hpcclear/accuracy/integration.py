@@ -106,7 +106,7 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
             setting[m, r] = method.setting(rtol)
             # collocation may be better than the reference: no error is told that the reference cannot tell
             off = rms((outcome.values - reference.values) / reference.scale)
-            lost = not abs(off[0]) < LOST
+            lost = not off[0] < LOST  # nor a number
             error[m, r] = np.nan if lost else np.fmax(off, reference.error)
     floor = MARGIN * reference.error
     order = np.array([[observed_order(n, e[:, k], floor[k]) for k in range(len(QUANTITIES))]

@@ -10,6 +10,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
+from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
@@ -22,7 +23,6 @@ from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.views import Outcome, Parameters, Settings
 from hpcclear.scene import Scene
-from hpcclear.scene.fields import Curve
 from hpcclear.scene.planar import turns_of
 
 LEAST_AVERAGED = 10
@@ -257,42 +257,6 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     rate = 1e3 * min(1.0, scene.slider_crank.crank.length * abs(speed) / 25.0)
     velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
     return (*coordinates, *velocities)
-
-
-def periodic_cells(
-    curve: tuple[tuple[float, float], ...], cells: int = at.CELLS, turns: int = 1
-) -> Array:
-    """A tabulated curve over one turn, or several, as cubic cells on a uniform grid, 4 coefficients each (flat).
-
-    Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
-    no overshoot, and smooth enough not to stop the integrator at each of them.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    angles = np.array([a for a, _ in curve]) / turns
-    values = np.array([v for _, v in curve])
-    if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
-        angles, values = angles[:-1], values[:-1]
-    # three turns side by side, so that the middle one sees its neighbours
-    three = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
-    smooth = PchipInterpolator(three, np.tile(values, 3))
-    grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
-    height = smooth(grid)
-    slope = smooth.derivative()(grid) * (at.TURN / cells)
-    height[-1], slope[-1] = height[0], slope[0]
-    d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
-    return np.column_stack([d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1]).ravel()
-
-
-def curve_at(curve: Curve, angle: Array, turns: int = 1) -> Array:
-    """A torque or load at crank angles (n,) in rad, over `turns` where it takes several, as the kernel reads it."""
-    if not isinstance(curve, tuple):
-        return np.full(len(angle), curve)
-    place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
-    cell = np.minimum(place.astype(int), at.CELLS - 1)
-    s = place - cell
-    c0, c1, c2, c3 = periodic_cells(curve, turns=turns).reshape(-1, 4)[cell].T
-    return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
 
 
 def implicit_method(scene: Scene) -> str:

@@ -12,6 +12,7 @@ from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import outcome_records, responses_told
 from hpcclear.dynamics.lanes import Lanes
@@ -27,7 +28,6 @@ from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.problem import (
     Problem,
     coordinate_count,
-    curve_at,
     integrator_of,
     problem_of,
 )

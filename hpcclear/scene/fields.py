@@ -206,6 +206,15 @@ Curve = float | tuple[tuple[float, float], ...]
 a monotone cubic between: no higher than the higher of two rows, no lower than the lower."""
 
 
+_ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+
+
+def _table_of_pairs(least: int) -> dict[str, Any]:
+    """JSON schema of a table of at least so many pairs."""
+    pair = {"type": "array", "items": _ENTRY, "minItems": 2, "maxItems": 2}
+    return {"type": "array", "items": pair, "minItems": least, "maxItems": LONGEST_CURVE}
+
+
 @dataclass(frozen=True)
 class CurveOf(Converted):
     """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit.
@@ -239,11 +248,8 @@ class CurveOf(Converted):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        entry = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-        pair = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
-        table = {"type": "array", "items": pair, "minItems": 2, "maxItems": LONGEST_CURVE}
         return {
-            "anyOf": [*entry["anyOf"], table],
+            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2)],
             "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
         }
 
@@ -300,13 +306,8 @@ class MotionTable(Converted):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        entry = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-        pair = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
         return {
-            "type": "array",
-            "items": pair,
-            "minItems": LEAST_ROWS,
-            "maxItems": LONGEST_CURVE,
+            **_table_of_pairs(LEAST_ROWS),
             "description": "[[time in s, angle in rad], ...], until the motion repeats",
         }
 

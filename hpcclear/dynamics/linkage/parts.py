@@ -137,8 +137,8 @@ class Harmonic:
 class TableDrive:
     """The body's angle is prescribed by rows (time in s, angle in rad), the first at 0, the last where it repeats.
 
-    A cubic spline that is smooth where it repeats as well; `cells`: what the kernel reads of it (`planar.spline`). The last
-    angle is the first, or a turn further on.
+    A cubic spline that is smooth where it repeats as well; `cells`: what the kernel reads of it (`curves.angle_cells`). The
+    last angle is the first, or a turn further on.
     """
 
     name: str

@@ -4,6 +4,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import Revolute, split
 from hpcclear.dynamics.linkage.poses import Poses
@@ -12,7 +13,7 @@ from hpcclear.dynamics.planar.path import followed, rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
 from hpcclear.dynamics.planar.response import bodies_and_points
 from hpcclear.dynamics.planar.tables import curves_of
-from hpcclear.dynamics.problem import Problem, curve_at, problem_of
+from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 

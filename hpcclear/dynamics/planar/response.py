@@ -79,7 +79,7 @@ def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
 
 
 def _turned(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> tuple[Array, Array]:
-    """Angle that the drive of the period has come to since the start, and its speed, rad and rad/s."""
+    """Angle of the drive of the period, since the start where it is prescribed, else of its body, and its speed; rad, rad/s."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(tables_of(scene))
     if linkage.turning:

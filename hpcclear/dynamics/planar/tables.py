@@ -7,11 +7,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.curves import angle_cells
 from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.physics.contact import contact_stiffness, reduced_compliance
-from hpcclear.dynamics.planar.spline import angle_cells
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
 from hpcclear.scene.planar import (

@@ -1,0 +1,73 @@
+"""Tabulated curves as the kernel reads them: cubic cells on a uniform grid, 4 coefficients each."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.scene.fields import Curve
+
+Rows = tuple[tuple[float, float], ...]
+
+
+def periodic_cells(curve: Rows, cells: int = at.CELLS, turns: int = 1) -> Array:
+    """A tabulated curve over one turn, or several, as cubic cells (flat).
+
+    Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
+    no overshoot, and smooth enough not to stop the integrator at each of them.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    angles = np.array([a for a, _ in curve]) / turns
+    values = np.array([v for _, v in curve])
+    if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
+        angles, values = angles[:-1], values[:-1]
+    # three turns side by side, so that the middle one sees its neighbours
+    three = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
+    smooth = PchipInterpolator(three, np.tile(values, 3))
+    grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
+    return np.column_stack(
+        _cubics(smooth(grid), smooth.derivative()(grid) * (at.TURN / cells))
+    ).ravel()
+
+
+def _cubics(height: Array, slope: Array) -> tuple[Array, Array, Array, Array]:
+    """Coefficients of cells (n,) between values and slopes a cell (n + 1,), of which the last are the first again."""
+    height[-1], slope[-1] = height[0], slope[0]
+    d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
+    return d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1
+
+
+@lru_cache(maxsize=16)
+def angle_cells(rows: Rows) -> Array:
+    """Cells of `table_drive.PARTS` over the time until a table (s, rad) repeats, shape (3, 4 CELLS); not to be written to.
+
+    A periodic spline, but for what it gains evenly, and its exact derivatives, so that what is integrated belongs to where
+    things are.
+    """
+    from scipy.interpolate import CubicSpline  # a third of a second, for these alone
+
+    times, angles = np.array(rows).T
+    rest = angles - (angles[-1] - angles[0]) * times / times[-1]
+    rest[-1] = rest[0]
+    smooth = CubicSpline(times, rest, bc_type="periodic")
+    length = times[-1] / at.CELLS
+    grid = np.linspace(0.0, times[-1], at.CELLS + 1)
+    c0, c1, c2, c3 = _cubics(smooth(grid), smooth(grid, 1) * length)
+    none = np.zeros(at.CELLS)
+    angle = np.column_stack([c0, c1, c2, c3])
+    spin = np.column_stack([c1, 2 * c2, 3 * c3, none]) / length
+    turn = np.column_stack([2 * c2, 6 * c3, none, none]) / length**2
+    return np.stack([angle.ravel(), spin.ravel(), turn.ravel()])
+
+
+def curve_at(curve: Curve, angle: Array, turns: int = 1) -> Array:
+    """A torque or load at crank angles (n,) in rad, over `turns` where it takes several, as the kernel reads it."""
+    if not isinstance(curve, tuple):
+        return np.full(len(angle), curve)
+    place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
+    cell = np.minimum(place.astype(int), at.CELLS - 1)
+    s = place - cell
+    c0, c1, c2, c3 = periodic_cells(curve, turns=turns).reshape(-1, 4)[cell].T
+    return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
