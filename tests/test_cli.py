@@ -231,3 +231,20 @@ def test_statistics_have_no_table_and_raw_goes_with_them(tmp_path):
     done = hpcclear(*words, "--raw", tmp_path)
     assert done.returncode == 2
     assert "--raw" in done.stderr
+
+
+def test_a_command_that_simulates_loads_no_study_and_no_statistics():
+    """Half a second of every command went to them once."""
+    loaded = "import sys, hpcclear.cli.printing; print(*sys.modules)"
+    found = subprocess.run(
+        [sys.executable, "-c", loaded], capture_output=True, text=True, check=True, timeout=300
+    )
+    heavy = {
+        "hpcclear.study",
+        "scipy.stats",
+        "scipy.optimize",
+        "scipy.interpolate",
+        "matplotlib",
+        "sklearn",
+    }
+    assert not heavy & set(found.stdout.split())

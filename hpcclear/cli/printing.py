@@ -19,7 +19,6 @@ from hpcclear.report.answer import ENDS, answer, beside_original
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.study import lives
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -69,7 +68,10 @@ def describe_scene(scene: Scene, cost: bool) -> None:
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
-    lives.check(scene)
+    if scene.study is not None:
+        from hpcclear.study import lives  # loads the statistics: not for every command
+
+        lives.check(scene)
     states = 2 * coordinate_count(scene)
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
@@ -153,6 +155,8 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
                 )
             )
     for row in study.worn:
+        from hpcclear.study import lives
+
         assert scene.wear is not None  # by validation
         text = f"as {scene.wear.lives} lives leave it after {row.cycles:g} revolutions; about {lives.simulations(scene)} "
         rows.append((f"{row.name} random", f"{text}simulations first"))
