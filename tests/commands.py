@@ -172,3 +172,14 @@ class Commands:
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait(crowded(60.0))
+
+
+def kill_once_it_saved(words: list[str], ranks: int, folder: Path) -> None:
+    """Start a command, and kill rank 1 when the first part of its work is in `folder`."""
+    job, deadline = start(words, ranks), time.time() + crowded(60.0)
+    while not result_files(folder):
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.01)
+    kill(ranks_of(job)[1])
+    finish(job)

@@ -3,7 +3,6 @@
 import json
 import math
 import sys
-import time
 import tomllib
 from pathlib import Path
 
@@ -11,9 +10,8 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from commands import finish, kill, overrides, ranks_of, result_files, run, start
+from commands import kill_once_it_saved, overrides, run
 from margins import at_least, fewest
-from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -499,14 +497,7 @@ def test_ranks_and_a_kill_change_no_byte(certified, tmp_path):
         assert out.read_bytes() == expected
     out = tmp_path / "killed" / "e.nc"
     out.parent.mkdir()
-    job = start([*words(out), "--checkpoint-interval", "0"], 2)
-    deadline = time.time() + crowded(60.0)
-    while not result_files(out.parent):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.01)
-    kill(ranks_of(job)[1])
-    finish(job)
+    kill_once_it_saved([*words(out), "--checkpoint-interval", "0"], 2, out.parent)
     assert not out.exists()
     code, output = run(words(out), 2)
     assert code == 0, output

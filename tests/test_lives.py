@@ -1,14 +1,12 @@
 """Lives of worn joints: jumps against closed forms, what ends a life, statistics over lives, bytes over ranks and a kill."""
 
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import finish, kill, overrides, ranks_of, result_files, run, start
-from patience import crowded
+from commands import kill_once_it_saved, overrides, run
 from running import scene_with
 from scipy.integrate import solve_ivp
 from scipy.stats import binom
@@ -314,14 +312,7 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     out = tmp_path / "killed" / "wear.nc"
     out.parent.mkdir()
     slow = [*words(out), "--checkpoint-interval", "0"]
-    job = start(slow, 2)
-    deadline = time.time() + crowded(60.0)
-    while not result_files(out.parent):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.01)
-    kill(ranks_of(job)[1])
-    finish(job)
+    kill_once_it_saved(slow, 2, out.parent)
     assert not out.exists()
     code, output = run(words(out), 2)
     assert code == 0, output

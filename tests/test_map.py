@@ -1,14 +1,12 @@
 """Maps: exponents, periods and kinds of motion; the same bytes for any ranks and after a kill."""
 
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from commands import finish, kill, ranks_of, result_files, run, start
-from patience import crowded
+from commands import kill_once_it_saved, run
 
 from hpcclear import grid
 from hpcclear.base.errors import InputError
@@ -129,14 +127,7 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     assert files[0] == files[1] == files[2]
     out = tmp_path / "killed" / "map.nc"
     out.parent.mkdir()
-    job = start([*words(out, *grids), "--checkpoint-interval", "0.1"], 2)
-    deadline = time.time() + crowded(60.0)
-    while not result_files(out.parent):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.02)
-    kill(ranks_of(job)[1])
-    finish(job)
+    kill_once_it_saved([*words(out, *grids), "--checkpoint-interval", "0.1"], 2, out.parent)
     code, output = run(words(out, *grids), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]

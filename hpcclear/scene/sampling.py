@@ -103,6 +103,28 @@ def latin_hypercube(
     return points
 
 
+def _chances(
+    seed: int,
+    purpose: str,
+    names: Sequence[str],
+    span: tuple[int, int],
+    scrambling: int | None,
+    stratified: bool,
+) -> list[Array]:
+    """Independent probabilities of each name, `span`: from which index on and how many; as `monte_carlo` has them."""
+    first, count = span
+    if stratified:
+        if first:
+            raise InputError("first", first, "a Latin hypercube has no parts", "Begin at 0")
+        rng = generator(seed, f"stratified {purpose}")
+        return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
+    if scrambling is None:
+        label = f"monte-carlo {purpose}"
+        return [_uniform(seed, label, name, first, count) for name in names]
+    rng = generator(seed, f"sobol {purpose}", str(scrambling))
+    return list(sobol(len(names), rng, first, count).T)
+
+
 def monte_carlo(
     scene: Scene,
     samples: int | None = None,
@@ -155,17 +177,7 @@ def monte_carlo(
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
     moving = [name for name in names if name in chosen or fixed is None]
-    if stratified:
-        if first:
-            raise InputError("first", first, "a Latin hypercube has no parts", "Begin at 0")
-        rng = generator(study.seed, f"stratified {purpose}")
-        uniform = list(np.maximum(unit_lhs(count, len(moving), rng), 2.0**-54).T)
-    elif scrambling is None:
-        label = f"monte-carlo {purpose}"
-        uniform = [_uniform(study.seed, label, name, first, count) for name in moving]
-    else:
-        rng = generator(study.seed, f"sobol {purpose}", str(scrambling))
-        uniform = list(sobol(len(moving), rng, first, count).T)
+    uniform = _chances(study.seed, purpose, moving, (first, count), scrambling, stratified)
     if study.correlation is not None:
         uniform = _together(study.correlation, moving, chosen, uniform)
     for column, name in enumerate(names):
