@@ -54,6 +54,7 @@ class Lane:
             "sincos": plain(angles.sincos),
             "saturated": plain(friction.saturated),
             "spring_force": plain(elements.spring_force),
+            "held_inverse": plain(elements.held_inverse),
             "harmonic": plain(elements.harmonic),
             "sign_of": plain(elements.sign_of),
         }

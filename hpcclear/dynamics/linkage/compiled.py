@@ -18,7 +18,7 @@ from numba import carray
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.elements import harmonic, sign_of, spring_force
+from hpcclear.dynamics.linkage.elements import harmonic, held_inverse, sign_of, spring_force
 from hpcclear.dynamics.linkage.motion import joint_force, table_value
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated

@@ -1,10 +1,11 @@
-"""Springs, dampers and harmonic drives: what generated motions call besides the contact law. Uncompiled, they take arrays."""
+"""What generated motions call besides the contact law: springs, harmonic drives, loops that fold flat. Plain, of arrays."""
 
 import numpy as np
 
 from hpcclear.base.jit import lane_function
 
 _TINY = 1e-300  # keeps the direction of a spring without length defined (and nought)
+_FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat
 
 
 @lane_function
@@ -32,3 +33,14 @@ def sign_of(value):
 def harmonic(mean, amplitude, rate, sine, cosine):
     """Angle (rad), angular velocity and acceleration of a harmonic drive, ``rate`` in rad/s, at a phase."""
     return mean + amplitude * sine, amplitude * rate * cosine, -amplitude * rate * rate * sine
+
+
+@lane_function
+def held_inverse(pivot, scale):
+    """1 / pivot of a multiplier, both negative; where a loop folds flat no more than 1e8 / scale.
+
+    There one direction of the loop is not held, neither by geometry nor by its forces, which would be nought by nought: a
+    free linkage goes on as its inertia has it until the loop holds again, some 1e-4 rad further on.
+    """
+    least = _FLAT * scale
+    return 1.0 / (pivot if pivot < least else least)

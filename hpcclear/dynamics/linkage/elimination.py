@@ -1,11 +1,12 @@
 """Symmetric linear equations solved once, in terms: blocks apart, one and two by hand, more by L D L' in least-degree order.
 
 Multipliers follow the coordinates that they hold: their pivots are -J M^-1 J', which vanishes at true singularities only.
+A free linkage gets through these by its inertia: see `elements.held_inverse`.
 """
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer
+from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer, named
 
 Matrix = dict[tuple[int, int], Term]
 Vector = dict[int, Term]
@@ -44,6 +45,8 @@ class Elimination:
         Unknowns, the coordinates first; the last `held` of them are multipliers.
     inverse : callable
         A term's reciprocal, as a parameter where there is one.
+    passed : mapping of int to sequence of int
+        Multipliers whose pivots are kept from vanishing, each with the multipliers of its joint.
     """
 
     def __init__(
@@ -53,10 +56,12 @@ class Elimination:
         block: list[int],
         held: int,
         inverse: Callable[[Term], Term | None],
+        passed: Mapping[int, Sequence[int]] = {},
     ) -> None:
         self.writer = writer
         self.block = block
         self.inverse = inverse
+        self.passed = passed
         self.entries = {
             (i, j): writer.let(f"k_{i}_{j}", matrix[i, j])
             for i in block
@@ -88,17 +93,18 @@ class Elimination:
             return [k for k in left if k != p and work.get((min(k, p), max(k, p)), ZERO)]
 
         left = [*coordinates, *multipliers]
+        scales: dict[int, Term] = {}
         for group in (coordinates, multipliers):
             group = list(group)
+            if group and group == multipliers:
+                scales = self._scales(work)
             while group:
                 pivot = min(group, key=lambda p: (len(neighbours(p)), p))
                 group.remove(pivot)
                 near = neighbours(pivot)
                 left.remove(pivot)
                 diagonal = work[pivot, pivot]
-                inverse = self.inverse(diagonal)
-                if inverse is None:
-                    inverse = self.writer.let(f"inverse_{pivot}", ONE / diagonal)
+                inverse = self._inverse(pivot, diagonal, scales.get(pivot))
                 row = {k: work[min(k, pivot), max(k, pivot)] for k in near}
                 scaled = {k: self.writer.let(f"l_{k}_{pivot}", row[k] * inverse) for k in near}
                 for i in near:
@@ -107,6 +113,25 @@ class Elimination:
                             value = work.get((i, j), ZERO) - scaled[i] * row[j]
                             work[i, j] = self.writer.let(f"k_{i}_{j}", value)
                 self.pivots.append((pivot, inverse, row, scaled))
+
+    def _scales(self, work: Matrix) -> dict[int, Term]:
+        """What each pivot that may vanish is compared with: the sum of its joint's, before any of them is taken."""
+        found: dict[int, Term] = {}
+        for pivot, joint in self.passed.items():
+            total = ZERO
+            for k in joint:
+                total = total + work[k, k]
+            found[pivot] = self.writer.let(f"scale_{joint[0]}", total)
+        return found
+
+    def _inverse(self, pivot: int, diagonal: Term, scale: Term | None) -> Term:
+        if scale is not None:
+            name = self.writer.fresh(f"inverse_{pivot}")
+            texts = ", ".join(self.writer.text(term) for term in (diagonal, scale))
+            self.writer.line(f"{name} = held_inverse({texts})")
+            return named(name)
+        known = self.inverse(diagonal)
+        return self.writer.let(f"inverse_{pivot}", ONE / diagonal) if known is None else known
 
     def solve(self, right: Vector) -> Vector:
         """The unknowns for one right-hand side, as terms that still have to be named."""

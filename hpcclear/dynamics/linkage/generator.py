@@ -22,6 +22,7 @@ from hpcclear.dynamics.linkage.parts import (
     Clearance,
     Drive,
     Force,
+    Revolute,
     Slide,
     Spring,
     Torque,
@@ -301,9 +302,28 @@ class _Generator:
         moving = [guide for guide in rubbing if guide.normal]
         if len(block) == 2 and not held and len(moving) == 1:
             return moving[0].paired(block, matrix, right)
-        factored = Elimination(self.writer, matrix, block, held, self.inverse)
+        factored = Elimination(self.writer, matrix, block, held, self.inverse, self._passed(block))
         found = factored.solve(right)
         return coupled(moving, factored, found) if moving else found
+
+    def _passed(self, block: list[int]) -> dict[int, list[int]]:
+        """Multipliers of pins in a free linkage, which may fold flat, with those of the same pin.
+
+        What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
+        """
+        if not all(isinstance(drive, TorqueDrive) for drive in self.mechanism.drives):
+            return {}
+        n, pins = len(self.columns), {}
+        for one in self.forest.closures:
+            if isinstance(one, Revolute):
+                names = (f"{one.name}_x", f"{one.name}_y")
+                pins |= dict.fromkeys(names, names)
+        numbers = {row.name: r for r, row in enumerate(self.constraints, n)}
+        return {
+            numbers[name]: [numbers[one] for one in both]
+            for name, both in pins.items()
+            if numbers[name] in block
+        }
 
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
