@@ -7,6 +7,7 @@ coordinates, and one linear system gives accelerations and multipliers (paper eq
 from dataclasses import dataclass, field
 from typing import Any
 
+import film_by_quadrature as quadrature
 import numpy as np
 
 # coordinates of the three bodies: crank, rod, slider
@@ -33,6 +34,26 @@ class Joint:
     factor: Any  # 1 + damping as a function of the penetration rate
     friction: Any  # friction over normal force as a function of the sliding speed
     active: float = 1.0
+    film: dict | None = (
+        None  # factors of the models and of shear, and the least thickness over the clearance
+    )
+
+
+def film_forces(joint, e, velocity, spin_journal, spin_bearing):
+    """Forces of an oil film on journal and bearing, and its moments on them about their own centres."""
+    film, floor = joint.film, joint.film["floor"]
+    ratio = np.linalg.norm(e) / joint.clearance
+    least = (
+        floor + np.clip(1 - ratio, 0, 2 * floor) ** 2 / (4 * floor) + max(1 - ratio - 2 * floor, 0)
+    )
+    place = (1 - least) * e / np.linalg.norm(e)
+    mean = 0.5 * (spin_journal + spin_bearing)
+    w = velocity - mean * np.array([-e[1], e[0]])
+    force = film["short"] * quadrature.short(place, w) + film["long"] * quadrature.long(place, w)
+    around = np.arange(2000) * np.pi / 1000
+    shear = film["shear"] * (1 / quadrature.thickness(place, around)).mean()
+    brake = shear * (spin_journal - spin_bearing)
+    return (force, -force), (-brake - 0.5 * cross(e, force), brake - 0.5 * cross(e, force))
 
 
 @dataclass
@@ -138,6 +159,15 @@ class Dense:
             Q[body + 2] += sign * cross(place - q[body : body + 2], force)
         seen = {"gap": gap, "normal": normal, "rate": rate, "tangential": tangential}
         seen["loss"] = (normal - elastic) * rate + tangential * sliding
+        if joint.film is not None:
+            places = ((journal, centre_j), (bearing, centre_b))
+            relative = speed(journal, centre_j) - speed(bearing, centre_b)
+            pulls, moments = film_forces(joint, e, relative, v[journal + 2], v[bearing + 2])
+            seen["normal"] = np.linalg.norm(normal * n - pulls[0])
+            for (body, centre), pull, moment in zip(places, pulls, moments, strict=True):
+                Q[body : body + 2] += pull
+                Q[body + 2] += moment + cross(centre - q[body : body + 2], pull)
+                seen["loss"] -= speed(body, centre) @ pull + moment * v[body + 2]
         seen["elastic_power"] = elastic * rate
         return Q, seen
 

@@ -24,6 +24,7 @@ FRICTIONS = {
     "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
 }
 IDEAL = {"kind": "ideal"}
+OIL = {"viscosity": 1e-3, "length": "20 mm"}
 FACTORS = {
     "open": ["both", "crank_rod", "rod_slider", "none"],
     "contact": list(CONTACTS),
@@ -32,6 +33,7 @@ FACTORS = {
     "gravity": [0.0, 9.81],
     "load": [None, -50.0, LOAD_CURVE],
     "guide": [False, True],
+    "film": [None, "short", "long"],
     "formulation": ["minimal", "baumgarte"],
     "energy": [True, False],
 }
@@ -42,6 +44,8 @@ def allowed(row):
     if row.get("open") == "none":
         # without clearance there is no contact law to choose, and friction is refused
         if row.get("contact", "hertz") != "hertz" or row.get("friction", "none") != "none":
+            return False
+        if row.get("film") is not None:
             return False
         # closed-form, not integrated: tests/test_ideal.py
         if row.get("drive") == "speed" and row.get("formulation") == "minimal":
@@ -75,6 +79,8 @@ def scene_of(row, **more):
     for joint in ("crank_rod", "rod_slider"):
         if row["open"] not in ("both", joint):
             changes[f"joints.{joint}"] = IDEAL
+        elif row["film"] is not None:
+            changes[f"joints.{joint}.film"] = OIL | {"model": row["film"]}
     if row["drive"] != "speed":
         changes["drive"] = {**FREE, "torque": 5.0 if row["drive"] == "torque" else TORQUE_CURVE}
     if row["load"] is not None:
@@ -112,6 +118,7 @@ ZEROS = {
     "load": {at.LOAD: 0.0},
     "load_table": {at.LOAD: 0.0},
     "guide": {at.GUIDE_COEFFICIENT: 0.0},
+    "film": {},  # of no viscosity: rows of a scene without
 }
 
 
@@ -130,13 +137,14 @@ def assert_same_motion(one, other):
 @pytest.mark.parametrize(
     "effect",
     [
-        pytest.param(name, marks=[] if name in ("coulomb", "guide") else pytest.mark.full)
+        pytest.param(name, marks=[] if name in ("coulomb", "guide", "film") else pytest.mark.full)
         for name in ZEROS
     ],
 )
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
     scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
-    assert_same_motion(run(scene, {effect: 1}, ZEROS[effect]), without)
+    flags = dict.fromkeys((effect, "short_film", "long_film") if effect == "film" else (effect,), 1)
+    assert_same_motion(run(scene, flags, ZEROS[effect]), without)
 
 
 @pytest.mark.full

@@ -81,12 +81,23 @@ MARKERS = {
         set(),
         {work(at.RATE_NOW + joint.sliding_power) for joint in (at.O12, at.O23)},
     ),
+    "film": (
+        {"short_film"},
+        {
+            par(base + row)
+            for base in (at.JOINT_12, at.JOINT_23)
+            for row in (at.FILM_FLOOR, at.FILM_SHEAR)
+        },
+    ),
+    "short_film": ({"film"}, {par(at.JOINT_12 + at.FILM_SHORT), par(at.JOINT_23 + at.FILM_SHORT)}),
+    "long_film": ({"film"}, {par(at.JOINT_12 + at.FILM_LONG), par(at.JOINT_23 + at.FILM_LONG)}),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {
     "latched": {par(at.JOINT_12 + at.DAMPING)},
     "ambrosio": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
     "series": set(),
+    "film": {par(at.JOINT_12 + at.FILM_SHORT), par(at.JOINT_23 + at.FILM_SHORT)},
     "baumgarte": set(),
 }
 

@@ -20,6 +20,7 @@ DAMPING = 0.5
 RESTITUTION_FACTOR = 0.4
 MU, RAMP = 0.1, 0.3
 DEAD = 0.05
+FILM = {"short": 8.0, "long": 20.0, "shear": 0.03, "floor": 0.04}
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
 FULL = {"gravity", "load", "guide", "ledger", "series"}
@@ -33,10 +34,13 @@ MOTIONS = [
     ("two", {"fixed", "coulomb"}),
     ("two", FULL | {"latched", "ambrosio"}),
     ("two", FULL | {"fixed", "coulomb", "torque"}),
+    ("two", FULL | {"latched", "coulomb", "film", "short_film", "long_film"}),
     ("O12", {"latched", "coulomb"}),
     ("O12", FULL | {"fixed", "ambrosio"}),
     ("O12", FULL | {"latched", "coulomb", "torque"}),
+    ("O12", FULL | {"torque", "film", "short_film"}),
     ("O23", {"fixed", "coulomb"}),
+    ("O23", FULL | {"fixed", "film", "long_film"}),
     ("O23", FULL | {"latched", "coulomb"}),
     ("O23", FULL | {"fixed", "ambrosio", "torque"}),
     ("none", {"torque", "ledger", "series"}),
@@ -86,6 +90,10 @@ def row_of_parameters(effects, rng):
             base + at.FRICTION: MU,
             base + at.INVERSE_RAMP: 1 / RAMP,
             base + at.DEAD_SPEED: DEAD,
+            base + at.FILM_SHORT: FILM["short"],
+            base + at.FILM_LONG: FILM["long"],
+            base + at.FILM_SHEAR: FILM["shear"],
+            base + at.FILM_FLOOR: FILM["floor"],
         }
     for place, value in values.items():
         par[place] = value
@@ -107,9 +115,11 @@ def joint_of(effects, par, base, active, impact_speed):
         return 0.0
 
     clearance, stiffness = par[base + at.CLEARANCE], par[base + at.CONTACT_STIFFNESS]
+    factors = {name: FILM[name] * (f"{name}_film" in effects) for name in ("short", "long")}
     return Joint(
-        clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0
-    )
+        clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,
+        {**FILM, **factors} if "film" in effects else None,
+    )  # fmt: skip
 
 
 def dense_model(effects, par, contacts, feedback=False):

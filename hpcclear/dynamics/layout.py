@@ -40,6 +40,9 @@ class Effects(NamedTuple):
     sliding: Any = None  # sliding speeds, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
+    film: Any = None  # oil in joints with clearance
+    short_film: Any = None
+    long_film: Any = None
 
 
 class Open(NamedTuple):
@@ -92,7 +95,7 @@ def open_of(effects: Effects) -> Open:
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
 ) = range(27)
-JOINT_ROWS = 10
+JOINT_ROWS = 12
 JOINT_BLOCKS = 27  # of all joints, one behind the other
 # within a joint's block
 (
@@ -104,7 +107,11 @@ JOINT_BLOCKS = 27  # of all joints, one behind the other
     FRICTION,
     INVERSE_RAMP,
     DEAD_SPEED,
-) = range(8)
+    FILM_SHORT,  # mu R L^3/c^3, N s/m; 0 where there is no such film
+    FILM_LONG,  # 12 mu L R^3/c^3, N s/m
+    FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
+    FILM_FLOOR,  # least thickness over the clearance
+) = range(12)
 JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS

@@ -200,6 +200,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     friction_law = e.friction.law if count else None
     torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
     load_is_table = isinstance(e.slider_load, tuple)
+    models = {film.model for film in scene.films().values()}
     return at.Effects(
         crank_rod=_flag(first),
         rod_slider=_flag(second),
@@ -220,6 +221,9 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
         wear=_flag(bool(scene.worn_joints())),
+        film=_flag(bool(models)),
+        short_film=_flag("short" in models),
+        long_film=_flag("long" in models),
     )
 
 
@@ -268,6 +272,8 @@ def implicit_method(scene: Scene) -> str:
     method = scene.numerics.method
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
+    if scene.films():
+        return "stiff"  # a film's damping grows beyond all bounds as it gets thin
     par = Parameters(parameters(scene)[0])
     friction = scene.effects.friction.law
     contact_law = getattr(scene.effects.contact, "law", "hertz")

@@ -26,6 +26,8 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         yield f"clearance {size} in joint {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
     for name in scene.worn_joints():
         yield f"wear of joint {name}"
+    for name, film in scene.films().items():
+        yield f"{film.model} oil film of {film.viscosity:g} Pa s in joint {name}"
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"

@@ -16,6 +16,7 @@ from hpcclear.scene.fields import (
     Table,
     invalid,
 )
+from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.wear import Wear
 
 
@@ -136,6 +137,8 @@ class ClearanceJoint(Table):
     """Journal centre minus bearing centre (x, y) at the start, m; centred unless said otherwise."""
     wear: Wear | None = None
     """How its surfaces wear; left out, they do not."""
+    film: Film | None = None
+    """Oil between its surfaces; left out, the joint is dry."""
 
     @property
     def journal_radius(self) -> float:
@@ -145,6 +148,7 @@ class ClearanceJoint(Table):
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
         check_journal(self.clearance, self.bearing_radius)
+        check_film(self.film, self.clearance)
         return self
 
 

@@ -21,6 +21,7 @@ from hpcclear.scene.fields import (
     invalid,
     nearest,
 )
+from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.mechanism import Material, check_journal
 from hpcclear.scene.wear import Wear
 
@@ -164,10 +165,13 @@ class PlanarClearance(Table):
     """Journal centre minus bearing centre at the start, m."""
     wear: Wear | None = None
     """How its surfaces wear; left out, they do not."""
+    film: Film | None = None
+    """Oil between its surfaces; left out, the joint is dry."""
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":
         check_journal(self.clearance, self.bearing_radius)
+        check_film(self.film, self.clearance)
         return self
 
 

@@ -45,7 +45,7 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
 
     Play in a joint that ``numerics.objective_joints`` names is none of them: the study asks about it.
     """
-    return (*_plays(scene), *_laws(scene), *_outside(scene), *_drives(scene))
+    return (*_plays(scene), *_films(scene), *_laws(scene), *_outside(scene), *_drives(scene))
 
 
 def _plays(scene: Scene) -> Iterator[Switch]:
@@ -58,6 +58,11 @@ def _plays(scene: Scene) -> Iterator[Switch]:
         else:
             ideal = {"kind": "ideal"}
         yield Switch(f"play in {label}", {scene.joint_key(label): ideal}, joint=label)
+
+
+def _films(scene: Scene) -> Iterator[Switch]:
+    for label in scene.films():
+        yield Switch(f"oil film in {label}", {f"{scene.joint_key(label)}.film": None})
 
 
 def _laws(scene: Scene) -> Iterator[Switch]:

@@ -12,6 +12,7 @@ from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, of_joints
 from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
+from hpcclear.scene.film import Film
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
@@ -190,6 +191,11 @@ class SceneTables(Table):
         return tuple(
             name for name in self.clearance_joints() if self.clearance_joint(name).wear is not None
         )
+
+    def films(self) -> dict[str, Film]:
+        """Oil films by the labels of their joints."""
+        tables = {name: self.clearance_joint(name).film for name in self.clearance_joints()}
+        return {name: film for name, film in tables.items() if film is not None}
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""

@@ -35,7 +35,7 @@ from hpcclear.dynamics.linkage.trees import Forest, forest
 class On(NamedTuple):
     """Which effects and outputs a text has, besides the mechanism's own loads and drives."""
 
-    friction: bool = False  # in the joints with clearance
+    friction: bool = False  # in the joints with clearance: of contact or of a film
     gravity: bool = False
     ledger: bool = False  # energies
     series: bool = False  # drive moment, for time series

@@ -28,7 +28,7 @@ class Linkage:
     mechanism : Mechanism
     gravity : bool
     friction : bool
-        In the joints with clearance.
+        In the joints with clearance: of contact or of a film.
     cartesian : bool
         Every body by itself, with multipliers and feedback.
     follow : str

@@ -14,6 +14,7 @@ import math
 
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.lubrication import film_of, pressed
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.contact import elastic_force, normal_force
 from hpcclear.dynamics.physics.friction import friction_ratio, saturated
@@ -101,11 +102,12 @@ def guide_friction(guide, par, speed, reaction, i, W):
 @apart
 @lane_function
 def joint_force(effects, work, par, joint, relative, i, W):
-    """Contact and friction in one open joint.
+    """Contact, friction and film in one open joint.
 
     `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
-    velocities of journal and bearing. Gap |e| - c, normal force and gap rate go to their rows.
-    Returns the force on the bearing (the journal gets the opposite), the moments of the friction force on
+    velocities of journal and bearing. Gap |e| - c, normal force (with a film: the size of both forces) and gap rate go to
+    their rows.
+    Returns the force on the bearing (the journal gets the opposite), the moments of friction force and film on
     bearing and journal about their own centres, and the dissipated power.
     """
     ex, ey, vx, vy, spin_journal, spin_bearing = relative
@@ -149,13 +151,15 @@ def joint_force(effects, work, par, joint, relative, i, W):
     moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
+    film, short, long = effects.film, effects.short_film, effects.long_film
+    oil = film_of(film, short, long, par, block, relative, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
-    work[(at.RATE_NOW + joint.force) * W + i] = normal
+    work[(at.RATE_NOW + joint.force) * W + i] = pressed(film, normal, nx, ny, oil[0], oil[1])
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
     store_rate(effects.wear, work, joint.sliding_power, normal * abs(sliding), i, W)
-    return fx, fy, moment_bearing, -moment_journal, loss
+    return fx + oil[0], fy + oil[1], moment_bearing + oil[2], oil[3] - moment_journal, loss + oil[4]
 
 
 @lane_function

@@ -56,7 +56,7 @@ def linkage_of(scene: Scene) -> Linkage:
         mechanism,
         follow=follow,
         gravity=scene.effects.gravity > 0.0,
-        friction=scene.effects.friction.law != "none",
+        friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
     )
 
