@@ -5,7 +5,10 @@ import math
 import film_by_quadrature as quadrature
 import numpy as np
 import pytest
+import rotors
 
+from hpcclear import simulate
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics.physics import film
 
 ECCENTRICITIES = [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.95, 0.99]
@@ -83,5 +86,90 @@ def test_a_film_gets_no_thinner_than_the_roughness():
     depth = np.linspace(-0.01, 0.04, 5001)
     seen = np.array([film.film_thickness(d, floor) for d in depth])
     slope = np.diff(seen) / np.diff(depth)
-    assert (slope >= -1e-9).all() and slope.max() < 1.0 + 1e-9
+    assert (slope >= -1e-9).all()
+    assert slope.max() < 1.0 + 1e-9
     assert np.abs(np.diff(slope)).max() < 1.01 * (depth[1] - depth[0]) / (2.0 * floor)
+
+
+def coefficients(e):
+    """Stiffness and damping of a short bearing at its place under a load in -y, over load and clearance, and load, clearance
+    and speed: by differences of the law."""
+    attitude = math.atan(math.pi * math.sqrt(1 - e**2) / (4 * e))
+    place = e * np.array([math.sin(attitude), -math.cos(attitude)])
+
+    def force(q, v):
+        w = (v[0] + 0.5 * q[1], v[1] - 0.5 * q[0])
+        return np.array(film.short_force(1, 1.0, tuple(q), w, 1.0 - q @ q))
+
+    still = np.zeros(2)
+    step = 1e-6 * min(e, 1 - e)
+    scale = 2 * step * np.hypot(*force(place, still))
+    axes = np.eye(2) * step
+    stiffness = [force(place - axis, still) - force(place + axis, still) for axis in axes]
+    damping = [force(place, -axis) - force(place, axis) for axis in axes]
+    return np.array(stiffness).T / scale, np.array(damping).T / scale
+
+
+@pytest.mark.parametrize("e", [0.1, 0.4, 0.7, 0.9])
+def test_small_motions_feel_the_coefficients_that_books_print(e):
+    for found, printed in zip(coefficients(e), rotors.printed_coefficients(e), strict=True):
+        assert found == pytest.approx(printed, rel=1e-7, abs=1e-7 * np.abs(printed).max())
+
+
+def whirl(e):
+    """At the limit of stability: mass times speed squared, over load and clearance; and the square of whirl over speed."""
+    k, c = coefficients(e)
+    held = (
+        k[0, 0] * c[1, 1] + k[1, 1] * c[0, 0] - k[0, 1] * c[1, 0] - k[1, 0] * c[0, 1]
+    ) / c.trace()
+    ratio = np.linalg.det(k - held * np.eye(2)) / np.linalg.det(c)
+    return held / ratio, ratio
+
+
+def test_limits_of_whirl_are_the_known_ones():
+    """A light rotor whirls at half its speed, from omega^2 m c/W = 24/pi on; none does beyond an eccentricity of 0.756."""
+    speed, ratio = whirl(1e-3)
+    assert speed == pytest.approx(24 / math.pi, rel=1e-5)
+    assert ratio == pytest.approx(0.25, rel=1e-5)
+    assert whirl(0.755)[1] > 0.0 > whirl(0.757)[1]
+
+
+# ---- whole motions ------------------------------------------------------------------------------------
+
+
+def places(scene):
+    """Eccentricity over the clearance (t, 2), the response, and what the energies leave over of what passed through."""
+    response = simulate(scene)
+    place = np.hstack([response["eccentricity_x"], response["eccentricity_y"]]) / rotors.CLEARANCE
+    passed = np.abs(np.diff(response["driving_work"])).sum()
+    return place, response, float(np.abs(response["energy_residual"]).max()) / passed
+
+
+@pytest.mark.parametrize(
+    ("model", "load"), [("short", 20.0), ("short", 300.0), ("long", 300.0), ("long", 3000.0)]
+)
+def test_a_journal_settles_where_the_load_is_carried(model, load):
+    """Eccentricity and attitude angle that its Sommerfeld number goes with."""
+    place, response, rest = places(rotors.rotor(150.0, load, 60, model=model))
+    assert int(response["status"]) == Status.OK
+    assert place[-1] == pytest.approx(rotors.equilibrium(model, 150.0, load), abs=1e-6)
+    assert float(response["contact_force"][-1, 0]) == pytest.approx(load, rel=1e-5)
+    assert rest < 1e-6
+
+
+@pytest.mark.parametrize("load", [20.0, 120.0])
+def test_oil_whirl_begins_at_the_known_speed(load):
+    """On either side of the limit a small deviation decays or grows as fast as the linear theory says."""
+    limit = rotors.whirl_speed(load)
+    for speed in (0.9 * limit, 1.1 * limit):
+        there = rotors.equilibrium("short", speed, load)
+        turns = 24
+        place, response, _ = places(rotors.rotor(speed, load, turns, start=tuple(there + 2e-4)))
+        away = np.hypot(*(place - there).T)
+        time = response["time"].to_numpy()
+        half = len(time) // 2
+        tops = [away[a:b].max() for a, b in ((half // 2, half), (half + half // 2, 2 * half))]
+        rate = math.log(tops[1] / tops[0]) / (time[-1] / 2)
+        expected = rotors.growth(speed, load)
+        assert (expected > 0.0) == (speed > limit)
+        assert rate == pytest.approx(expected, rel=0.1)

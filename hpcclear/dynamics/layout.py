@@ -95,7 +95,7 @@ def open_of(effects: Effects) -> Open:
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
 ) = range(27)
-JOINT_ROWS = 12
+JOINT_ROWS = 13
 JOINT_BLOCKS = 27  # of all joints, one behind the other
 # within a joint's block
 (
@@ -111,7 +111,8 @@ JOINT_BLOCKS = 27  # of all joints, one behind the other
     FILM_LONG,  # 12 mu L R^3/c^3, N s/m
     FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
     FILM_FLOOR,  # least thickness over the clearance
-) = range(12)
+    FILM_STEEPNESS,  # s/m, of the film's force over that of inertia
+) = range(13)
 JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS

@@ -45,7 +45,7 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
             key = scene.joint_key(joint)
             block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
             _joint_parameters(scene, get, key, f"{key}.materials", p[:, block:])
-            _film_parameters(scene, get, joint, p[:, block:])
+            _film_parameters(scene, get, joint, p, block)
         return p
     p = np.ones((get.size, at.OWN))
     p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
@@ -78,7 +78,7 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
         if joint in scene.clearance_joints():
             key = scene.joint_key(joint)
             _joint_parameters(scene, get, key, key, p[:, base:])
-            _film_parameters(scene, get, joint, p[:, base:])
+            _film_parameters(scene, get, joint, p, base)
     return p
 
 
@@ -121,19 +121,22 @@ def _joint_parameters(scene: Scene, get: Numbers, key: str, materials: str, p: A
         p[:, at.INVERSE_RAMP] = 1.0 / (friction.speeds[1] - friction.speeds[0])
 
 
-def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array) -> None:
-    """Fill what a joint's block of parameters has of its film; without one its force is 0."""
-    p[:, at.FILM_SHORT : at.FILM_SHEAR + 1] = 0.0
-    p[:, at.FILM_FLOOR] = 0.5
-    film = scene.films().get(joint)
+def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
+    """Fill what a joint's block of parameters (its first column) has of its film; without one its force is 0."""
+    film, own = scene.films().get(joint), p[:, block:]
+    own[:, at.FILM_SHORT : at.JOINT_ROWS] = 0.0
+    own[:, at.FILM_FLOOR] = 0.5
     if film is None:
         return
     key = scene.joint_key(joint)
     viscosity, length = get(f"{key}.film.viscosity"), get(f"{key}.film.length")
     clearance, radius = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
     if film.model == "short":
-        p[:, at.FILM_SHORT] = viscosity * radius * (length / clearance) ** 3
+        own[:, at.FILM_SHORT] = viscosity * radius * (length / clearance) ** 3
     else:
-        p[:, at.FILM_LONG] = 12.0 * viscosity * length * (radius / clearance) ** 3
-    p[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
-    p[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
+        own[:, at.FILM_LONG] = 12.0 * viscosity * length * (radius / clearance) ** 3
+    own[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
+    own[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
+    masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
+    inertia = sum(get(path) for path in masses) * p[:, at.CRANK_LENGTH] * p[:, at.SPEED] ** 2
+    own[:, at.FILM_STEEPNESS] = (own[:, at.FILM_SHORT] + own[:, at.FILM_LONG]) / inertia

@@ -216,6 +216,10 @@ class Parameters(View):
     journal_radius = _entry(at.JOURNAL_RADIUS)
     friction = _entry(at.FRICTION)
     inverse_ramp = _entry(at.INVERSE_RAMP)
+    film_short = _entry(at.FILM_SHORT)
+    film_long = _entry(at.FILM_LONG)
+    film_shear = _entry(at.FILM_SHEAR)
+    film_floor = _entry(at.FILM_FLOOR)
 
 
 class Rates(View):

@@ -171,7 +171,7 @@ RESPONSE: Columns = {
     "eccentricity_x": number(("time", "joint"), "m", "x distance of the journal centre from the bearing centre"),
     "eccentricity_y": number(("time", "joint"), "m", "y distance of the journal centre from the bearing centre"),
     "penetration": number(("time", "joint"), "m", "overlap of journal and bearing"),
-    "contact_force": number(("time", "joint"), "N", "normal contact force"),
+    "contact_force": number(("time", "joint"), "N", "normal contact force, with an oil film the force of both"),
     "friction_force": number(("time", "joint"), "N", "tangential contact force"),
     "reaction_x": number(("time", "joint"), "N", "x force on the rod in an ideal joint"),
     "reaction_y": number(("time", "joint"), "N", "y force on the rod in an ideal joint"),

@@ -19,6 +19,10 @@ WIDEST = 0.1
 """Clearance over bearing radius; worn bearings reach a hundredth, the mechanisms that publications study a twentieth."""
 LONGEST = 5.0
 """Of a crank or rod, m."""
+THINNEST, THICKEST = 1e-5, 20.0
+"""Viscosities of air and of the thickest gear oil when cold, Pa s."""
+LONGEST_SHORT, SHORTEST_LONG = 1.0, 2.0
+"""Length over diameter up to which a bearing may be called short, and from which long."""
 STEEL = 7850.0
 """kg/m3."""
 
@@ -29,6 +33,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
         yield from _drive(scene)
         yield from _bodies(scene)
     yield from _joints(scene)
+    yield from _films(scene)
     effects = scene.effects
     if effects.gravity > 100.0:
         yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
@@ -89,4 +94,22 @@ def _joints(scene: SceneTables) -> Iterator[str]:
             yield (
                 f"{key}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
                 "bearing's radius; write the radial play, half of the difference of the diameters"
+            )
+
+
+def _films(scene: SceneTables) -> Iterator[str]:
+    for name, film in scene.films().items():
+        key = f"{scene.joint_key(name)}.film"
+        if film.viscosity and not THINNEST <= film.viscosity <= THICKEST:
+            what = "thinner than air" if film.viscosity < THINNEST else "thicker than any oil"
+            yield (
+                f"{key}.viscosity = {film.viscosity:g} Pa s is {what}; engine oil has 0.01 Pa s when hot and 0.3 when cold, "
+                f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
+            )
+        ratio = 0.5 * film.length / scene.clearance_joint(name).bearing_radius
+        short = film.model == "short"
+        if ratio > LONGEST_SHORT if short else ratio < SHORTEST_LONG:
+            yield (
+                f'{key}.model = "{film.model}" carries far too much where the bearing is {ratio:.2g} diameters long; '
+                f"short films go to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}"
             )

@@ -79,6 +79,9 @@ STEEP = 100.0
 ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
 """Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
 
+ERROR_IN_FILM = 2e-3
+"""Of a step at most, as a part of the speed at which a film is squeezed by the forces of inertia."""
+
 KINK_REACH, MOST_CUTS = 0.005, 12.0
 """A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
 
@@ -103,18 +106,21 @@ def fit_to_ramp(m, settings):
 
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
     and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
-    ramp's end would hide its slope.
+    ramp's end would hide its slope. A film is squeezed as slowly where it carries: an error of that speed would be one of all
+    forces, and the energy balance would not close.
     """
     steepest = 1e-300
+    film = 1e-300
     slope = 0.0
     for k in range(at.MAX_JOINTS):
         block = mem.PAR + at.JOINT_BLOCKS + k * at.JOINT_ROWS
         inverse = m[(block + at.INVERSE_RAMP) * LANES]
         steepest = max(steepest, inverse)
         slope = max(slope, m[(block + at.FRICTION) * LANES] * inverse)
+        film = max(film, m[(block + at.FILM_STEEPNESS) * LANES])
     ramp = 1.0 / steepest
     speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
-    within = ERROR_IN_RAMP * ramp / (1.0 + speed)
+    within = min(ERROR_IN_RAMP * ramp, ERROR_IN_FILM / film) / (1.0 + speed)
     strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
     m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
     m[mem.REACH] = DIFFERENCE_IN_RAMP * ramp

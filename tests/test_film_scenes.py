@@ -1,0 +1,149 @@
+"""Scenes whose joints carry oil: energy, hard cases, both ways to write a slider-crank, what is refused and what is told."""
+
+import numpy as np
+import pytest
+from running import SCENE, energy_residual, run, scene_with
+
+from hpcclear import simulate
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import implicit_method
+from hpcclear.dynamics.views import Parameters
+from hpcclear.scene import load_scene
+from hpcclear.scene.points import Points
+from hpcclear.scene.switches import Off, switches
+
+JOINTS = ("crank_rod", "rod_slider")
+CLOSED = 2e-5  # the bound of the library of hard scenes at 1e-6
+OIL = {"viscosity": "10 mPa*s", "length": "20 mm", "model": "short"}
+
+
+def oiled(rtol=1e-6, clearance="0.1 mm", joints=JOINTS, **film):
+    """The paper's slider-crank with oil in its joints, two revolutions from the start."""
+    changes = {f"joints.{joint}.film": OIL | film for joint in joints}
+    changes |= {f"joints.{joint}.clearance": clearance for joint in JOINTS}
+    return scene_with(changes | {"numerics.energy": True}, 2, rtol)
+
+
+# ---- hard cases: each ends as it says, and its energy closes ---------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["short", "long"])
+@pytest.mark.parametrize("clearance", ["0.02 mm", "0.3 mm"])
+def test_any_oil_ends_in_a_stated_way_and_keeps_the_energy_balance(model, clearance):
+    """Viscosities from 1e-4 to 10 Pa s: from joints that strike through the film to such that creep in it."""
+    for viscosity in (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0):
+        scene = oiled(model=model, clearance=clearance, viscosity=viscosity)
+        result = run(scene)
+        assert result.out.status == Status.OK
+        rest, passed = energy_residual(scene, result)
+        assert abs(rest) < CLOSED * passed
+
+
+@pytest.mark.parametrize("eccentricity", [0.99, 0.9999, 1.0, 1.02])
+def test_a_start_in_the_thinnest_film_or_in_contact(eccentricity):
+    scene = oiled(viscosity=1e-3, clearance="0.2 mm")
+    start = [eccentricity * 2e-4, 0.0]
+    scene = scene.with_({f"joints.{joint}.start_eccentricity": start for joint in JOINTS})
+    result = run(scene)
+    assert result.out.status == Status.OK
+    rest, passed = energy_residual(scene, result)
+    assert abs(rest) < CLOSED * passed
+
+
+@pytest.mark.parametrize("roughness", ["0.1 um", "1 um", "50 um"])
+def test_film_and_contact_at_once(roughness):
+    """So little oil that the journal meets its bearing through it: contact joins in, and nothing jumps."""
+    scene = oiled(viscosity=1e-4, clearance="0.3 mm", length="0.5 mm", roughness=roughness)
+    result = run(scene)
+    assert result.out.status == Status.OK
+    assert (result.out.deepest[:2] > 1e-6).all()
+    rest, passed = energy_residual(scene, result)
+    assert abs(rest) < CLOSED * passed
+
+
+# ---- one law, whoever writes it down ------------------------------------------------------------------------
+
+
+def test_oil_in_one_joint_leaves_the_other_dry():
+    scene = oiled(joints=["crank_rod"], viscosity=0.05)
+    response = simulate(scene)
+    assert int(response["status"]) == Status.OK
+    penetration = response["penetration"].to_numpy().max(axis=0)
+    assert penetration[0] == 0.0 < penetration[1]
+
+
+def test_methods_agree_on_a_film():
+    """Explicit steps, implicit ones, and collocation."""
+    found = {}
+    for method in ("dormand-prince", "radau", "lobatto"):
+        scene = oiled(rtol=1e-9, viscosity=1e-3, clearance="0.3 mm", length="5 mm")
+        found[method] = float(run(scene.with_({"numerics.method": method})).out.objective)
+    best = found.pop("dormand-prince")
+    assert found == {method: pytest.approx(best, rel=1e-6) for method in found}
+
+
+# ---- the scene file ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "reason"),
+    [
+        ("viscosity", -1.0, "at least 0"),
+        ("viscosity", "10 mm", "does not fit"),
+        ("viscosity", 1e6, "at most"),
+        ("viscosity", None, "missing"),
+        ("length", 0.0, "above 0"),
+        ("model", "wide", "not one of the known values"),
+        ("roughness", "0.1 mm", "quarter of the clearance"),
+        ("temperature", 300.0, "not a known key"),
+    ],
+)
+def test_a_film_that_is_none_is_refused_with_the_reason(entry, value, reason):
+    with pytest.raises(InputError) as caught:
+        oiled().with_({f"joints.crank_rod.film.{entry}": value})
+    assert caught.value.key == f"joints.crank_rod.film.{entry}"
+    assert reason in caught.value.reason
+    assert caught.value.remedy
+
+
+def test_a_scene_tells_of_its_films():
+    scene = oiled()
+    assert "short oil film of 0.01 Pa s in joint crank_rod" in scene.effects_on()
+    assert implicit_method(scene) == "stiff"
+    assert not any(".film" in text for text in scene.warnings)
+    for film, word in (
+        ({"viscosity": 30.0}, "mPa*s"),
+        ({"length": "80 mm"}, "2 diameters long"),
+        ({"model": "long"}, "0.5 diameters long"),
+    ):
+        assert any(word in text for text in oiled(**film).warnings)
+    assert load_scene(SCENE).films() == {}
+
+
+def test_a_film_is_an_effect_that_may_be_switched_off():
+    scene = oiled(joints=["crank_rod"])
+    (film,) = [one for one in switches(scene) if "film" in one.name]
+    off = Off(scene, [film])
+    assert film.name == "oil film in crank_rod"
+    assert off.scene.films() == {}
+    assert off.scene.clearance_joints() == JOINTS
+    assert off.paths(["joints.crank_rod.film.viscosity", "joints.crank_rod.clearance"]) == (
+        "joints.crank_rod.clearance",
+    )
+    both = Off(scene, [one for one in switches(scene) if one.joint == "crank_rod"] + [film])
+    assert both.scene.clearance_joints() == ("rod_slider",)
+
+
+def test_numbers_of_a_film_may_be_varied():
+    """Each sample has the film of its own viscosity, clearance and length."""
+    scene = oiled()
+    paths = [f"joints.crank_rod.{name}" for name in ("film.viscosity", "clearance", "film.length")]
+    values = np.array(
+        [[0.01, 1e-4, 0.02], [0.02, 1e-4, 0.02], [0.01, 2e-4, 0.02], [0.01, 1e-4, 0.04]]
+    )
+    points = Points(("mu", "C", "L"), values, tuple((path,) for path in paths))
+    p = Parameters(parameters(scene, points))
+    assert p.film_short[:, 0] == pytest.approx(p.film_short[0, 0] * np.array([1, 2, 1 / 8, 8]))
+    assert p.film_shear[:, 0] == pytest.approx(p.film_shear[0, 0] * np.array([1, 2, 0.5, 2]))
