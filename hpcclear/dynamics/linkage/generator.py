@@ -313,7 +313,8 @@ class _Generator:
         """
         if not all(isinstance(drive, TorqueDrive) for drive in self.mechanism.drives):
             return {}
-        n, pins = len(self.columns), {}
+        n = len(self.columns)
+        pins: dict[str, tuple[str, str]] = {}
         for one in self.forest.closures:
             if isinstance(one, Revolute):
                 names = (f"{one.name}_x", f"{one.name}_y")
