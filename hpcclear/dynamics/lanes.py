@@ -117,6 +117,10 @@ class Lanes:
         with compiled_beside([beside] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, stiff).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
+            if stiff:  # implicit steps take as long as all of this together
+                special_code()
+                for width in widths:
+                    problem.motion(effects, width)
         if blocks:
             implicit = implicit_code(n, *open_joints).address if stiff else 0
             self._codes = (n, Codes(special_code().address, explicit, implicit))
