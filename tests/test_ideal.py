@@ -9,7 +9,7 @@ from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_o
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
-from hpcclear.dynamics.curves import periodic_cells
+from hpcclear.dynamics.curves import curve_at, periodic_cells
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage import ideal
 from hpcclear.dynamics.parameters import parameters
@@ -167,6 +167,36 @@ def test_tabulated_load_is_taken_at_the_crank_angle():
         at.Effects(load_table=1), par, cells, np.array([0.0, 1.0, 3.0, 5.0, 1.0 + at.TURN])
     )
     np.testing.assert_allclose(seen[ideal.LOAD_FORCE], [1.0, 3.0, -2.0, 0.5, 3.0], atol=1e-4)
+
+
+ROWS = ((0.1, 1.0), (1.0, 3.0), (3.0, -2.0), (5.0, 0.5))
+
+
+def test_straight_lines_between_rows():
+    """Exact but in the four cells that hold a row; there off by an eighth of the kink's slope over a cell, at most."""
+    width = at.TURN / at.CELLS
+    angle = np.linspace(-1.0, 7.0, 20_001)
+    expected = np.interp(angle, *np.array(ROWS).T, period=at.TURN)
+    error = np.abs(curve_at(ROWS, angle, interpolation="linear") - expected)
+    holds = [np.abs((angle - row + np.pi) % at.TURN - np.pi) < width for row, _ in ROWS]
+    assert error[~np.any(holds, axis=0)].max() < 1e-13
+    assert 0 < error.max() < 0.5 * width * 5
+    # rows at the borders of cells have their kinks
+    even = tuple((k * at.TURN / 8, float(k % 3)) for k in range(8))
+    expected = np.interp(angle, *np.array(even).T, period=at.TURN)
+    assert np.abs(curve_at(even, angle, interpolation="linear") - expected).max() < 1e-12
+    assert np.abs(curve_at(even, angle) - expected).max() > 0.01
+
+
+@pytest.mark.parametrize("ideal_joints", [True, False])
+def test_the_load_of_a_response_is_straight_where_that_is_asked_for(ideal_joints):
+    load = [[0.0, 0.0], [3.0, 100.0], [4.0, -100.0]]
+    changes = {"effects.slider_load": load, "numerics.interpolation": "linear"}
+    response = simulate(scene_with(changes | (BARE if ideal_joints else {}), revolutions=1))
+    angle = np.mod(response["crank_angle"].to_numpy(), at.TURN)
+    expected = np.interp(angle, *np.array(load).T, period=at.TURN)
+    assert np.abs(response["slider_load"].to_numpy() - expected).max() < 0.5
+    assert np.abs(response["energy_residual"].to_numpy()).max() < 1e-3
 
 
 def test_outcomes_have_no_gap():

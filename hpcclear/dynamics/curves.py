@@ -11,22 +11,28 @@ from hpcclear.scene.fields import Curve
 Rows = tuple[tuple[float, float], ...]
 
 
-def periodic_cells(curve: Rows, cells: int = at.CELLS, turns: int = 1) -> Array:
+def periodic_cells(
+    curve: Rows, cells: int = at.CELLS, turns: int = 1, interpolation: str = "smooth"
+) -> Array:
     """A tabulated curve over one turn, or several, as cubic cells (flat).
 
-    Monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021): through every pair,
-    no overshoot, and smooth enough not to stop the integrator at each of them.
+    "smooth": monotone cubic between the given pairs (Fritsch and Carlson 1980, doi:10.1137/0717021), through every pair,
+    no overshoot, and smooth enough not to stop the integrator at each of them. "linear": straight between them; a kink
+    within a cell is rounded over that cell, a 2048th of the period, so that there is nothing to stop at either.
     """
-    from scipy.interpolate import PchipInterpolator
-
     angles = np.array([a for a, _ in curve]) / turns
     values = np.array([v for _, v in curve])
     if angles[-1] - angles[0] > at.TURN * (1.0 - 1e-12):
         angles, values = angles[:-1], values[:-1]
     # three turns side by side, so that the middle one sees its neighbours
     three = np.concatenate([angles - at.TURN, angles, angles + at.TURN])
-    smooth = PchipInterpolator(three, np.tile(values, 3))
+    values = np.tile(values, 3)
     grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
+    if interpolation == "linear":
+        return np.column_stack(_straight(three, values, grid[:-1], at.TURN / cells)).ravel()
+    from scipy.interpolate import PchipInterpolator
+
+    smooth = PchipInterpolator(three, values)
     return np.column_stack(
         _cubics(smooth(grid), smooth.derivative()(grid) * (at.TURN / cells))
     ).ravel()
@@ -35,8 +41,28 @@ def periodic_cells(curve: Rows, cells: int = at.CELLS, turns: int = 1) -> Array:
 def _cubics(height: Array, slope: Array) -> tuple[Array, Array, Array, Array]:
     """Coefficients of cells (n,) between values and slopes a cell (n + 1,), of which the last are the first again."""
     height[-1], slope[-1] = height[0], slope[0]
-    d0, d1, m0, m1 = height[:-1], height[1:], slope[:-1], slope[1:]
+    return _hermite(height[:-1], height[1:], slope[:-1], slope[1:])
+
+
+def _hermite(d0: Array, d1: Array, m0: Array, m1: Array) -> tuple[Array, Array, Array, Array]:
+    """Coefficients of cells (n,) from values and slopes a cell at their beginnings and ends."""
     return d0, m0, 3 * (d1 - d0) - 2 * m0 - m1, 2 * (d0 - d1) + m0 + m1
+
+
+def _straight(
+    angles: Array, values: Array, begin: Array, width: float
+) -> tuple[Array, Array, Array, Array]:
+    """Coefficients of cells that begin at angles (n,), straight wherever no pair lies within the cell."""
+    inside = 1e-6 * width  # a pair at the border belongs to neither cell, whatever rounding says
+    rise = np.diff(values) / np.diff(angles) * width
+
+    def slope(where: Array) -> Array:
+        return np.asarray(rise[np.searchsorted(angles, where) - 1])
+
+    height = np.interp(begin, angles, values)
+    return _hermite(
+        height, np.roll(height, -1), slope(begin + inside), slope(begin + width - inside)
+    )
 
 
 @lru_cache(maxsize=16)
@@ -62,12 +88,14 @@ def angle_cells(rows: Rows) -> Array:
     return np.stack([angle.ravel(), spin.ravel(), turn.ravel()])
 
 
-def curve_at(curve: Curve, angle: Array, turns: int = 1) -> Array:
+def curve_at(curve: Curve, angle: Array, turns: int = 1, interpolation: str = "smooth") -> Array:
     """A torque or load at crank angles (n,) in rad, over `turns` where it takes several, as the kernel reads it."""
     if not isinstance(curve, tuple):
         return np.full(len(angle), curve)
     place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
     cell = np.minimum(place.astype(int), at.CELLS - 1)
     s = place - cell
-    c0, c1, c2, c3 = periodic_cells(curve, turns=turns).reshape(-1, 4)[cell].T
+    c0, c1, c2, c3 = (
+        periodic_cells(curve, turns=turns, interpolation=interpolation).reshape(-1, 4)[cell].T
+    )
     return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))

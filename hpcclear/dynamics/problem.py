@@ -1,6 +1,8 @@
 """What is common to the samples of a scene: effects, coordinates, method, tolerances, tables."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -319,7 +321,9 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
     return single and automatic and smooth and scene.numerics.rtol <= TIGHT
 
 
-def _cells_of_curves(linkage: Linkage, tables: dict[str, Any], turns: int) -> tuple[Array, ...]:
+def _cells_of_curves(
+    linkage: Linkage, tables: dict[str, Any], cells: Callable[[Any], Array]
+) -> tuple[Array, ...]:
     """Cells of a linkage's curves, in the order of their rows."""
     driven = {
         f"{drive.name}.{part}": cells
@@ -328,8 +332,7 @@ def _cells_of_curves(linkage: Linkage, tables: dict[str, Any], turns: int) -> tu
         for part, cells in zip(PARTS, drive.cells, strict=True)
     }
     return tuple(
-        driven[name] if name in driven else periodic_cells(tables[name], turns=turns)
-        for name in linkage.curve_rows
+        driven[name] if name in driven else cells(tables[name]) for name in linkage.curve_rows
     )
 
 
@@ -341,9 +344,10 @@ def problem_of(
     torque = getattr(scene.drive, "torque", None)
     linkage, turns, curves = None, 1, cast(tuple[Array, ...], ())
     if scene.is_planar:
-        linkage, tables = planar.linkage_of(scene), planar.tables_of(scene)
-        turns = turns_of(tables)
-        curves = _cells_of_curves(linkage, curves_of(tables), turns)
+        linkage, turns = planar.linkage_of(scene), turns_of(planar.tables_of(scene))
+    cells = partial(periodic_cells, turns=turns, interpolation=scene.numerics.interpolation)
+    if linkage is not None:
+        curves = _cells_of_curves(linkage, curves_of(planar.tables_of(scene)), cells)
     averaged: Any = scene.numerics.averaged_revolutions
     auto = averaged == "auto"
     return Problem(
@@ -358,8 +362,8 @@ def problem_of(
         averaged_cap=scene.numerics.max_averaged_revolutions if auto else averaged,
         objective_tolerance=scene.numerics.objective_tolerance if auto else 0.0,
         max_steps=scene.numerics.max_steps,
-        torque_table=periodic_cells(torque) if isinstance(torque, tuple) else None,
-        load_table=periodic_cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
+        torque_table=cells(torque) if isinstance(torque, tuple) else None,
+        load_table=cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
         cycle=turns * at.TURN,

@@ -214,7 +214,9 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
     labels = scene.joint_labels
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
-        data["slider_load"] = curve_at(scene.effects.slider_load, data["crank_angle"])
+        data["slider_load"] = curve_at(
+            scene.effects.slider_load, data["crank_angle"], 1, scene.numerics.interpolation
+        )
     return dataset.response_dataset(
         times,
         {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},

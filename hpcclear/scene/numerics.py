@@ -13,9 +13,11 @@ class Numerics(Table):
     formulation: Literal["minimal", "baumgarte"] = "minimal"
     """Minimal coordinates, or Lagrange multipliers with Baumgarte feedback (eq. 11)."""
     alpha: Annotated[float, Quantity("1/s", least=0)] = 250.0
-    """Baumgarte feedback on constraint speed, 1/s; used by that formulation only."""
+    """Baumgarte feedback on constraint speed, 1/s; used by that formulation, and by ideal loops of linkages."""
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
-    """Baumgarte feedback on constraint position, 1/s; used by that formulation only."""
+    """Baumgarte feedback on constraint position, 1/s; used by that formulation, and by ideal loops of linkages."""
+    interpolation: Literal["smooth", "linear"] = "smooth"
+    """Between the rows of tables against the crank angle: a monotone cubic, or straight lines."""
     method: Literal["auto", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"] = "auto"
     """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
     "radau" always, "auto" as "switching" in scenes with steep friction ramps or strong damping, in others "lobatto" for

@@ -53,8 +53,9 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     start = mechanism.body(mechanism.period.body).start_angle
     angle = cycle * times / period
     gravity = scene.effects.gravity
+    turns, interpolation = turns_of(tables), scene.numerics.interpolation
     turned = {
-        name: curve_at(curve, (start + angle) / turns_of(tables), turns_of(tables))
+        name: curve_at(curve, (start + angle) / turns, turns, interpolation)
         for name, curve in curves_of(tables).items()
     }
     found = prescribed_motion(mechanism, times, gravity, turned)
