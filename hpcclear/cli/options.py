@@ -1,0 +1,138 @@
+"""Options that several commands share, and what all of them do with their words."""
+
+import contextlib
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.launcher import launched_rank
+from hpcclear.ranks.stopping import StopSwitch
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.team import Ranks
+    from hpcclear.scene import Scene
+
+FILE = click.argument("file", type=click.Path(path_type=Path))
+SET = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY.PATH=VALUE",
+    help="Override an entry of the file; repeatable.",
+)
+
+
+def output_option(words: str) -> Callable[[Any], Any]:
+    """The option that names where results go."""
+    return click.option(
+        "-o", "--output", type=click.Path(path_type=Path), required=True, help=words
+    )
+
+
+FRESH = click.option(
+    "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
+)
+LIMIT = click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="Stop early, resumable, after this time.",
+)
+INTERVAL = click.option(
+    "--checkpoint-interval",
+    "interval",
+    type=click.FloatRange(min=0.0),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Save finished samples this often: what a crash costs at most.",
+)
+POINTS = click.option(
+    "--points",
+    type=click.Path(path_type=Path),
+    help="CSV table of designs instead of the study's sampling.",
+)
+PROGRESS = click.option(
+    "--progress",
+    type=click.Choice(["auto", "bar", "log", "quiet"]),
+    default="auto",
+    show_default=True,
+    help="How progress is shown.",
+)
+
+
+@dataclass(frozen=True)
+class How:
+    """How a run is carried out: four options of a command, one argument of its function."""
+
+    fresh: bool
+    time_limit: float | None
+    interval: float
+    progress: Any
+
+
+def with_how(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the four options of `How`, as its argument `how`."""
+
+    @FRESH
+    @LIMIT
+    @INTERVAL
+    @PROGRESS
+    @functools.wraps(command)
+    def gathered(**values: Any) -> int:
+        how = How(**{field.name: values.pop(field.name) for field in fields(How)})
+        return command(how=how, **values)
+
+    return gathered
+
+
+def scene_of(file: Path, overrides: tuple[str, ...], warn: bool = True) -> "Scene":
+    """The scene; what looks like a slip of units is said, unless the caller says it."""
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.plausibility import implausible
+
+    scene = load_scene(file, overrides)
+    for text in implausible(scene) if warn else ():
+        say(f"Warning: {text}")
+    return scene
+
+
+def place_of(output: Path) -> Path:
+    """The place for results, made if it lies below here or beside what is there; else a slip of the pen is likelier."""
+    parent = output.parent
+    if not output.is_absolute() or parent.parent.is_dir():
+        with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
+            parent.mkdir(parents=True, exist_ok=True)
+    return output
+
+
+def check_free(path: Path) -> None:
+    """Raise InputError if something is there: what a user wrote is not written over."""
+    if path.exists():
+        raise InputError("file", str(path), "is there already", "Choose another name")
+
+
+def is_root() -> bool:
+    """Whether this process is the first of its launcher, or has none."""
+    return launched_rank() in (0, None)
+
+
+def on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
+    """Run a command that uses every rank."""
+    from hpcclear.ranks.boundary import run_on_ranks
+
+    stop: StopSwitch = click.get_current_context().obj
+    if time_limit is not None:
+        stop.limit_time(time_limit)
+    return run_on_ranks(program, stop)
+
+
+def say(text: str) -> None:
+    """An error message, from root only."""
+    if is_root():
+        click.echo(text, err=True)

@@ -1,0 +1,130 @@
+"""Commands about one scene, of one process: `init`, `check`, `simulate`, `schema`; and `report`, of what is there."""
+
+import time
+from pathlib import Path
+
+import click
+
+from hpcclear.cli.options import FILE, SET, check_free, is_root, output_option, place_of, scene_of
+from hpcclear.ranks.stopping import Exit
+
+
+@click.command(short_help="Write a starter scene.")
+@click.argument("file", type=click.Path(path_type=Path))
+def init(file: Path) -> int:
+    """Write an engine to start from: every table, each number with its unit, and a small study.
+
+    An existing file is never overwritten.
+
+    Example: hpcclear init engine.toml
+    """
+    if not is_root():
+        return Exit.DONE
+    from importlib import resources
+
+    from hpcclear.results import files
+
+    check_free(file)
+    files.probe(place_of(file))
+    text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
+    files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
+    click.echo(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
+    return Exit.DONE
+
+
+@click.command(short_help="Say what a file would simulate, at what cost.")
+@FILE
+@SET
+@click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
+@click.option(
+    "--sketch",
+    type=click.Path(path_type=Path),
+    metavar="FIGURE",
+    help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
+)
+def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | None) -> int:
+    """Validate a scene or study and say what would be simulated.
+
+    Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
+    """
+    if not is_root():
+        return Exit.DONE
+    from hpcclear.cli.printing import describe_scene
+
+    scene = scene_of(file, overrides, warn=False)
+    describe_scene(scene, cost)
+    if sketch is not None:
+        from hpcclear.report import save, sketch_figure
+
+        poses = None
+        if scene.is_planar:
+            from hpcclear.dynamics.planar.problem import poses_at_start
+
+            poses = poses_at_start(scene)
+        click.echo(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
+    return Exit.DONE
+
+
+@click.command(short_help="Simulate one response.")
+@FILE
+@SET
+@output_option("NetCDF file to write.")
+def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
+    """Simulate one response: time series, forces, energies, objective.
+
+    Exit code 1 if the simulation did not reach its end, 4 if f is not known to numerics.target_error; what there is
+    of it is written.
+
+    Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
+    """
+    if not is_root():
+        return Exit.DONE
+    from hpcclear.base.outcome import Flag, Status
+    from hpcclear.cli.printing import describe_response
+    from hpcclear.dynamics.response import simulate as simulate_scene
+    from hpcclear.dynamics.steady.telling import why_missed
+    from hpcclear.results import dataset, files, netcdf
+
+    scene = scene_of(file, overrides)
+    files.probe(place_of(output), netcdf.SEAL)
+    began = time.perf_counter()
+    response = simulate_scene(scene)
+    dataset.write(response, output)
+    describe_response(response, output, time.perf_counter() - began)
+    status = Status(int(response["status"]))
+    if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
+        click.echo(f"Target missed: {why_missed(response, scene.numerics.target_error)}", err=True)
+        return Exit.TARGET_MISSED
+    if status.valid:
+        return Exit.DONE
+    click.echo(f"Error: {status.name.lower()}: {status.message}. {status.remedy}", err=True)
+    return Exit.FAILED
+
+
+@click.command(short_help="Write figures and an HTML page.")
+@click.argument("directory", type=click.Path(path_type=Path))
+def report(directory: Path) -> int:
+    """Write figures and a self-contained HTML page about a directory of results.
+
+    Example: hpcclear report results/quickstart
+    """
+    if not is_root():
+        return Exit.DONE
+    from hpcclear.report.html.page import write_report
+
+    click.echo(f"report  {write_report(directory)}")
+    return Exit.DONE
+
+
+@click.command()
+def schema() -> int:
+    """Print the JSON schema of scene files, for editors.
+
+    Example: hpcclear schema > hpcclear.schema.json
+    """
+    import json
+
+    from hpcclear.scene import scene_schema
+
+    click.echo(json.dumps(scene_schema(), indent=2))
+    return Exit.DONE

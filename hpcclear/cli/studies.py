@@ -1,0 +1,132 @@
+"""Commands about a whole study: `run`, what its accuracy costs (`accuracy`), what it will take (`plan`)."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcclear.cli.options import (
+    FILE,
+    FRESH,
+    LIMIT,
+    PROGRESS,
+    SET,
+    on_ranks,
+    output_option,
+    place_of,
+    scene_of,
+)
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.team import Ranks
+
+
+@click.command(short_help="Carry a whole study.")
+@FILE
+@SET
+@output_option("Directory for the results.")
+@FRESH
+@LIMIT
+@PROGRESS
+def run(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    fresh: bool,
+    time_limit: float | None,
+    progress: Any,
+) -> int:
+    """Carry a whole study: sensitivity, surrogates, robust optimisation, verified designs.
+
+    Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_study
+        from hpcclear.study import run_study
+
+        place = run_study(
+            scene_of(file, overrides),
+            place_of(output),
+            ranks,
+            fresh=fresh,
+            progress_style=progress,
+            tell=lambda text: click.echo(text, err=True),
+        )
+        describe_study(place)
+
+    return on_ranks(program, time_limit)
+
+
+@click.command(short_help="Show what accuracy costs in time.")
+@FILE
+@SET
+@output_option("Directory for accuracy.nc and the figures.")
+@click.option(
+    "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
+)
+@FRESH
+@LIMIT
+def accuracy(
+    file: Path,
+    overrides: tuple[str, ...],
+    output: Path,
+    quick: bool,
+    fresh: bool,
+    time_limit: float | None,
+) -> int:
+    """Show what accuracy costs in time: tolerance and revolutions, integration, averaging, surrogates, Monte Carlo, ranks.
+
+    Each figure is written when its panel is done, and what is done is kept: the same command goes on from there.
+
+    Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.accuracy.profile import PROFILES
+        from hpcclear.accuracy.run import run_accuracy
+        from hpcclear.cli.accuracy import describe
+        from hpcclear.ensemble.session import Options
+
+        def tell(text: str) -> None:
+            click.echo(f"accuracy: {text}", err=True)
+
+        profile = PROFILES["quick" if quick else "full"]
+        scene, place = scene_of(file, overrides), place_of(output)
+        describe(*run_accuracy(scene, place, ranks, profile, tell, Options(fresh=fresh)))
+
+    return on_ranks(program, time_limit)
+
+
+@click.command(short_help="Say what a run will cost.")
+@FILE
+@SET
+@click.option(
+    "--error",
+    type=click.FloatRange(0.0, 0.5, min_open=True),
+    metavar="RELATIVE",
+    help="Error of the objective to plan for; by default the settings of the file.",
+)
+@click.option(
+    "--ranks",
+    "workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Ranks to plan for; by default those it runs on.",
+)
+def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: int | None) -> int:
+    """Measure some samples and say what a run costs: settings, core-hours, ranks, wall time.
+
+    Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.accuracy.plan import ladder, measure
+        from hpcclear.cli.plan import describe
+
+        planned = ranks.size if workers is None else workers
+        scene = scene_of(file, overrides)
+        made = measure(scene, ranks, ladder(scene, error), planned)
+        describe(made, str(file), error, planned)
+
+    return on_ranks(program)
