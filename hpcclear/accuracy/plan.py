@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
-from hpcclear.base.arrays import Records
+from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
@@ -21,7 +21,7 @@ from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.team import COLUMNS, Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.study import extent, lives
+from hpcclear.study import budget, extent, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -56,16 +56,26 @@ class Row:
         Core-seconds of one sample.
     reached : str
         Limits that the samples tried came to; empty where the file names no target error.
+    simulations : int or None
+        Of the whole study, if they go by the row; None: those of the plan.
+    label : str
+        What is asked, in words; empty: the error.
     """
 
     error: float | None
     scene: Scene
     seconds: float
     reached: str
+    simulations: int | None = None
+    label: str = ""
 
     def settings(self) -> str:
         """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
         n = self.scene.numerics
+        if self.simulations is not None and self.scene.study is not None:
+            verified = self.scene.study.verification
+            shares = _percent(verified.accuracy.mean, verified.accuracy.deviation)
+            return f"rtol {n.rtol:.0e} + {shares}"
         if self.reached:
             return ", ".join(self.reached.split(", ")[:2])
         return f"rtol {n.rtol:.1e}, {n.transient_revolutions}+{n.averaged_revolutions} rev"
@@ -101,6 +111,12 @@ class Plan:
     columns: int
     responses: int = 0
 
+    def simulations(self, row: Row) -> int:
+        """Of the command that is planned, at a row."""
+        if row.simulations is not None:
+            return row.simulations
+        return self.samples if self.study is None else self.study
+
     def core_seconds(self, row: Row, simulations: int, ranks: int) -> float:
         """Core-seconds of a job, start-up on every rank included."""
         return simulations * row.seconds + ranks * self.startup
@@ -127,7 +143,7 @@ def measure(
         With a study.
     ranks : Ranks
     errors : tuple of float
-        Target errors of the ladder.
+        Target errors of the ladder; a study that asks for an accuracy has a ladder of its own.
     workers : int
         Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
         clock are slower together.
@@ -144,8 +160,10 @@ def measure(
     points = design(few, None)
     assert study is not None  # refused by `design`
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
-    rows = []
+    rows: list[Row] = []
     with _company(scene, points, workers if ranks.size == 1 else 1):
+        if study.accuracy is not None:
+            rows, wanted = splits(scene, points, ranks), []
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
             seconds, records = cost(one, points, ranks, limit, str(k))
@@ -153,8 +171,45 @@ def measure(
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     startup = process_age_at_start()
     whole = sum(extent.samples_of(scene).values()) if study.cases else None
+    whole = next((row.simulations for row in rows if row.error is None and row.simulations), whole)
     alone = extent.responses_of(scene) if study.cases else 0
     return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
+
+
+FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
+"""Accuracies of the ladder of a study that asks for one, over that."""
+
+
+def splits(scene: Scene, points: Points, ranks: Ranks) -> list[Row]:
+    """The ladder of a study of which an accuracy is asked: how each would be shared out, its pilot among its simulations."""
+    known: dict[tuple[float, bytes], tuple[Array, float]] = {}
+
+    def simulate(label: str, one: Scene, few: Points) -> tuple[Array, float]:
+        key = one.numerics.rtol, few.values.tobytes()  # pilots share what they begin with
+        if key not in known:
+            known[key] = budget.simulated(ranks, one, few)
+        return known[key]
+
+    wanted, rows = budget.asked(scene), []
+    for k, factor in enumerate(FACTORS):
+        mean, deviation = np.minimum(factor * wanted, 0.99).tolist()
+        asked = {"study.accuracy.mean": mean, "study.accuracy.deviation": deviation}
+        one = scene if factor == 1.0 else scene.with_(asked)
+        made = budget.spread(one, simulate)
+        split = made.split
+        final = budget.settled(one, split)
+        pilot = made.pilot / made.found.evaluations[split.rung]
+        count = sum(extent.samples_of(final, round(split.points)).values()) + round(pilot)
+        seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}")
+        label = _percent(mean, deviation) + ("" if split.sure else " ?")
+        rows.append(Row(None if factor == 1.0 else factor, final, seconds, "", count, label))
+    return rows
+
+
+def _percent(mean: float, deviation: float) -> str:
+    """Of mean and deviation, once if they are the same."""
+    texts = dict.fromkeys(f"{100 * one:.2g} %" for one in (mean, deviation))
+    return ", ".join(texts)
 
 
 def cost(
@@ -217,7 +272,8 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
 
 
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
-    """Errors to measure: `TARGETS`, and the one asked for; none where lives are followed, which have copies of their own.
+    """Errors to measure: `TARGETS`, and the one asked for; none where an accuracy is asked of a whole study, or where lives are
+    followed, which have copies of their own.
 
     Raises
     ------
@@ -225,6 +281,13 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
         Lives cannot be followed, or an error was asked for that these have no use for.
     """
     lives.check(scene)
+    if scene.study is not None and scene.study.accuracy is not None:
+        if error is not None:
+            raise InputError(
+                "--error", error, "the study asks for an accuracy of its own, which decides the tolerance",
+                "Leave it out, and set study.accuracy",
+            )  # fmt: skip
+        return ()
     if scene.study is not None and scene.study.worn:
         if error is not None:
             raise InputError(

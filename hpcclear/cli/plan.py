@@ -16,26 +16,34 @@ RESERVE = 1.5
 def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
     out = console()
-    simulations = plan.samples if plan.study is None else plan.study
+    row = next((row for row in plan.rows if row.error == error), plan.rows[0])
+    simulations = plan.simulations(row)
+    split = row.simulations is not None
     command = "sample" if plan.study is None else "run"
     made = Table(
         title=f"{command}: {simulations} simulations on {ranks} ranks", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
-    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+    first = "accuracy" if split else "error"
+    extra = "simulations" if split else "core-h"
+    for name in (first, "settings", "ms/sample", "core-s", extra, "wall time"):
         made.add_column(name, no_wrap=True, justify="right" if name != "settings" else "left")
-    for row in plan.rows:
-        total = plan.core_seconds(row, simulations, ranks)
+    for one in plan.rows:
+        count = plan.simulations(one)
+        total = plan.core_seconds(one, count, ranks)
         made.add_row(
-            "file" if row.error is None else f"{row.error:.0e}",
-            row.settings(),
-            f"{1e3 * row.seconds:.3g}",
+            one.label or ("file" if one.error is None else f"{one.error:.0e}"),
+            one.settings(),
+            f"{1e3 * one.seconds:.3g}",
             f"{total:.4g}",
-            f"{total / 3600:.2g}",
-            duration(plan.wall_seconds(row, simulations, ranks)),
+            f"{count}" if split else f"{total / 3600:.2g}",
+            duration(plan.wall_seconds(one, count, ranks)),
         )
     out.print(made)
-    row = next((row for row in plan.rows if row.error == error), plan.rows[0])
+    if split:
+        doubtful = any("?" in one.label for one in plan.rows)
+        text = "accuracy of mean and deviation: tolerance + what is left to the samples"
+        out.print(text + ("; ?: cannot be promised" if doubtful else "") + "\n")
     out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row, simulations, ranks):

@@ -78,6 +78,7 @@ FURTHER: dict[str, dict[str, object]] = {
     },
     "judged": {"flag_values": _NO_YES, "flag_meanings": "told judged"},
     "recommended": {"flag_values": _NO_YES, "flag_meanings": "not_recommended recommended"},
+    "chosen": {"flag_values": _NO_YES, "flag_meanings": "not_chosen chosen"},
     "dominated": {"flag_values": _NO_YES, "flag_meanings": "not_surely dominated"},
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -114,6 +115,7 @@ KINDS = {
     ),
     "front": _kind("Fronts of mean and deviation", columns.FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", columns.VERIFICATION, ("design",)),
+    "budget": _kind("An accuracy shared out over a study", columns.BUDGET),
     "chaos": _kind("How much of the scatter of designs is chaos", columns.CHAOS),
     "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),

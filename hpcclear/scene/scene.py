@@ -7,7 +7,7 @@ import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene import citation, describing, domain
+from hpcclear.scene import budget, citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.paths import PHYSICAL, replace
 from hpcclear.scene.tables import SceneTables, plain
@@ -27,6 +27,7 @@ class Scene(SceneTables):
         if self.study is None:
             return self
         self._check_worn_inputs()
+        budget.check(self.study, self.numerics)
         numbers = self._numbers()
         for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
             for row in rows:

@@ -56,7 +56,9 @@ def scene_schema() -> dict[str, Any]:
         kept = {word: entry[word] for word in ("description", "default") if word in entry}
         effects[key] = {"anyOf": [*choices, {"const": "none"}], **kept}
     case = {"anyOf": [{"$ref": "#/$defs/Case"}, definitions["Case"]["properties"]["random"]]}
-    definitions["Study"]["properties"]["cases"]["additionalProperties"] = case
+    study = definitions["Study"]["properties"]
+    study["accuracy"]["anyOf"] = [*_NUMBER["anyOf"], *study["accuracy"]["anyOf"]]
+    study["cases"]["additionalProperties"] = case
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **schema,

@@ -4,9 +4,11 @@ Sizes and weights default to the values of the paper this program began with whe
 them; names never decide a default, only what a variable drives does.
 """
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from hpcclear.scene.fields import Count, Quantity, Table, invalid
 
@@ -129,6 +131,30 @@ class MomentAccuracy(Table):
     """Of the probability of exceeding a limit, where a case asks for it: absolute; default 0.01."""
 
 
+MOMENTS = ("mean", "deviation")
+
+
+def of_both(entry: Any) -> Any:
+    """A number as the accuracy of mean and deviation; of a table with one of the two, the other is the same.
+
+    Raises
+    ------
+    PydanticCustomError
+        It is no number between 0 and 1.
+    """
+    if entry is None:
+        return None
+    if not isinstance(entry, Mapping):
+        try:
+            return dict.fromkeys(MOMENTS, Quantity("", above=0, below=1).convert(entry))
+        except PydanticCustomError as error:
+            context = error.context or {}
+            remedy = 'Write 0.005 or "0.5 %", say, or { mean = 0.002, deviation = 0.005 }'
+            raise invalid(context["reason"], remedy, "accuracy", entry) from None
+    given = [entry[name] for name in MOMENTS if name in entry]
+    return dict.fromkeys(MOMENTS, given[0]) | dict(entry) if len(given) == 1 else entry
+
+
 SCRAMBLINGS = 16
 """Independent scramblings of the Sobol sequence, each as many simulations: enough to know their spread,
 few enough to be long."""
@@ -141,7 +167,9 @@ class Verification(Table):
     """What is simulated of a design: "qmc", 16 scramblings of a Sobol sequence over the random inputs, as long as `accuracy`
     asks for; or "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
     accuracy: MomentAccuracy = MomentAccuracy()
-    """Half-widths of the limits that "qmc" goes on for, from 512 simulations a design, doubled until they are met."""
+    """Half-widths of the limits that "qmc" goes on for, from `least_samples` a design, doubled until they are met."""
+    least_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] | None = None
+    """Simulations of a design from which its accuracy is judged, for "qmc"; default 512, as far as it may have so many."""
     most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
     """Simulations of a design at most, for "qmc"."""
     samples: Annotated[int, Count(2, 10**9)] | None = None

@@ -14,11 +14,13 @@ from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.formula import names_in
 from hpcclear.scene.stages import (
     CertificateOfEffects,
+    MomentAccuracy,
     Names,
     Sensitivity,
     Surrogate,
     Swarm,
     Verification,
+    of_both,
 )
 from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
 
@@ -49,6 +51,10 @@ class Study(Table):
         "peak-point-acceleration",
     ] = "mean-gap"
     """What the study makes small: eq. 13, or another response."""
+    accuracy: MomentAccuracy | None = None
+    """Of mean and deviation of verified designs, all errors together, at `verification.confidence`: a number for both, or a
+    table. It is spread over tolerance and samples by what a pilot measures, and decides `numerics.rtol`, and
+    `verification.accuracy`, `least_samples` and `infill_samples`. Left out, these stand for themselves."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
@@ -68,6 +74,8 @@ class Study(Table):
         if not isinstance(data, Mapping):
             return data
         data = dict(data)
+        if "accuracy" in data:
+            data["accuracy"] = of_both(data["accuracy"])
         cases, variables, random = data.get("cases"), data.get("variables"), data.get("random")
         if isinstance(cases, Mapping):
             asked = data.get("objective", "mean-gap")

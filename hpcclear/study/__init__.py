@@ -1,6 +1,7 @@
 """The study, from a scene to verified designs: read this after the README.
 
 0. Lives, where a clearance is random as wear leaves it: they are followed, and what their joints come to is the distribution.
+0. Where an accuracy is asked of the whole study: how it is shared out over tolerance and samples.
 0. On request the certificate of effects: what the scene could do without.
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
@@ -35,6 +36,7 @@ from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study import (
+    budget,
     certificate,
     chaos,
     lives,
@@ -130,8 +132,12 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     return run.times
 
 
-def _tell_the_story(run: StudyRun, written: Scene) -> None:
+def _tell_the_story(given: StudyRun, written: Scene) -> None:
     """All stages after the lives; `written` is the scene as it was, without what these told."""
+    run, shared = given, None
+    if given.study.accuracy is not None:
+        shared = budget.share_out(given)
+        run = given.of(budget.settled(given.scene, shared.split))
     sensitivity: Result | None = None
     if run.study.certificate is not None:
         certificate.certify(run)
@@ -160,13 +166,17 @@ def _tell_the_story(run: StudyRun, written: Scene) -> None:
     over_life: Result = {}
     if written.required_study.worn:
         over_life = run.stage("lives", lives.of_designs, written, table.choices)
-    verification.write(run, table, true, model, remarks, printed, over_life)
+    within = None if shared is None else budget.within(shared, true)
+    verification.write(run, table, true, model, remarks, printed, over_life, within)
+    if shared is not None:
+        names = [choice.name for choice in table.choices]
+        budget.reached(run, given.scene, shared, true, names)
 
     scatter = run.stage("chaos", chaos.simulate, designs)
     chaos.write(run, table.choices, {name: one[table.rows] for name, one in scatter.items()})
 
-    series = run.stage("responses", responses.simulate_all, table.choices)
-    responses.write(run, table.choices)
+    series = given.stage("responses", responses.simulate_all, table.choices)
+    responses.write(given, table.choices)
     paper.write_findings(run, sensitivity, kriging, series)
 
 
@@ -194,4 +204,5 @@ def _results(scene: Scene) -> list[str]:
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
     names += ["sensitivity.nc"] if scene.required_study.groups else []
     names += ["effects.nc"] if scene.required_study.certificate is not None else []
+    names += ["budget.nc"] if scene.required_study.accuracy is not None else []
     return names + paper.files(scene)

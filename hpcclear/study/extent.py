@@ -17,18 +17,18 @@ from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
 
-def samples_of(scene: Scene) -> dict[str, int]:
+def samples_of(scene: Scene, verified: int | None = None) -> dict[str, int]:
     """Samples on the ranks by stage, if no surface or model is refused.
 
     The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
-    accuracy verified designs are taken to need what the paper's did.
+    accuracy verified designs are taken to need what the paper's did, unless `verified` says what each will take.
 
     Raises
     ------
     InputError
         If the scene has no study.
     """
-    found = _of_stages(scene)
+    found = _of_stages(scene, verified)
     asked = scene.required_study.certificate
     if asked is not None:
         most = certificate_samples(scene) if asked.samples is None else asked.samples
@@ -36,12 +36,12 @@ def samples_of(scene: Scene) -> dict[str, int]:
     return found
 
 
-def _of_stages(scene: Scene) -> dict[str, int]:
+def _of_stages(scene: Scene, each: int | None = None) -> dict[str, int]:
     """The same of all stages but the certificate, whose size goes by theirs."""
     study = scene.required_study
     extremes, spread = optimisation.chosen_in_all(study)
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
-    count = truth.expected(study.verification)
+    count = truth.expected(study.verification) if each is None else each
     if study.verification.infill_rounds:
         verified += refinement.RUNNERS_UP * len(study.cases)
     begun, rounds = refinement.simulations(study)

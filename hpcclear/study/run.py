@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +61,12 @@ class StudyRun:
         return {one.name: one.words for one in variables} | {
             f"{one.name}_ratio": one.ratio_words for one in variables if one.ratio is not None
         }
+
+    def of(self, scene: Scene) -> "StudyRun":
+        """The same run of a scene whose settings are other ones; what follows is numbered on."""
+        simulations = Simulations(scene, self.ranks, self.checkpoint, self.simulations.style)
+        simulations.next = self.simulations.next
+        return replace(self, scene=scene, simulations=simulations)
 
     def rng(self, *labels: str) -> np.random.Generator:
         """A stream of random numbers for one purpose."""

@@ -73,7 +73,8 @@ def simulate(
 
 def first_length(settings: Verification) -> int:
     """Points of each scrambling from which accuracy is judged: a power of two."""
-    return 2 ** int(np.log2(min(FIRST, settings.most_samples) // SCRAMBLINGS))
+    least = FIRST if settings.least_samples is None else settings.least_samples
+    return 2 ** int(np.log2(min(least, settings.most_samples) // SCRAMBLINGS))
 
 
 def expected(settings: Verification) -> int:

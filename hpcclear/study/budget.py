@@ -1,0 +1,285 @@
+"""One accuracy for a whole study: a pilot measures what errors cost, and the cheapest way to share it out is taken.
+
+Asked is how far mean and deviation of verified designs may be off, all errors together. Two make them up: the tolerance of the
+integration moves each sample, and a number of samples is not all of them. The surrogate has no share, since every number
+that is told of a verified design is simulated; it only says where to look, until rounds of further designs win less than
+the accuracy. Cost is counted in evaluations of the equations of motion, never in seconds, so that the split is the same
+whatever the machine was doing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Status
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.statistics.random.allocation import Evidence, Split, cheapest
+from hpcclear.study import extent, truth
+from hpcclear.study.pilot import LADDER, Pilot, Simulate
+from hpcclear.study.run import Result, StudyRun
+
+TIGHTEST = 1e-10
+"""Where the ladder ends, if it has to go on."""
+
+MOST_PAIRS = 64
+"""Points of each scrambling that pairs are made of at most."""
+
+PILOT = 0.1
+"""Share of the study's cost that doubled pairs may take."""
+
+LEAST = 128
+"""Simulations of a verified design from which on its limits are believed."""
+
+SEARCHED = 8
+"""Verified designs get so many times the simulations of those that are searched: these meet the same scatter, and their
+differences are known better than they are."""
+
+MOMENTS = ("mean", "deviation")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """An accuracy shared out.
+
+    Attributes
+    ----------
+    split : Split
+    found : Evidence
+    labels : list of str
+        Of the pilot's designs.
+    pilot : float
+        Evaluations of the equations of motion that it took.
+    """
+
+    split: Split
+    found: Evidence
+    labels: list[str]
+    pilot: float
+
+
+def settled(scene: Scene, split: Split) -> Scene:
+    """The scene with what a split decides in the place of the accuracy."""
+    study = scene.required_study
+    assert study.accuracy is not None
+    wanted = study.accuracy.model_dump(exclude_none=True)
+    wanted |= dict(zip(MOMENTS, split.samples.tolist(), strict=True))
+    most = study.verification.most_samples
+    first = 2 ** int(np.log2(split.points / 2.0))
+    searched = 2 ** int(np.log2(split.points / SEARCHED))
+    return scene.with_(
+        {
+            "study.accuracy": None,
+            "numerics.rtol": split.rtol,
+            "study.verification.accuracy": wanted,
+            "study.verification.least_samples": min(max(first, LEAST), truth.FIRST, most),
+            "study.verification.infill_samples": min(max(searched, 4 * SCRAMBLINGS), most),
+        }
+    )
+
+
+def asked(scene: Scene) -> Array:
+    """Mean and deviation, relative, shape (2,)."""
+    wanted = scene.required_study.accuracy
+    assert wanted is not None
+    return np.array([wanted.mean, wanted.deviation])
+
+
+def priced(scene: Scene, found: Evidence, *, doubtful: bool = True) -> Split | None:
+    """The cheapest split of the scene's accuracy by what is known so far."""
+    verification = scene.required_study.verification
+    limits = LEAST, max(verification.most_samples, LEAST)
+
+    def simulations(points: float) -> float:
+        way = Split(0, 1e-6, np.zeros(2), asked(scene), points, 0.0, True)
+        return float(sum(extent.samples_of(settled(scene, way), round(points)).values()))
+
+    return cheapest(found, asked(scene), simulations, limits, doubtful=doubtful)
+
+
+def spread(scene: Scene, simulate: Simulate) -> Budget:
+    """Measure until a split is sure, or a surer one would cost more than it saves.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `study.accuracy`.
+    simulate : callable
+
+    Raises
+    ------
+    InputError
+        All simulations of the pilot fail.
+    """
+    pilot = Pilot(scene, simulate)
+    while True:
+        found = pilot.evidence()
+        split, known = decided(scene, found), priced(scene, found, doubtful=False)
+        share = PILOT * split.evaluations
+        if known is None and _goes_on(pilot, share):
+            pilot.tighter()
+            continue
+        saved = split.evaluations - known.evaluations if known is not None and split.sure else share
+        few = known is not None and pilot.length < MOST_PAIRS
+        if few and pilot.price_of_doubling() <= min(saved / 2.0, share):
+            pilot.longer()
+            continue
+        return Budget(split, found, pilot.labels, pilot.spent)
+
+
+def _goes_on(pilot: Pilot, share: float) -> bool:
+    """Whether a tighter tolerance is tried: one always, more as long as they take a small share of the study."""
+    last = pilot.rungs[-1]
+    return last == LADDER[-1] or (last > 1.001 * TIGHTEST and pilot.price_of_tightening() <= share)
+
+
+def decided(scene: Scene, found: Evidence) -> Split:
+    """The cheapest split that is sure; where chaos hides what tolerances do, that of the file or a tighter one if that is
+    known to be needed; where none is good enough the tightest."""
+    sure = priced(scene, found)
+    if sure is not None:
+        return sure
+    known = priced(scene, found, doubtful=False)
+    if known is None:
+        return _at(scene, found, len(found.rtol) - 2)
+    rung = int(np.abs(np.log(found.rtol[:-1] / scene.numerics.rtol)).argmin())
+    return _at(scene, found, max(rung, known.rung))
+
+
+def _at(scene: Scene, found: Evidence, rung: int) -> Split:
+    """The split at a tolerance that is not sure to be good enough: samples for all that its known bias leaves."""
+    share, wanted = found.tolerance_shares(False)[rung], asked(scene)
+    room = np.nan_to_num(share) < wanted
+    samples = np.sqrt(wanted**2 - np.where(room, share, 0.0) ** 2)
+    verification = scene.required_study.verification
+    points = found.points_for(samples, LEAST, max(verification.most_samples, LEAST))
+    way = Split(rung, float(found.rtol[rung]), share, samples, points, 0.0, False)
+    count = sum(extent.samples_of(settled(scene, way), round(points)).values())
+    return Split(rung, way.rtol, share, samples, points, count * found.evaluations[rung], False)
+
+
+# ---- as a stage of a study -------------------------------------------------------------------------
+
+
+def share_out(run: StudyRun) -> Budget:
+    """The stage: the pilot, each part of it kept by itself; budget.nc, and the split in words."""
+
+    def simulate(label: str, scene: Scene, points: Points) -> tuple[Array, float]:
+        kept = run.part(label, _simulated, scene, points)
+        return kept["objective"], float(kept["evaluations"])
+
+    run.announce("budget")
+    with run.ranks.stage("budget"):
+        made = spread(run.scene, simulate)
+    for text in told(run.scene, made):
+        run.tell(text)
+    write(run, made, np.full(2, np.nan))
+    return made
+
+
+def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:
+    values, evaluations = simulated(run.ranks, scene, points)
+    return {"objective": values, "evaluations": np.asarray(evaluations)}
+
+
+def simulated(ranks: Ranks, scene: Scene, points: Points) -> tuple[Array, float]:
+    """Objectives of points on all ranks, (n,), NaN where failed, and evaluations of the equations of motion a simulation."""
+    records = sample_points(scene, points, ranks, stage="budget: simulations")
+    values = np.where(records["status"] == Status.OK, records["objective"], np.nan)
+    return values, float(records["rhs_evaluations"].mean())
+
+
+def told(scene: Scene, made: Budget) -> list[str]:
+    """The split in words, and what is not sure about it."""
+    study, split = scene.required_study, made.split
+    final = settled(scene, split).required_study
+    count = extent.samples_of(settled(scene, split), round(split.points))
+    level = f"{study.verification.confidence:.0%}"
+    texts = [
+        f"Accuracy asked at {level}: {_shares(asked(scene))}.",
+        f"Split: rtol {split.rtol:.0e}, which takes {_shares(split.tolerance)}; samples {_shares(split.samples)}, "
+        f"about {split.points:.0f} simulations of a verified design and {final.verification.infill_samples} of one that is "
+        f"searched; the surrogate nothing, its {study.samples} points only say where to look.",
+        f"That is {sum(count.values())} simulations, {split.evaluations:.2g} evaluations of the equations of motion; "
+        f"the pilot took {made.pilot / (made.pilot + split.evaluations):.0%} of it.",
+    ]
+    if not split.sure:
+        shares = made.found.tolerance_shares(True)[split.rung]
+        texts.append(
+            "The accuracy cannot be promised: what this tolerance takes is known to no better than "
+            f"{_shares(shares)} - chaos hides it, or the accuracy is too small."
+        )
+    if split.points > 0.9 * study.verification.most_samples:
+        texts.append(
+            "study.verification.most_samples will end some designs before the accuracy is reached: raise it."
+        )
+    return texts
+
+
+def _shares(values: Array) -> str:
+    return f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the deviation"
+
+
+def within(made: Budget, true: Result) -> Array:
+    """What each verified design reached, (n, 2): half-widths of its limits with what the tolerance may add, relative."""
+    share = made.found.tolerance_shares(True)[made.split.rung]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in MOMENTS])
+    return np.hypot(reach, share)
+
+
+def reached(run: StudyRun, scene: Scene, made: Budget, true: Result, names: Sequence[str]) -> None:
+    """Tell what was reached of the accuracy in a scene, and write it; `true` and `names` are of the verified designs."""
+    found, wanted = within(made, true), asked(scene)
+    worst = np.nanmax(found, axis=0, initial=0.0)
+    missed = [
+        name for name, row in zip(names, found, strict=True) if not (row <= wanted * 1.0001).all()
+    ]
+    text = f"Reached at {run.study.verification.confidence:.0%}: {_shares(worst)}, at worst, of {_shares(wanted)}"
+    if missed:
+        text += f"; not by {len(missed)} of {len(names)} designs, {missed[0]} among them"
+        if made.split.sure:
+            text += ": study.verification.most_samples ended them"
+    run.tell(f"{text}.")
+    write(run, made, worst)
+
+
+def write(run: StudyRun, made: Budget, worst: Array) -> None:
+    """Write budget.nc: the split, what it stands on, and what was reached, (2,), NaN as long as it is not known."""
+    found, split = made.found, made.split
+    rungs = len(found.rtol)
+    nothing = np.full((1, 2), np.nan)
+    data = {
+        "rtol": found.rtol,
+        "evaluations": found.evaluations,
+        "bias": np.concatenate([found.bias, nothing]),
+        "bias_error": np.concatenate([found.doubt, nothing]),
+        "chosen": (np.arange(rungs) == split.rung).astype(np.int8),
+        "reach": found.reach,
+        "power": found.power,
+        "tolerance_share": split.tolerance,
+        "sampling_share": split.samples,
+        "reached": worst,
+    }
+    coords = {
+        "rung": np.arange(rungs),
+        "design": np.array(made.labels),
+        "moment": np.array(MOMENTS),
+    }
+    content = dataset.dataset("budget", coords, data, objective=run.scene.objective)
+    content.attrs |= {
+        "confidence": found.confidence,
+        "pairs": found.pairs,
+        "points": found.points,
+        "verified_points": split.points,
+        "pilot_evaluations": made.pilot,
+        "study_evaluations": split.evaluations,
+        "sure": "yes" if split.sure else "no",
+    }
+    run.write(content, "budget.nc")

@@ -1,0 +1,161 @@
+"""The pilot of a study of which an accuracy is asked: what its errors are, and what they cost.
+
+Some designs are simulated at several tolerances, the same points at each: pairs tell what a tolerance does to mean and
+deviation. More points at one of them tell how errors of samples fall.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import generator, monte_carlo, unit_lhs
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.statistics.random.allocation import Evidence, evidence
+
+LADDER = tuple(10.0**-k for k in range(3, 7))
+"""Tolerances of the pilot; the last one is what the others are measured against, and the ladder goes on if none is
+good enough."""
+
+DESIGNS = 5
+"""Designs of the pilot over all cases, the originals besides."""
+
+PAIRS = 4
+"""Points of each scrambling that pairs are made of at first."""
+
+POINTS, POINTS_RTOL = 16, 1e-4
+"""Points of each scrambling that tell how errors of samples fall, and at which tolerance."""
+
+Simulate = Callable[[str, Scene, Points], tuple[Array, float]]
+"""Objectives of points, NaN where failed, and evaluations of the equations of motion a simulation; by a label of its own."""
+
+
+class Pilot:
+    """Simulations of the pilot so far.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `study.accuracy`.
+    simulate : callable
+
+    Attributes
+    ----------
+    labels : list of str
+        Of its designs.
+    rungs : list of float
+        Tolerances, loosest first.
+    length : int
+        Points of each scrambling that pairs are made of.
+    spent : float
+        Evaluations of the equations of motion.
+
+    Raises
+    ------
+    InputError
+        All simulations at a tolerance fail.
+    """
+
+    def __init__(self, scene: Scene, simulate: Simulate) -> None:
+        self._scene, self._simulate = scene, simulate
+        self._designs = _designs(scene)
+        self.labels = [f"{case} {name}" for case, name, _ in self._designs]
+        self.spent, self._parts = 0.0, 0
+        self.rungs, self.length = list(LADDER), PAIRS
+        self._points, self._each = self._values(POINTS_RTOL, 0, POINTS)
+        first = [self._pairs_of(rtol, 0, PAIRS) for rtol in self.rungs]
+        self._pairs = [values for values, _ in first]
+        self._evaluations = [each for _, each in first]
+
+    def evidence(self) -> Evidence:
+        """What they tell."""
+        return evidence(
+            np.array(self.rungs), np.array(self._evaluations), np.stack(self._pairs), self._points,
+            self._scene.required_study.verification.confidence,
+        )  # fmt: skip
+
+    def tighter(self) -> None:
+        """A rung more."""
+        self.rungs.append(self.rungs[-1] / 10.0)
+        values, each = self._values(self.rungs[-1], 0, self.length)
+        self._pairs.append(values)
+        self._evaluations.append(each)
+
+    def longer(self) -> None:
+        """Twice the pairs at every tolerance."""
+        for k, rtol in enumerate(self.rungs):
+            more, each = self._pairs_of(rtol, self.length, self.length)
+            self._pairs[k] = np.concatenate([self._pairs[k], more], axis=2)
+            self._evaluations[k] = (self._evaluations[k] + each) / 2.0
+        self.length *= 2
+
+    def price_of_tightening(self) -> float:
+        """Evaluations that `tighter` takes, about: as much more than the last rung as that took more than the one before."""
+        grown = self._evaluations[-1] ** 2 / max(self._evaluations[-2], 1.0)
+        return len(self._designs) * SCRAMBLINGS * self.length * grown
+
+    def price_of_doubling(self) -> float:
+        """Evaluations that `longer` takes."""
+        return len(self._designs) * SCRAMBLINGS * self.length * float(np.sum(self._evaluations))
+
+    def _pairs_of(self, rtol: float, first: int, length: int) -> tuple[Array, float]:
+        """The same, from those that are there already as far as they go."""
+        if rtol == POINTS_RTOL and first + length <= POINTS:
+            return self._points[:, :, first : first + length], self._each
+        return self._values(rtol, first, length)
+
+    def _values(self, rtol: float, first: int, length: int) -> tuple[Array, float]:
+        """Objectives (designs, scramblings, length), and evaluations a simulation."""
+        scene = self._scene.with_({"study.accuracy": None, "numerics.rtol": rtol})
+        values, spent = [], 0.0
+        for case in dict.fromkeys(case for case, _, _ in self._designs):
+            own = [design for name, _, design in self._designs if name == case]
+            points = _points(scene, case, own, first, length)
+            self._parts += 1
+            found, each = self._simulate(f"budget-{self._parts}", scene, points)
+            values.append(found.reshape(len(own), SCRAMBLINGS, length))
+            spent += each * len(points)
+        made = np.concatenate(values)
+        if not np.isfinite(made).any():
+            raise InputError(
+                "study.accuracy", rtol, f"all {made.size} simulations of its pilot failed at this rtol",
+                "Run hpcclear simulate on the scene to see why",
+            )  # fmt: skip
+        self.spent += spent
+        return made, spent / made.size
+
+
+def _designs(scene: Scene) -> list[tuple[str, str, dict[str, float]]]:
+    """Case, name and design variables of the pilot's designs: the original and some of a Latin hypercube of each case."""
+    study = scene.required_study
+    each = -(-DESIGNS // len(study.cases))
+    found = []
+    for case in study.cases:
+        names = study.design_variables(case.name)
+        region = box(scene, names)
+        unit = unit_lhs(each, len(names), generator(study.seed, "budget", case.name))
+        rows = to_physical(scene, names, region.lower + unit * (region.upper - region.lower))
+        first = [scene.number(study.variable(name).paths[0]) for name in names]
+        found.append((case.name, "original", dict(zip(names, first, strict=True))))
+        for k, row in enumerate(rows.tolist()):
+            found.append((case.name, f"pilot {k + 1}", dict(zip(names, row, strict=True))))
+    return found
+
+
+def _points(
+    scene: Scene, case: str, designs: Sequence[dict[str, float]], first: int, length: int
+) -> Points:
+    """The points `first` and on of all scramblings of all designs, one after the other."""
+    made = [
+        monte_carlo(
+            scene, length, random=scene.required_study.case(case).random, design=design,
+            purpose="budget", first=first, scrambling=number,
+        )
+        for design in designs
+        for number in range(SCRAMBLINGS)
+    ]  # fmt: skip
+    return Points(made[0].names, np.concatenate([one.values for one in made]), made[0].paths)
