@@ -54,7 +54,7 @@ infill_designs = 4
 response_windows = 2
 response_copies = 2
 """
-BIAS = 20.0  # of f over rtol: 2 % at 1e-3, 0.2 % at 1e-4, 0.02 % at 1e-5
+BIAS = 15.0  # of f over rtol: 1.5 % at 1e-3, 0.15 % at 1e-4, 0.015 % at 1e-5
 
 
 def scene_of(*overrides: str):
@@ -86,8 +86,12 @@ def of(pairs, evaluations=None):
 
 def test_a_bias_is_found_and_the_error_of_independent_draws_falls_as_their_root():
     found = of(pilot_values((0.02, -0.003), length=64))
-    np.testing.assert_allclose(found.bias, [[0.02, 0.02], [0.003, 0.003]], rtol=0.05)
-    assert (found.doubt < 1e-3).all()
+    expected = [
+        [0.02 / 0.75] * 2,
+        [0.003 / 0.5] * 2,
+    ]  # against a tolerance that leaves a half in ten
+    np.testing.assert_allclose(found.bias, expected, rtol=0.05)
+    assert (found.doubt < 2e-3).all()
     np.testing.assert_allclose(found.power, 0.5, atol=0.12)
     expected = 2.13 * 0.1 / np.sqrt(1024)  # Student's t of 15
     np.testing.assert_allclose(found.reach[:, 0], expected, rtol=0.5)
@@ -96,7 +100,7 @@ def test_a_bias_is_found_and_the_error_of_independent_draws_falls_as_their_root(
 def test_what_chance_does_to_pairs_is_doubt_and_no_bias():
     known = np.array([of(pilot_values((0.0,), 0.5, seed=k)).bias[0] for k in range(40)])
     doubt = np.array([of(pilot_values((0.0,), 0.5, seed=k)).doubt[0] for k in range(40)])
-    apart = np.sqrt(2.0) * 0.5 * 0.1 / np.sqrt(16 * 16 * 6)  # mean of six designs
+    apart = np.sqrt(2.0) * 0.5 * 0.1 / np.sqrt(16 * 16 * 6) / 0.5  # mean of six designs
     np.testing.assert_allclose(doubt[:, 0].mean(), apart, rtol=0.1)
     single = apart * np.sqrt(6)
     assert np.sqrt((known[:, 0] ** 2).mean()) < single  # root mean square of b alone is `single`
@@ -106,7 +110,7 @@ def test_what_chance_does_to_pairs_is_doubt_and_no_bias():
 def test_failed_simulations_are_left_out_in_pairs():
     values = pilot_values((0.02,), length=64)
     values[0, :, 3, ::2], values[1, :, 5, 1::3] = np.nan, np.nan
-    np.testing.assert_allclose(of(values).bias, [[0.02, 0.02]], rtol=0.05)
+    np.testing.assert_allclose(of(values).bias, [[0.04, 0.04]], rtol=0.05)
 
 
 def test_values_without_scatter_need_no_simulations():
@@ -124,12 +128,12 @@ EVIDENCE = Evidence(
 
 @pytest.mark.parametrize("asked", [0.1, 0.06, 0.03, 0.015, 0.01, 0.005])
 def test_the_cheapest_split_is_that_of_brute_force(asked):
-    wanted, t = np.array([asked, asked]), 2.5706  # Student's, of six designs
+    wanted, z = np.array([asked, asked]), 1.95996
     found = cheapest(EVIDENCE, wanted, lambda points: 1000.0 + 10.0 * points, (64, 2**20))
     best = np.inf
     for rung in range(3):
-        room = 1.0 - (t * EVIDENCE.bias[rung] / asked) ** 2
-        if room.min() <= 1.0 - 0.6**2:
+        room = 1.0 - (z * EVIDENCE.bias[rung] / asked) ** 2
+        if room.min() <= 1.0 - 0.75**2:
             continue
         each = []
         for reach in EVIDENCE.reach:
@@ -171,9 +175,10 @@ def test_the_split_is_recorded_with_its_evidence(done):
     found = dataset.read(done[0] / "budget.nc", "budget")
     bias = found["bias"].to_numpy()
     rtol = found["rtol"].to_numpy()
-    np.testing.assert_allclose(bias[:-1, 0], BIAS * (rtol[:-1] - rtol[-1]), rtol=1e-3)
+    whole = 1.0 - 0.5 ** np.log10(rtol[:-1] / rtol[-1])  # that of the last one is allowed for
+    np.testing.assert_allclose(bias[:-1, 0], BIAS * (rtol[:-1] - rtol[-1]) / whole, rtol=1e-3)
     chosen = found["rtol"].to_numpy()[found["chosen"].to_numpy() == 1]
-    assert chosen == pytest.approx([1e-5])  # 0.2 % at 1e-4 are more than is asked of the mean
+    assert chosen == pytest.approx([1e-5])  # 0.15 % at 1e-4 are more than is asked of the mean
     squares = found["tolerance_share"] ** 2 + found["sampling_share"] ** 2
     np.testing.assert_allclose(squares, [0.001**2, 0.002**2])
     assert found.attrs["sure"] == "yes"

@@ -31,7 +31,7 @@ TIGHTEST = 1e-10
 MOST_PAIRS = 64
 """Points of each scrambling that pairs are made of at most."""
 
-PILOT = 0.1
+PILOT = 0.15
 """Share of the study's cost that doubled pairs may take."""
 
 LEAST = 128

@@ -5,6 +5,7 @@ deviation. More points at one of them tell how errors of samples fall.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator, monte_carlo, unit_lhs
 from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.statistics.random.allocation import Evidence, evidence
+from hpcclear.statistics.random.replicates import moments
 
 LADDER = tuple(10.0**-k for k in range(3, 7))
 """Tolerances of the pilot; the last one is what the others are measured against, and the ladder goes on if none is
@@ -23,6 +25,10 @@ good enough."""
 
 DESIGNS = 5
 """Designs of the pilot over all cases, the originals besides."""
+
+SCREENED, SCREENING = 16, 2
+"""Designs that each case's are chosen from, and points of each scrambling for that: what is verified is good, and a small
+deviation has larger relative errors."""
 
 PAIRS = 4
 """Points of each scrambling that pairs are made of at first."""
@@ -32,6 +38,14 @@ POINTS, POINTS_RTOL = 16, 1e-4
 
 Simulate = Callable[[str, Scene, Points], tuple[Array, float]]
 """Objectives of points, NaN where failed, and evaluations of the equations of motion a simulation; by a label of its own."""
+
+
+class Design(NamedTuple):
+    """A design of the pilot: its case, its name, its design variables, SI."""
+
+    case: str
+    name: str
+    values: dict[str, float]
 
 
 class Pilot:
@@ -62,9 +76,9 @@ class Pilot:
 
     def __init__(self, scene: Scene, simulate: Simulate) -> None:
         self._scene, self._simulate = scene, simulate
-        self._designs = _designs(scene)
-        self.labels = [f"{case} {name}" for case, name, _ in self._designs]
         self.spent, self._parts = 0.0, 0
+        self._designs = self._chosen()
+        self.labels = [f"{design.case} {design.name}" for design in self._designs]
         self.rungs, self.length = list(LADDER), PAIRS
         self._points, self._each = self._values(POINTS_RTOL, 0, POINTS)
         first = [self._pairs_of(rtol, 0, PAIRS) for rtol in self.rungs]
@@ -112,8 +126,8 @@ class Pilot:
         """Objectives (designs, scramblings, length), and evaluations a simulation."""
         scene = self._scene.with_({"study.accuracy": None, "numerics.rtol": rtol})
         values, spent = [], 0.0
-        for case in dict.fromkeys(case for case, _, _ in self._designs):
-            own = [design for name, _, design in self._designs if name == case]
+        for case in dict.fromkeys(design.case for design in self._designs):
+            own = [design.values for design in self._designs if design.case == case]
             points = _points(scene, case, own, first, length)
             self._parts += 1
             found, each = self._simulate(f"budget-{self._parts}", scene, points)
@@ -128,21 +142,35 @@ class Pilot:
         self.spent += spent
         return made, spent / made.size
 
+    def _chosen(self) -> list[Design]:
+        """The original of each case, and of a Latin hypercube the designs of least mean and least deviation, then others."""
+        study, found = self._scene.required_study, []
+        each = -(-DESIGNS // len(study.cases))
+        self._designs = _hypercubes(self._scene)
+        values, _ = self._values(LADDER[0], 0, SCREENING)
+        for case in study.cases:
+            rows = [k for k, design in enumerate(self._designs) if design.case == case.name]
+            both = np.array([[one.value for one in moments(values[k])] for k in rows])
+            both = np.where(np.isfinite(both), both, np.inf)
+            best = [rows[k] for k in (*both.argmin(axis=0), *range(len(rows)))]
+            names = study.design_variables(case.name)
+            first = [self._scene.number(study.variable(name).paths[0]) for name in names]
+            found.append(Design(case.name, "original", dict(zip(names, first, strict=True))))
+            found += [self._designs[k] for k in list(dict.fromkeys(best))[:each]]
+        return found
 
-def _designs(scene: Scene) -> list[tuple[str, str, dict[str, float]]]:
-    """Case, name and design variables of the pilot's designs: the original and some of a Latin hypercube of each case."""
+
+def _hypercubes(scene: Scene) -> list[Design]:
+    """Designs of a Latin hypercube of each case."""
     study = scene.required_study
-    each = -(-DESIGNS // len(study.cases))
     found = []
     for case in study.cases:
         names = study.design_variables(case.name)
         region = box(scene, names)
-        unit = unit_lhs(each, len(names), generator(study.seed, "budget", case.name))
+        unit = unit_lhs(SCREENED, len(names), generator(study.seed, "budget", case.name))
         rows = to_physical(scene, names, region.lower + unit * (region.upper - region.lower))
-        first = [scene.number(study.variable(name).paths[0]) for name in names]
-        found.append((case.name, "original", dict(zip(names, first, strict=True))))
         for k, row in enumerate(rows.tolist()):
-            found.append((case.name, f"pilot {k + 1}", dict(zip(names, row, strict=True))))
+            found.append(Design(case.name, f"pilot {k + 1}", dict(zip(names, row, strict=True))))
     return found
 
 

@@ -1,10 +1,9 @@
 """How an accuracy that is asked of mean and deviation is shared out, so that it costs least.
 
 A moment by n simulations at a tolerance is off by a bias, the tolerance's, and by the error of its samples:
-error^2 = (t bias(tolerance))^2 + reach(n)^2, with Student's t of the designs that it is known from, and costs n times what a
-simulation costs at that tolerance. A pilot tells both: the same points at several tolerances give biases in pairs,
-and replicates of a sequence the error of samples and how it falls with n. So every tolerance leaves the samples a share,
-and has a price.
+error^2 = (z bias(tolerance))^2 + reach(n)^2, with the normal z of the confidence, and costs n times what a simulation costs
+at that tolerance. A pilot tells both: the same points at several tolerances give biases in pairs, and replicates of a
+sequence the error of samples and how it falls with n. So every tolerance leaves the samples a share, and has a price.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
 variance of paired samples); random-effects moments after R. DerSimonian and N. Laird (1986), doi:10.1016/0197-2456(86)90046-2.
@@ -14,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.random.replicates import Estimate, moments, spread, student
@@ -22,9 +22,13 @@ SLOWEST, FASTEST = 0.5, 0.75
 """Powers that the error of samples may fall by: that of independent draws, and of sequences whose integrand has kinks; what a
 few hundred points show beyond it does not last."""
 
-ROOM = 0.6
-"""Share of an accuracy that a tolerance may take at most, which leaves four fifths of it to the samples. Tighter tolerances
+ROOM = 0.75
+"""Share of an accuracy that a tolerance may take at most, which leaves two thirds of it to the samples. Tighter tolerances
 are cheap, and what little a looser one leaves makes designs dear whose samples need more than the pilot's."""
+
+FALL = 0.5
+"""What a tolerance ten times tighter leaves of a bias, at most: contacts that are met a little early or late make it fall
+slowly. So that of the tightest, which others are measured against, is not lost."""
 
 NOTHING = 1e-9
 """Share of the mean below which a deviation is round-off."""
@@ -41,7 +45,7 @@ class Evidence:
     evaluations : array, shape (r,)
         Of the equations of motion, a simulation.
     bias : array, shape (r - 1, 2)
-        Root mean square over designs, without what chance adds to it.
+        Root mean square over designs, without what chance adds to it; with that of the last one (`FALL`).
     doubt : array, shape (r - 1, 2)
         Standard error of the mean bias of all designs.
     pairs, points : int
@@ -64,10 +68,9 @@ class Evidence:
     confidence: float
 
     def tolerance_shares(self, doubtful: bool) -> Array:
-        """What tolerances take of an accuracy, (r - 1, 2), with or without what is not known about them: limits for a design
-        that is none of the pilot's, whose biases scatter as theirs."""
+        """What tolerances take of an accuracy, (r - 1, 2), with or without what is not known about them."""
         doubt = self.doubt if doubtful else 0.0
-        return student(self.confidence, max(len(self.reach) - 1, 1)) * np.hypot(self.bias, doubt)
+        return float(ndtri(0.5 + self.confidence / 2.0)) * np.hypot(self.bias, doubt)
 
     def points_for(self, reach: Array, least: int, most: int) -> float:
         """Simulations of a design, on average over the pilot's, that limits of these half-widths (2,) take by doubling."""
@@ -124,6 +127,7 @@ def evidence(
     bias, error = np.moveaxis(np.array(known), 2, 0)  # (r - 1, d, 2) each
     square, chance = _mean(bias**2), _mean(error**2)
     designs = np.isfinite(bias).sum(axis=1)
+    whole = 1.0 / (1.0 - FALL ** np.log10(np.asarray(rtol)[:-1, None] / rtol[-1]))
     reach = np.array([_reach(one, confidence) for one in points])
     early = np.array([_reach(one[:, : one.shape[1] // 4], confidence) for one in points])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -132,7 +136,7 @@ def evidence(
     power = np.clip(np.nan_to_num(_mean(fall[None])[0], nan=SLOWEST), SLOWEST, FASTEST)
     return Evidence(
         np.asarray(rtol), np.asarray(evaluations),
-        np.sqrt(np.maximum(square - chance, 0.0)), np.sqrt(chance / np.maximum(designs, 1)),
+        whole * np.sqrt(np.maximum(square - chance, 0.0)), whole * np.sqrt(chance / np.maximum(designs, 1)),
         pairs[0, 0].size, points[0].size, reach, power, confidence,
     )  # fmt: skip
 
