@@ -50,6 +50,30 @@ PLAIN = {
 }
 """Figures of one dataset alone, by what makes it."""
 
+
+def _other_goals() -> tuple[xr.Dataset, xr.Dataset]:
+    """The first case asks for a quantile and a formula, the second for mean and deviation."""
+    front, verified = data.front(), data.verification()
+    asked = ["95th percentile of f, m2 + m3", "mean of f, deviation of f"]
+    front["searched"] = ("case", np.array(asked))
+    first = np.arange(2)[:, None, None] == 0
+    for name, moment, value in (
+        ("first", "mean", 1.5 * front["mean"]),
+        ("second", "deviation", front["m2"] + front["m3"]),
+    ):
+        front[f"searched_{name}"] = value.where(first, front[moment])
+        front[f"searched_{name}"].attrs = {}
+    ours = verified["case"] == str(front["case"][0].item())
+    for name, moment, value in (
+        ("first", "mean", 1.5 * verified["mean_true"]),
+        ("second", "deviation", verified["m2"] + verified["m3"]),
+    ):
+        verified[f"{name}_true"] = value.where(ours, verified[f"{moment}_true"])
+        for end in ("lower", "upper"):
+            verified[f"{name}_{end}"] = verified[f"{name}_true"]
+    return front, verified
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     **{
         name: lambda make=make, name=name: getattr(report, f"{name}_figure")(make())  # type: ignore[misc]
@@ -64,6 +88,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "samples, one variable": lambda: report.samples_figure(
         data.samples(failed=1).drop_vars(["m2", "m3", "u2", "I2"])
     ),
+    "front, other goals": lambda: report.front_figure(*_other_goals()),
     "front, verified": lambda: report.front_figure(data.front(), data.verification()),
     "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
     "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
@@ -289,3 +314,20 @@ def test_leave_one_out_is_what_a_model_without_the_point_predicts() -> None:
     expected = model.mean + model.scale * float(smooth[7, others] @ weights)
     error = abs(expected - model.values[7])
     assert model.leave_one_out()[7] == pytest.approx(expected, abs=1e-6 * error)
+
+
+def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
+    front, verified = _other_goals()
+    made = report.front_figure(front, verified)
+    upper, lower = np.array(made.axes).reshape(2, 2)
+    assert upper[0].get_xlabel().split() == "95th percentile of f (mm)".split()
+    assert upper[0].get_ylabel() == "m2 + m3 (SI)"
+    assert lower[0].get_xlabel().startswith("mean")
+    assert lower[0].get_ylabel().startswith("deviation")
+    points = upper[0].lines[0].get_xydata()
+    one = front.isel(case=0, run=0)
+    np.testing.assert_allclose(points[:, 0], 1.5e3 * one["mean"])
+    np.testing.assert_allclose(points[:, 1], one["m2"] + one["m3"])
+    low, high = upper[1].get_ylim()
+    mass = verified["m2"] + verified["m3"]
+    assert low <= float(mass.min()) <= float(mass.max()) <= high

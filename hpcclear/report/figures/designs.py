@@ -1,7 +1,8 @@
 """Figures of the optimised designs: fronts, and responses side by side."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
     """Pareto fronts of all cases, and the designs that were simulated directly (the paper's Fig. 9).
 
+    Axes are what each case makes small: mean and deviation, if it asks for nothing else.
     Left the fronts alone, right with the original and the paper's designs, which lie far off.
 
     Parameters
@@ -27,19 +29,21 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
         Kind ``verification``: its designs are drawn with confidence limits, joined to what the surrogate said.
     """
     cases = [str(case) for case in front["case"].to_numpy()]
+    goals = [_goals(front.sel(case=case)) for case in cases]
+    alike = all(one[0].label == goals[0][0].label for one in goals)
     columns = 1 if verification is None else 2
-    figure, axes = style.grid(len(cases), columns, 24.0 + 54.0 * len(cases), sharex="col")
-    x, y = labels.of(front["mean"]), labels.of(front["deviation"])
-    for line, case in zip(axes, cases, strict=True):
+    options = {"sharex": "col"} if alike else {}
+    figure, axes = style.grid(len(cases), columns, 24.0 + 54.0 * len(cases), **options)
+    for line, case, (x, y) in zip(axes, cases, goals, strict=True):
         for column, panel in enumerate(line):
             _runs(panel, front.sel(case=case), x, y)
             if verification is not None:
                 _verified(panel, verification, case, x, y, all_designs=column == 1)
         line[0].set_title(f"case: {labels.literal(case)}")
-        line[0].set_ylabel(y.label(r"deviation $\sigma_f$"))
-        line[-1].set_ylabel(y.label(r"deviation $\sigma_f$"))
-    for panel in axes[-1]:
-        panel.set_xlabel(x.label(r"mean $\mu_f$"))
+        line[0].set_ylabel(y.label)
+        line[-1].set_ylabel(y.label)
+        for panel in line if case == cases[-1] or not alike else ():
+            panel.set_xlabel(x.label)
     handles, words = axes[0, -1].get_legend_handles_labels()
     once = dict(zip(words, handles, strict=True))
     figure.legend(list(once.values()), list(once), loc="outside lower center", ncols=2)
@@ -47,11 +51,52 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
     return figure
 
 
-def _runs(panel: Any, one: xr.Dataset, x: labels.Scale, y: labels.Scale) -> None:
+NARROW = 20
+"""Letters in a line of a label below a panel."""
+
+
+class _Goal(NamedTuple):
+    """What is on an axis: its label, the variable of the front, those of verified designs, the scale."""
+
+    label: str
+    searched: str
+    verified: str
+    scale: labels.Scale
+
+
+_MOMENTS = ("mean of f", "deviation of f")
+_LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"deviation $\sigma_f$"))
+
+
+def _goals(one: xr.Dataset) -> tuple[_Goal, _Goal]:
+    """What a case makes small, from its part of the fronts."""
+    asked = str(one["searched"].item()).split(", ") if "searched" in one else []
+    if len(asked) != 2 or tuple(asked) == _MOMENTS:
+        return _moment(one, *_LETTERS[0]), _moment(one, *_LETTERS[1])
+    return _asked(one, asked[0], "first"), _asked(one, asked[1], "second")
+
+
+def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
+    unit = labels.of(one[name])
+    return _Goal(unit.label(words), name, name, unit)
+
+
+def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
+    """One of two, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
+    values = one[f"searched_{name}"]
+    of_f = words.endswith(" of f")
+    unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
+    share = words.startswith("share ")
+    label = unit.label(words) if of_f or share else f"{words} (SI)"
+    label = textwrap.fill(labels.literal(label), NARROW, break_long_words=False)
+    return _Goal(label, f"searched_{name}", name, unit)
+
+
+def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
-        points = (row["mean"].to_numpy() * x.factor, row["deviation"].to_numpy() * y.factor)
+        points = [row[goal.searched].to_numpy() * goal.scale.factor for goal in (x, y)]
         options: dict[str, Any] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
         panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
 
@@ -60,12 +105,12 @@ def _verified(
     panel: Any,
     verification: xr.Dataset,
     case: str,
-    x: labels.Scale,
-    y: labels.Scale,
+    x: _Goal,
+    y: _Goal,
     *,
     all_designs: bool,
 ) -> None:
-    """True mean and deviation of the designs of a case, ours or all, each joined to the surrogate's."""
+    """True values of the designs of a case, ours or all, each joined to the surrogate's, of mean and deviation."""
     names = [str(name) for name in verification["design"].to_numpy()]
     cases = (
         [str(c) for c in verification["case"].to_numpy()]
@@ -79,7 +124,7 @@ def _verified(
         label, marker = _mark(one)
         if marker != "o" and not all_designs:
             continue
-        at = float(one["mean_true"]) * x.factor, float(one["deviation_true"]) * y.factor
+        at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
         options: dict[str, Any] = {
             "fmt": marker,
             "ms": 3.4,
@@ -87,7 +132,7 @@ def _verified(
             "mew": 0.7,
             "zorder": 4,
         }
-        bars = _limits(one, "mean", x), _limits(one, "deviation", y)
+        bars = [_limits(one, goal.verified, goal.scale) for goal in (x, y)]
         panel.errorbar(
             *at,
             xerr=bars[0],
@@ -98,11 +143,10 @@ def _verified(
             label=label,
             **options,
         )
-        if "mean_surrogate" in one and "deviation_surrogate" in one:
-            guess = (
-                float(one["mean_surrogate"]) * x.factor,
-                float(one["deviation_surrogate"]) * y.factor,
-            )
+        if f"{x.verified}_surrogate" in one and f"{y.verified}_surrogate" in one:
+            guess = [
+                float(one[f"{goal.verified}_surrogate"]) * goal.scale.factor for goal in (x, y)
+            ]
             panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
         greek = {f"{case} alpha": "α", f"{case} beta": "β"}.get(name)
         if greek is not None and not all_designs:
