@@ -320,7 +320,7 @@ def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
     front, verified = _other_goals()
     made = report.front_figure(front, verified)
     upper, lower = np.array(made.axes).reshape(2, 2)
-    assert upper[0].get_xlabel().split() == "95th percentile of f (mm)".split()
+    assert upper[0].get_xlabel().split() == ["95th", "percentile", "of", "f", "(mm)"]
     assert upper[0].get_ylabel() == "m2 + m3 (SI)"
     assert lower[0].get_xlabel().startswith("mean")
     assert lower[0].get_ylabel().startswith("deviation")

@@ -32,7 +32,7 @@ MOST_PAIRS = 64
 """Points of each scrambling that pairs are made of at most."""
 
 PILOT = 0.15
-"""Share of the study's cost that doubled pairs may take."""
+"""Share of the study's cost that a pilot may come to by doubled pairs and tighter tolerances."""
 
 LEAST = 128
 """Simulations of a verified design from which on its limits are believed."""
@@ -121,11 +121,11 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
     while True:
         found = pilot.evidence()
         split, known = decided(scene, found), priced(scene, found, doubtful=False)
-        share = PILOT * split.evaluations
+        share = PILOT * split.evaluations - pilot.spent
         if known is None and _goes_on(pilot, share):
             pilot.tighter()
             continue
-        saved = split.evaluations - known.evaluations if known is not None and split.sure else share
+        saved = np.inf if known is None or not split.sure else split.evaluations - known.evaluations
         few = known is not None and pilot.length < MOST_PAIRS
         if few and pilot.price_of_doubling() <= min(saved / 2.0, share):
             pilot.longer()
