@@ -74,6 +74,17 @@ PAIRS = [
         "joints.crank_rod.wear={length=0.02, bearing={coefficient=1e-15}}",
         "joints.rod_slider.wear={length=0.02, bearing={coefficient=1e-15}}",
     ),
+    *(
+        added(
+            f"{model} oil film of {viscosity}",
+            *(
+                f"joints.{joint}.film={{model='{model}', viscosity='{viscosity}', length='{length}'}}"
+                for joint in ("crank_rod", "rod_slider")
+            ),
+        )
+        for model, length in (("short", "20 mm"), ("long", "80 mm"))
+        for viscosity in ("1 mPa*s", "10 mPa*s", "100 mPa*s")
+    ),
     added("energies", "numerics.energy=true"),
     added("further responses", "numerics.responses=true"),
 ]

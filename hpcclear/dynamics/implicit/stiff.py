@@ -79,15 +79,16 @@ STEEP = 100.0
 ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
 """Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
 
-ERROR_IN_FILM = 2e-3
-"""Of a step at most, as a part of the speed at which a film is squeezed by the forces of inertia."""
+ERROR_IN_FILM, FILM_AT, LEAST_IN_FILM = 2e-3, 1e-6, 2e-11
+"""Of a step at most, as a part of the speed at which a film is squeezed by the forces of inertia, where `rtol` is at least the
+second number, and in proportion below; and the least that this comes to."""
 
 KINK_REACH, MOST_CUTS = 0.005, 12.0
 """A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
 
 
 @scalar_function
-def loosened(rtol, strictness, steep):
+def loosened(rtol, strictness, steep, smooth):
     """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
 
     Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
@@ -97,7 +98,7 @@ def loosened(rtol, strictness, steep):
     `strictness`: square of how many times tighter this sample's tolerances are.
     """
     asked = rtol / math.sqrt(strictness)
-    return 0.05 * asked if steep else 0.1 * asked**0.9
+    return 0.05 * asked if steep else 0.1 * asked ** (2.0 / 3.0 if smooth else 0.9)
 
 
 @scalar_function
@@ -120,9 +121,12 @@ def fit_to_ramp(m, settings):
         film = max(film, m[(block + at.FILM_STEEPNESS) * LANES])
     ramp = 1.0 / steepest
     speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
-    within = min(ERROR_IN_RAMP * ramp, ERROR_IN_FILM / film) / (1.0 + speed)
     strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
-    m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP), within)
+    asked = min(settings[RTOL] / (FILM_AT * math.sqrt(strictness)), 1.0) ** 0.9
+    squeezed = max(ERROR_IN_FILM / film * asked / (1.0 + speed), LEAST_IN_FILM)
+    within = min(ERROR_IN_RAMP * ramp / (1.0 + speed), squeezed)
+    smooth = film > 1e-300
+    m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP, smooth), within)
     m[mem.REACH] = DIFFERENCE_IN_RAMP * ramp
 
 
