@@ -72,8 +72,9 @@ def test_a_journal_that_leaves_the_wall_is_hardly_held():
 def test_the_angle_of_the_half_circle():
     for psi in np.linspace(1e-3, math.pi - 1e-3, 300):
         for r in (0.1, 1.0):
-            found = film.half_circle_angle(-r * math.cos(psi), r * math.sin(psi), r)
+            found, sine = film.half_circle_angle(-r * math.cos(psi), r * math.sin(psi), r)
             assert found == pytest.approx(psi, rel=1e-12)
+            assert sine == pytest.approx(math.sin(0.5 * psi), rel=1e-12)
 
 
 def test_a_film_gets_no_thinner_than_the_roughness():

@@ -29,7 +29,7 @@ def oiled(rtol=1e-6, clearance="0.1 mm", joints=JOINTS, **film):
 # ---- hard cases: each ends as it says, and its energy closes ---------------------------------------------
 
 
-@pytest.mark.parametrize("model", ["short", "long"])
+@pytest.mark.parametrize("model", ["short", "long", "finite"])
 @pytest.mark.parametrize("clearance", ["0.02 mm", "0.3 mm"])
 def test_any_oil_ends_in_a_stated_way_and_keeps_the_energy_balance(model, clearance):
     """Viscosities from 1e-4 to 10 Pa s: from joints that strike through the film to such that creep in it."""
@@ -74,6 +74,25 @@ def test_oil_in_one_joint_leaves_the_other_dry():
     assert penetration[0] == 0.0 < penetration[1]
 
 
+def test_films_of_two_models_and_no_viscosity_at_all():
+    """A finite film in one joint, a short one in the other; without viscosity neither is there."""
+    dry = oiled(joints=[], clearance="0.3 mm")
+    films = {
+        f"joints.{joint}.film": OIL | {"model": model}
+        for joint, model in zip(JOINTS, ("short", "finite"), strict=True)
+    }
+    both = run(dry.with_(films))
+    assert both.out.status == Status.OK
+    rest, passed = energy_residual(dry, both)
+    assert abs(rest) < CLOSED * passed
+    none = {f"joints.{joint}.film.viscosity": 0.0 for joint in JOINTS}
+    smooth = {"law": "hunt-crossley", "damping": 0.5}
+    explicit = {"numerics.method": "dormand-prince", "effects.contact": smooth}
+    off, on = run(dry.with_(explicit)), run(dry.with_(films | explicit).with_(none))
+    turn = len(off.q) // 4  # before chaos parts any two
+    np.testing.assert_allclose(on.q[:turn], off.q[:turn], rtol=0, atol=1e-10)
+
+
 def test_methods_agree_on_a_film():
     """Explicit steps, implicit ones, and collocation."""
     found = {}
@@ -106,6 +125,19 @@ def test_a_film_that_is_none_is_refused_with_the_reason(entry, value, reason):
     assert caught.value.key == f"joints.crank_rod.film.{entry}"
     assert reason in caught.value.reason
     assert caught.value.remedy
+
+
+def test_a_finite_film_is_for_one_length_over_diameter():
+    with pytest.raises(InputError) as caught:
+        oiled(model="finite", length="200 mm")
+    assert caught.value.key == "joints.crank_rod.film.model"
+    assert "5 long" in caught.value.reason
+    scene = oiled(model="finite")
+    points = Points(("L",), np.array([[0.02], [0.03]]), (("joints.crank_rod.film.length",),))
+    with pytest.raises(InputError) as caught:
+        parameters(scene, points)
+    assert caught.value.key == "joints.crank_rod.film.model"
+    assert "film.length" in caught.value.remedy
 
 
 def test_a_scene_tells_of_its_films():

@@ -90,6 +90,14 @@ MARKERS = {
         },
     ),
     "short_film": ({"film"}, {par(at.JOINT_12 + at.FILM_SHORT), par(at.JOINT_23 + at.FILM_SHORT)}),
+    "finite_film": (
+        {"film"},
+        {
+            par(at.JOINT_12 + at.FILM_FINITE),
+            par(at.O12.finite),
+            par(at.O23.finite + at.FINITE_ROWS - 1),
+        },
+    ),
     "long_film": ({"film"}, {par(at.JOINT_12 + at.FILM_LONG), par(at.JOINT_23 + at.FILM_LONG)}),
 }
 # rows that an effect shares with another: not its own marker

@@ -43,6 +43,7 @@ class Effects(NamedTuple):
     film: Any = None  # oil in joints with clearance
     short_film: Any = None
     long_film: Any = None
+    finite_film: Any = None
 
 
 class Open(NamedTuple):
@@ -95,7 +96,7 @@ def open_of(effects: Effects) -> Open:
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
 ) = range(27)
-JOINT_ROWS = 13
+JOINT_ROWS = 14
 JOINT_BLOCKS = 27  # of all joints, one behind the other
 # within a joint's block
 (
@@ -108,16 +109,20 @@ JOINT_BLOCKS = 27  # of all joints, one behind the other
     INVERSE_RAMP,
     DEAD_SPEED,
     FILM_SHORT,  # mu R L^3/c^3, N s/m; 0 where there is no such film
+    FILM_FINITE,  # as of a short one
     FILM_LONG,  # 12 mu L R^3/c^3, N s/m
     FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
     FILM_FLOOR,  # least thickness over the clearance
     FILM_STEEPNESS,  # s/m, of the film's force over that of inertia
-) = range(13)
+) = range(14)
 JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
 """First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
-PARAMETERS = OWN + 192
+FINITE = OWN + 192
+"""First row of what films of finite length have besides, joint by joint, in scenes that have such a film."""
+FINITE_ROWS = 180
+PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
 # of each joint: its gap, its normal force and the rate of its gap, rows of all joints side by side like all that joints have:
@@ -305,6 +310,7 @@ class Joint(NamedTuple):
     """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
 
     block: int  # of parameters
+    finite: int
     gap: int  # rates
     force: int
     rate: int
@@ -317,7 +323,7 @@ class Joint(NamedTuple):
 
 JOINTS = tuple(
     Joint(
-        JOINT_BLOCKS + JOINT_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
+        JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
         SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES

@@ -5,11 +5,16 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.bearing import correction
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar.problem import parameters_of
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+
+SAME_LENGTH = 0.01
+"""By how much length over diameter may differ between samples of a film of finite length, relative: worn bearings are wider."""
 
 
 class Numbers:
@@ -39,6 +44,12 @@ def topology(scene: Scene) -> tuple[bool, bool, bool]:
 def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
+    p = _parameters(scene, points, get)
+    return _with_finite_films(scene, get, p) if finite_rows(scene) else p
+
+
+def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
+    """But for those of films of finite length."""
     if scene.is_planar:
         p = parameters_of(scene, get, points)
         for k, joint in enumerate(scene.clearance_joints()):
@@ -131,12 +142,51 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     key = scene.joint_key(joint)
     viscosity, length = get(f"{key}.film.viscosity"), get(f"{key}.film.length")
     clearance, radius = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+    thin = viscosity * radius * (length / clearance) ** 3
     if film.model == "short":
-        own[:, at.FILM_SHORT] = viscosity * radius * (length / clearance) ** 3
+        own[:, at.FILM_SHORT] = thin
+    elif film.model == "finite":
+        own[:, at.FILM_FINITE] = thin
     else:
         own[:, at.FILM_LONG] = 12.0 * viscosity * length * (radius / clearance) ** 3
     own[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
     own[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
     masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
     inertia = sum(get(path) for path in masses) * p[:, at.CRANK_LENGTH] * p[:, at.SPEED] ** 2
-    own[:, at.FILM_STEEPNESS] = (own[:, at.FILM_SHORT] + own[:, at.FILM_LONG]) / inertia
+    own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SHORT : at.FILM_SHEAR].sum(axis=1) / inertia
+
+
+def finite_rows(scene: Scene) -> int:
+    """Parameters of a sample with films of finite length; 0 without such films."""
+    if all(film.model != "finite" for film in scene.films().values()):
+        return 0
+    return at.FINITE + at.FINITE_ROWS * (_place(scene, scene.clearance_joints()[-1]) + 1)
+
+
+def _place(scene: Scene, joint: str) -> int:
+    """Which place among the kernel's joints a joint has."""
+    return scene.joint_labels.index(joint)
+
+
+def _with_finite_films(scene: Scene, get: Numbers, p: Array) -> Array:
+    """With the coefficients of films of finite length; those of other joints are a short one's."""
+    rows = np.zeros((len(p), finite_rows(scene)))
+    rows[:, : p.shape[1]] = p
+    for joint in scene.clearance_joints():
+        first = at.FINITE + at.FINITE_ROWS * _place(scene, joint)
+        own = rows[:, first : first + at.FINITE_ROWS]
+        film = scene.films().get(joint)
+        if film is None or film.model != "finite":
+            own[:, :: at.FINITE_ROWS // 2] = 1.0
+            continue
+        key = scene.joint_key(joint)
+        ratio = 0.5 * film.length / scene.clearance_joint(joint).bearing_radius
+        varied = 0.5 * get(f"{key}.film.length") / get(f"{key}.bearing_radius")
+        if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
+            raise InputError(
+                f"{key}.film.model", "finite",
+                "the samples differ in length over diameter, and a film is solved for one alone",
+                'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
+            )  # fmt: skip
+        own[:] = correction(ratio)
+    return rows

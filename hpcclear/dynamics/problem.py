@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
-from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.parameters import finite_rows, parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
@@ -226,6 +226,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         film=_flag(bool(models)),
         short_film=_flag("short" in models),
         long_film=_flag("long" in models),
+        finite_film=_flag("finite" in models),
     )
 
 
@@ -367,7 +368,8 @@ def problem_of(
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
         cycle=turns * at.TURN,
-        parameter_rows=at.OWN if linkage is None else linkage.parameter_rows,
+        parameter_rows=finite_rows(scene)
+        or (at.OWN if linkage is None else linkage.parameter_rows),
         linkage=linkage,
         curves=curves,
         chosen=scene.objective.joints,

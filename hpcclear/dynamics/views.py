@@ -217,6 +217,7 @@ class Parameters(View):
     friction = _entry(at.FRICTION)
     inverse_ramp = _entry(at.INVERSE_RAMP)
     film_short = _entry(at.FILM_SHORT)
+    film_finite = _entry(at.FILM_FINITE)
     film_long = _entry(at.FILM_LONG)
     film_shear = _entry(at.FILM_SHEAR)
     film_floor = _entry(at.FILM_FLOOR)

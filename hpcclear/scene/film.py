@@ -12,15 +12,33 @@ class Film(Table):
     """Dynamic viscosity at the temperature that the bearing runs at, Pa s."""
     length: PositiveLength
     """Of the bearing, at right angles to the plane, m."""
-    model: Literal["short", "long"]
-    """How Reynolds' equation is solved: for bearings that are short beside their diameter (Ocvirk), or long (Sommerfeld)."""
+    model: Literal["short", "long", "finite"]
+    """How Reynolds' equation is solved: for bearings that are short beside their diameter (Ocvirk), long (Sommerfeld), or of
+    their own length, once a bearing."""
     roughness: PositiveLength = 1e-6
     """Of both surfaces together, m: how thin the film is where they touch."""
 
 
-def check_film(film: Film | None, clearance: float) -> None:
-    """An error for validators unless a film is left between rough surfaces in the middle of a clearance, m."""
-    if film is not None and 4.0 * film.roughness > clearance:
+LENGTHS = (0.05, 3.0)
+"""Lengths over diameters that `finite` is for."""
+
+
+def check_film(film: Film | None, clearance: float, radius: float) -> None:
+    """An error for validators unless a film is left between rough surfaces in the middle of a clearance, m, and its model fits.
+
+    `radius`: of the bearing, m.
+    """
+    if film is None:
+        return
+    ratio = 0.5 * film.length / radius
+    if film.model == "finite" and not LENGTHS[0] <= ratio <= LENGTHS[1]:
+        raise invalid(
+            f"is for lengths from {LENGTHS[0]:g} to {LENGTHS[1]:g} diameters, and this bearing is {ratio:.3g} long",
+            'Take "short"' if ratio < 1.0 else 'Take "long"',
+            key="film.model",
+            value=film.model,
+        )
+    if 4.0 * film.roughness > clearance:
         raise invalid(
             f"must be at most a quarter of the clearance ({clearance:g} m), or no film is left",
             "Write the roughness of both surfaces together",

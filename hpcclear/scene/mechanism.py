@@ -148,7 +148,7 @@ class ClearanceJoint(Table):
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
         check_journal(self.clearance, self.bearing_radius)
-        check_film(self.film, self.clearance)
+        check_film(self.film, self.clearance, self.bearing_radius)
         return self
 
 

@@ -171,7 +171,7 @@ class PlanarClearance(Table):
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":
         check_journal(self.clearance, self.bearing_radius)
-        check_film(self.film, self.clearance)
+        check_film(self.film, self.clearance, self.bearing_radius)
         return self
 
 

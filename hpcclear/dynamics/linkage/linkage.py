@@ -61,10 +61,10 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
-        if self._free > at.PARAMETERS:
+        if self._free > at.FINITE:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
-                f"need {self._free - at.OWN} parameters, and there is room for {at.PARAMETERS - at.OWN}",
+                f"need {self._free - at.OWN} parameters, and there is room for {at.FINITE - at.OWN}",
                 "Take fewer bodies or points",
             )  # fmt: skip
 

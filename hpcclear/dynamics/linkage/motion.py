@@ -151,10 +151,11 @@ def joint_force(effects, work, par, joint, relative, i, W):
     moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
-    film, short, long = effects.film, effects.short_film, effects.long_film
-    oil = film_of(film, short, long, par, block, relative, (nx, ny, gap), i, W)
+    oil = film_of(effects, par, joint, relative, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
-    work[(at.RATE_NOW + joint.force) * W + i] = pressed(film, normal, nx, ny, oil[0], oil[1])
+    work[(at.RATE_NOW + joint.force) * W + i] = pressed(
+        effects.film, normal, nx, ny, oil[0], oil[1]
+    )
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.sliding, work, joint.sliding, sliding, i, W)

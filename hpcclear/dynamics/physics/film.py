@@ -12,6 +12,7 @@ circumference. All that is integrated there follows from
 by differentiation, as d psi/da = 1/s and d psi/db = a b/(s (1 - b^2)). No term divides by the eccentricity.
 
 - Short bearing (Ocvirk 1953, NACA TN 2808): pressure is positive around the direction of w.
+- Finite bearing: as a short one, but for factors by which Reynolds' equation in both directions differs (`dynamics.bearing`).
 - Long bearing (Sommerfeld 1904): at both ends of the half circle that is ambient; it lies around 2 w + e (e.w)/c^2. For pure
   wedge this is Sommerfeld's half film, for pure squeeze the half that is being squeezed.
 """
@@ -19,6 +20,9 @@ by differentiation, as d psi/da = 1/s and d psi/db = a b/(s (1 - b^2)). No term 
 import math
 
 from hpcclear.base.jit import lane_function
+
+LEAST_S = 0.19899748742132398
+"""s at an eccentricity of 0.98, up to which finite bearings are fitted."""
 
 _TINY = 1e-300  # keeps the direction of a film at rest defined (and zero)
 
@@ -43,11 +47,15 @@ def small_arctan(t):
 
 @lane_function
 def half_circle_angle(a, s, r):
-    """psi from 0 to pi whose tangent is s/-a, for s > 0 and r = sqrt(a^2 + s^2), without a branch: halved three times."""
+    """psi from 0 to pi whose tangent is s/-a, for s > 0 and r = sqrt(a^2 + s^2), and sin(psi/2).
+
+    Halved three times, in place of branches.
+    """
     far = r + abs(a)
     less = far if a <= 0.0 else s * s / far  # r - a = r (1 + cos psi)
-    half = s / (less + math.sqrt(2.0 * r * less))  # tan(psi/4)
-    return 8.0 * small_arctan(half / (1.0 + math.sqrt(1.0 + half * half)))
+    chord = math.sqrt(2.0 * r * less)
+    half = s / (less + chord)  # tan(psi/4)
+    return 8.0 * small_arctan(half / (1.0 + math.sqrt(1.0 + half * half))), s / chord
 
 
 @lane_function
@@ -65,16 +73,16 @@ def film_thickness(depth, floor):
 
 @lane_function
 def short_impedance(a, b, s2):
-    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle: the short film's force along w and across."""
+    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle, the short film's force along w and across; sin(psi/2)."""
     s = math.sqrt(s2)
     r2 = s2 + a * a
-    psi = half_circle_angle(a, s, math.sqrt(r2))
+    psi, sine = half_circle_angle(a, s, math.sqrt(r2))
     q = 1.0 / s2
     q2 = q * q
     turned = psi * (q2 / s)
     along = 3.0 * a * q2 + turned * (s2 + 3.0 * a * a)
     across = b * (2.0 + a * a / r2) * q2 + 3.0 * a * b * turned
-    return along, across
+    return along, across, sine
 
 
 @lane_function
@@ -86,7 +94,7 @@ def long_impedance(a, b, s2, along, across):
     """
     s = math.sqrt(s2)
     r2 = s2 + a * a
-    psi = half_circle_angle(a, s, math.sqrt(r2))
+    psi, _ = half_circle_angle(a, s, math.sqrt(r2))
     q = 1.0 / s2
     q2 = q * q
     turned = psi * (q2 / s)
@@ -104,15 +112,21 @@ def long_impedance(a, b, s2, along, across):
 
 
 @lane_function
+def along_and_across(eccentricity, w):
+    """The eccentricity's components along w and across it, where w is not nought."""
+    ex, ey = eccentricity
+    wx, wy = w
+    inverse = 1.0 / math.sqrt(wx * wx + wy * wy + _TINY)
+    return (ex * wx + ey * wy) * inverse, (ey * wx - ex * wy) * inverse
+
+
+@lane_function
 def short_force(flag, scale, eccentricity, w, s2):
     """Force on the journal, N, of a short film; `scale`: mu R L^3/c^3; eccentricity over c, w in m/s; 0 with it off."""
     if flag is not None:
-        ex, ey = eccentricity
         wx, wy = w
-        inverse = 1.0 / math.sqrt(wx * wx + wy * wy + _TINY)
-        a = (ex * wx + ey * wy) * inverse
-        b = (ey * wx - ex * wy) * inverse
-        along, across = short_impedance(a, b, s2)
+        a, b = along_and_across(eccentricity, w)
+        along, across, _ = short_impedance(a, b, s2)
         return -scale * (along * wx - across * wy), -scale * (along * wy + across * wx)
     else:
         return 0.0, 0.0
@@ -136,3 +150,10 @@ def long_force(flag, scale, eccentricity, w, s2):
         return -scale * (along * mx - across * my), -scale * (along * my + across * mx)
     else:
         return 0.0, 0.0
+
+
+@lane_function
+def finite_scales(s2, sine):
+    """s and sin(psi/2) as the polynomials of finite bearings take them, from -1 to 1; s no less than is fitted."""
+    s = max(math.sqrt(s2), LEAST_S)
+    return (2.0 * s - (1.0 + LEAST_S)) / (1.0 - LEAST_S), 2.0 * sine - 1.0
