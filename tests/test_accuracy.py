@@ -134,8 +134,10 @@ def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
         return  # the ladder is climbed once
     found = integration.measure(scene, TINY, silent)
     by_name = dict(zip(found.methods, found.error[..., 0], strict=True))
+    floor = integration.MARGIN * found.reference_error[0]  # no error below the reference's is told
     for name in ("dormand-prince", "LSODA (scipy)"):
-        assert by_name[name][2] < 0.1 * by_name[name][0]
+        assert by_name[name][2] < max(0.1 * by_name[name][0], 1.01 * floor)
+        assert by_name[name][2] < 0.5 * by_name[name][0]
     # The classical method's longest steps are too long for these contacts: no number is told, and no good one.
     classical = by_name["RK4, fixed steps"]
     assert np.isnan(classical[0])

@@ -66,12 +66,19 @@ def test_chaos_is_found_where_revolutions_differ_for_good():
 
 
 def test_periods_double_on_the_way_to_chaos():
-    """Of the 90 clearances from 0.1 to 1 mm 16 have the period 1, 6 two, one each 4 and 8."""
-    periods = judged(np.linspace(0.1e-3, 1e-3, 90).tolist(), 0.05)["period"]
-    counts = [int((periods == period).sum()) for period in (1, 2)]
+    """Of 90 clearances from 0.1 to 1 mm 16 have the period 1, 6 two; of 48 in two of these stretches some 23 four or eight.
+
+    Which single clearances do is chance: several attractors lie side by side, and processors differ in the last bits.
+    Clearances kicked by 1e-9 gave 21 to 26.
+    """
+    wide = np.linspace(0.1e-3, 1e-3, 90)
+    narrow = [np.linspace(*ends, 24) for ends in ((0.424e-3, 0.4333e-3), (0.5205e-3, 0.5243e-3))]
+    periods = judged([*wide, *narrow[0], *narrow[1]], 0.05)["period"]
+    counts = [int((periods[:90] == period).sum()) for period in (1, 2)]
     assert counts[0] >= 10
     assert counts[1] >= 3
-    assert ((periods == 4) | (periods == 8)).any()
+    doubled = int(np.isin(periods[90:], (4, 8)).sum())
+    assert doubled >= 10, periods[90:]
 
 
 def test_axes_take_names_paths_and_units():

@@ -89,8 +89,8 @@ def of_joints(objective: Objective, places: Sequence[int], labels: Sequence[str]
         words += ", the larger"
 
     def largest(records: Records) -> Array:
-        found: Array = records[field][:, list(places)].max(axis=1)
-        return found
+        found: Array = np.asarray(records[field], float)[:, list(places)]
+        return np.asarray(found.max(axis=1))
 
     of = objective.of if objective.name == MEAN_GAP.name else largest
     return objective._replace(words=words, of=of, joints=tuple(places))

@@ -338,13 +338,10 @@ def describe_samples(found: "Finished") -> None:
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
-        rows.append(
-            (
-                "throughput",
-                f"{len(f) / busy.sum():.0f} samples a second and core, "
-                f"{busy.sum() / evaluations * 1e9:.1f} ns a force evaluation",
-            )
-        )
+        throughput = f"{len(f) / busy.sum():.0f} samples a second and core"
+        if evaluations:  # without play there is nothing to integrate
+            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation"
+        rows.append(("throughput", throughput))
     out.print(table("Samples", rows + _load(found)))
     for what, path in (("samples", found.output), ("timing", found.timing)):
         if path.exists():  # what was merged has its times beside the parts

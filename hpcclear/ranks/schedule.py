@@ -154,6 +154,32 @@ class HandOut:
         self.outstanding -= records.size
 
 
+class Kept:
+    """Records of a design in the order of its samples, put where they belong as they come: held once, never sorted.
+
+    Parameters
+    ----------
+    total : int
+        Samples of the design.
+    earlier : structured ndarray
+        Records of samples finished before.
+    """
+
+    def __init__(self, total: int, earlier: np.ndarray) -> None:
+        self._records = np.empty(total, earlier.dtype)
+        self._there = np.zeros(total, bool)
+        self.add(earlier)
+
+    def add(self, records: np.ndarray) -> None:
+        """Take finished records."""
+        self._records[records["sample"]] = records
+        self._there[records["sample"]] = True
+
+    def records(self) -> np.ndarray:
+        """What has been taken, by growing number."""
+        return self._records if self._there.all() else self._records[self._there]
+
+
 class Desk:
     """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
 

@@ -17,7 +17,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import Desk, HandOut, Points, Worker
+from hpcclear.ranks.schedule import Desk, HandOut, Kept, Points, Worker
 from hpcclear.ranks.stopping import Stopped, StopSwitch
 
 FLUSH_INTERVAL = 1.0
@@ -197,13 +197,13 @@ class Ranks:
         progress = Progress("", style="quiet") if progress is None else progress
         book = HandOut(len(points), earlier["sample"], task.workers or self.size)
         run = _Run(self, book, points, progress)
-        run.on_records, run.save, run.kept = on_records, save, [earlier] if keep else None
+        run.on_records, run.save = on_records, save
+        run.kept = Kept(len(points), earlier) if keep else None
         progress.start(len(points), earlier)
         with contextlib.closing(progress), self._timed(task.name) as spent:
             if not run.book.done:
                 run.work(task, spent)
-        records = np.concatenate(run.kept or [earlier[:0]])
-        return records[np.argsort(records["sample"])]
+        return earlier[:0] if run.kept is None else run.kept.records()
 
     def everywhere(
         self, name: str, function: Callable[[Any, "Ranks"], object], payload: object
@@ -354,7 +354,7 @@ class _Run:
         self.book = book
         self.on_records: Callable[[np.ndarray], object] | None = None
         self.save: Callable[[], object] | None = None
-        self.kept: list[np.ndarray] | None = None
+        self.kept: Kept | None = None
 
     def work(self, task: Task, spent: np.ndarray) -> None:
         """Run the stage; whatever ends it, everything finished is collected and delivered."""
@@ -434,7 +434,7 @@ class _Run:
             return
         self.book.accept(records)
         if self.kept is not None:
-            self.kept.append(records)
+            self.kept.add(records)
         with self._ranks.writing():
             if self.on_records is not None:
                 callback, self.on_records = self.on_records, None  # one that fails gets no more

@@ -30,6 +30,7 @@ KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
 
 _FANOUT = 8
+_KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
@@ -117,10 +118,11 @@ def discard(directory: Path) -> None:
 
 @dataclass
 class _Part:
+    """One file; `held`: its records (n,) and designs (n, k), unless there are so many that only the file has them."""
+
     level: int
     path: Path
-    records: np.ndarray
-    values: np.ndarray
+    held: tuple[np.ndarray, np.ndarray] | None
 
 
 class Checkpoint:
@@ -229,12 +231,11 @@ class Checkpoint:
 
     def completed(self) -> np.ndarray:
         """All samples on disk and in memory, by growing number, each once; shape (n,)."""
-        pieces = [part.records for part in self._parts] + [records for records, _ in self._buffer]
-        return _join(pieces, [np.empty((len(piece), 0)) for piece in pieces])[0]
+        return self.contents()[0]
 
     def contents(self) -> tuple[np.ndarray, np.ndarray]:
         """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
-        pieces = [(part.records, part.values) for part in self._parts] + self._buffer
+        pieces = [self._held(part) for part in self._parts] + self._buffer
         return _join([records for records, _ in pieces], [values for _, values in pieces])
 
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
@@ -244,8 +245,25 @@ class Checkpoint:
         )
         path = self.directory / f"part-{level:02d}-{self._number:06d}.nc"
         dataset.write(content, path)
-        self._parts.append(_Part(level, path, records, values))
+        self._keep(level, path, records, values)
         self._number += 1
+
+    def _keep(self, level: int, path: Path, records: np.ndarray, values: np.ndarray) -> None:
+        held = (records, values) if len(records) <= _KEPT else None
+        self._parts.append(_Part(level, path, held))
+
+    def _held(self, part: _Part) -> tuple[np.ndarray, np.ndarray]:
+        """A part's records and designs, from memory or from its file; raises InputError if that was damaged meanwhile."""
+        if part.held is not None:
+            return part.held
+        content = dataset.read(part.path, "samples")
+        return dataset.records(content), self._designs(content)
+
+    def _designs(self, content: xr.Dataset) -> np.ndarray:
+        """Designs (n, k) of a part, a column for each name."""
+        designs = dataset.designs(content)
+        columns = [designs[name] for name in self.names]
+        return np.stack(columns, 1) if columns else np.empty((content.sizes["sample"], 0))
 
     def _merge(self) -> None:
         while True:
@@ -254,7 +272,8 @@ class Checkpoint:
             if level is None:
                 return
             old = [part for part in self._parts if part.level == level]
-            merged = _join([part.records for part in old], [part.values for part in old])
+            held = [self._held(part) for part in old]
+            merged = _join([records for records, _ in held], [values for _, values in held])
             self._write_part(level + 1, *merged)
             # a kill in between leaves samples twice, which `_join` mends
             for part in old:
@@ -345,14 +364,10 @@ class Checkpoint:
             self.problems.append(f"samples of {path.name} are done again: {error.reason}")
             return
         check_key(content, self.key, path)
-        designs = dataset.designs(content)
-        if set(designs) != set(self.names):
+        if set(dataset.designs(content)) != set(self.names):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
-        records = dataset.records(content)
-        columns = [designs[name] for name in self.names]
-        values = np.stack(columns, 1) if columns else np.empty((len(records), 0))
-        self._parts.append(_Part(level, path, records, values))
+        self._keep(level, path, dataset.records(content), self._designs(content))
 
     @contextmanager
     def _refusing(self) -> Iterator[None]:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from hpcclear.base.errors import InputError, StorageError
 
+Buffer = bytes | memoryview
+
 TEMPORARY = re.compile(r"\.hpcclear-[0-9a-f]{16}\.tmp")
 """Names of files that were being written; what is left of them after a kill is rubbish."""
 
@@ -106,7 +108,7 @@ def _is_marked(path: Path, mark: bytes) -> bool:
         return mark in begin or mark in file.read(_LOOK)
 
 
-def write_bytes(path: Path, content: bytes, mark: bytes = b"") -> None:
+def write_bytes(path: Path, content: Buffer, mark: bytes = b"") -> None:
     """Put `content` at `path` whole: temporary name beside it, fsync, rename, fsync of the parent.
 
     A symbolic link at `path` is replaced, never followed; a file is, if it holds `mark` near an end
@@ -136,7 +138,7 @@ def write_bytes(path: Path, content: bytes, mark: bytes = b"") -> None:
         os.close(directory)
 
 
-def _replaced(name: str, content: bytes, directory: int) -> bool:
+def _replaced(name: str, content: Buffer, directory: int) -> bool:
     """Write aside and rename; False if somebody removed the temporary in between."""
     temporary = f".hpcclear-{secrets.token_hex(8)}.tmp"
     try:
@@ -159,7 +161,7 @@ def remove_leftovers(directory: Path) -> None:
                 path.unlink()
 
 
-def _write_whole(name: str, content: bytes, directory: int) -> None:
+def _write_whole(name: str, content: Buffer, directory: int) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     file = os.open(name, flags, 0o666, dir_fd=directory)
     try:

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.results.files import write_bytes
+from hpcclear.results.files import Buffer, write_bytes
 
 SEAL = b"\nhpcclear seal sha256:"
 """Begin of what is put behind the content of every file."""
@@ -75,15 +75,20 @@ def read_bytes(path: Path) -> bytes:
     return content
 
 
-def seal(content: bytes) -> bytes:
+def seal(content: Buffer) -> bytes:
     """What is put behind the content of a file."""
     return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a sealed NetCDF-4 file (see `write_bytes`, `encode`)."""
-    image = encode(dataset)
-    write_bytes(path, image + seal(image), SEAL)
+    image = _image(dataset)
+    with image.getbuffer() as content:
+        ending = seal(content)
+    image.seek(0, io.SEEK_END)
+    image.write(ending)  # behind it, in place: of a large file no second copy is made
+    with image.getbuffer() as content:
+        write_bytes(path, content, SEAL)
 
 
 def load(path: Path) -> xr.Dataset:
@@ -111,6 +116,11 @@ def encode(dataset: xr.Dataset) -> bytes:
     ValueError
         A type or a coordinate that the file cannot hold.
     """
+    return _image(dataset).getvalue()
+
+
+def _image(dataset: xr.Dataset) -> io.BytesIO:
+    """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", track_order=True) as file:
         scales = {
@@ -125,7 +135,7 @@ def encode(dataset: xr.Dataset) -> bytes:
             for axis, dimension in enumerate(variable.dims):
                 target.dims[axis].attach_scale(scales[dimension])
         _encode_attributes(file, dataset.attrs)
-    return buffer.getvalue()
+    return buffer
 
 
 def _encode_dimension(file: h5py.File, name: str, number: int, dataset: xr.Dataset) -> h5py.Dataset:

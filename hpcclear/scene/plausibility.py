@@ -34,6 +34,10 @@ def implausible(scene: SceneTables) -> Iterator[str]:
         yield from _bodies(scene)
     yield from _joints(scene)
     yield from _films(scene)
+    if scene.numerics.beta == 0.0 and (
+        scene.is_planar or scene.numerics.formulation == "baumgarte"
+    ):
+        yield "numerics.beta = 0 leaves loops without play to drift; 100 to 1000 1/s pull them together"
     effects = scene.effects
     if effects.gravity > 100.0:
         yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
