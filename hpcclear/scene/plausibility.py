@@ -111,9 +111,10 @@ def _films(scene: SceneTables) -> Iterator[str]:
                 f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
             )
         ratio = 0.5 * film.length / scene.clearance_joint(name).bearing_radius
-        short = film.model == "short"
-        if ratio > LONGEST_SHORT if short else ratio < SHORTEST_LONG:
+        if (film.model == "short" and ratio > LONGEST_SHORT) or (
+            film.model == "long" and ratio < SHORTEST_LONG
+        ):
             yield (
                 f'{key}.model = "{film.model}" carries far too much where the bearing is {ratio:.2g} diameters long; '
-                f"short films go to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}"
+                f'short films go to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}; model = "finite" is for both'
             )
