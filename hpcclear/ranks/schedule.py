@@ -176,7 +176,7 @@ class Kept:
         self._there[records["sample"]] = True
 
     def records(self) -> np.ndarray:
-        """What has been taken, by growing number."""
+        """What has been taken, by growing number, shape (taken,)."""
         return self._records if self._there.all() else self._records[self._there]
 
 
