@@ -7,6 +7,7 @@ the index of the sample, so that nothing depends on how many points are drawn at
 import hashlib
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -121,8 +122,18 @@ def _chances(
     if scrambling is None:
         label = f"monte-carlo {purpose}"
         return [_uniform(seed, label, name, first, count) for name in names]
+    return list(_scrambled(seed, purpose, scrambling, len(names), first, count).T)
+
+
+@lru_cache(maxsize=64)
+def _scrambled(
+    seed: int, purpose: str, scrambling: int, dimensions: int, first: int, count: int
+) -> Array:
+    """Points of a scrambling, (count, dimensions), read only: all designs of a study meet the same."""
     rng = generator(seed, f"sobol {purpose}", str(scrambling))
-    return list(sobol(len(names), rng, first, count).T)
+    points = sobol(dimensions, rng, first, count)
+    points.flags.writeable = False
+    return points
 
 
 def monte_carlo(

@@ -21,21 +21,26 @@ QUANTILE = 0.95
 """Probability of staying below the percentile that is told."""
 
 
-def samples_of(
-    run: StudyRun,
-    choice: Choice,
-    count: int,
-    purpose: str = "verification",
-    *,
-    first: int = 0,
-    scrambling: int | None = None,
-) -> Points:
-    """Samples of a design in all study variables: independent ones, or those of a scrambling.
+def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
+    """Independent samples of a design in all study variables.
 
     Every design of a case meets the same scatter, so that differences between designs are not
     noise.
     """
-    points = monte_carlo(
+    points = _of_design(run, choice, count, purpose, 0, None)
+    return run.simulations.filled(points.names, points.values)
+
+
+def _scattered(run: StudyRun, choice: Choice, count: int, purpose: str, first: int) -> Points:
+    """The points from `first` on of all scramblings of a design, one scrambling after the other."""
+    made = [_of_design(run, choice, count, purpose, first, k) for k in range(SCRAMBLINGS)]
+    return run.simulations.filled(made[0].names, np.concatenate([one.values for one in made]))
+
+
+def _of_design(
+    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, scrambling: int | None
+) -> Points:
+    return monte_carlo(
         run.scene,
         count,
         random=run.study.case(choice.case).random,
@@ -44,7 +49,6 @@ def samples_of(
         first=first,
         scrambling=scrambling,
     )
-    return run.simulations.filled(points.names, points.values)
 
 
 def simulate(
@@ -118,11 +122,7 @@ def _values(
         batches = [samples_of(run, choice, count, purpose) for choice in choices]
         shape = (2, count, 1)
     else:
-        batches = [
-            samples_of(run, choice, count, purpose, first=first, scrambling=number)
-            for choice in choices
-            for number in range(SCRAMBLINGS)
-        ]
+        batches = [_scattered(run, choice, count, purpose, first) for choice in choices]
         shape = (2, SCRAMBLINGS, count)
     values = np.concatenate([batch.values for batch in batches])
     records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)
