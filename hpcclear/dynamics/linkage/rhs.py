@@ -109,6 +109,7 @@ def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
     return compiled_text(motion_text(module, effects, W))
 
 
+@cache  # a study asks for it with every lane's compilation, some hundred times
 def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
     """The name of the text that ``motion`` of a module is compiled from."""
     text = one_text(module.motion, f"motion_{W}", effects=effects, W=W)
@@ -122,6 +123,7 @@ def compiled_text(name: str) -> Any:
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 
+@cache
 def written_by(effects: at.Effects) -> ModuleType:
     """The module that holds `accelerations` and `motion` of a slider-crank with these effects.
 
