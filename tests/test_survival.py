@@ -248,7 +248,7 @@ def _script() -> str:
 # -- program errors -----------------------------------------------------------------------------
 
 BEFORE = [
-    "call hpcclear.cli.options:scene_of",
+    "call hpcclear.cli.ensembles:scene_of",
     "call hpcclear.ensemble.samples:design",
     "call hpcclear.results.lock:Lock.acquire",
     "call hpcclear.results.checkpoint:Checkpoint._open",
@@ -271,7 +271,7 @@ AFTER = [
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
 STUDY_CASES = [
-    "call hpcclear.cli.options:scene_of",
+    "call hpcclear.cli.studies:scene_of",
     "import hpcclear.study",
     "call hpcclear.results.checkpoint:Checkpoint._open",
     "call hpcclear.study.sensitivities:analyse",
