@@ -65,6 +65,23 @@ def parts(folder: Path) -> list[str]:
 # -- samples ------------------------------------------------------------------------------------
 
 
+def test_parts_too_large_to_be_kept_are_read_from_their_files(tmp_path, monkeypatch):
+    """The same samples and designs, merged or not, as where everything stays in memory."""
+    found = []
+    for kept in (50_000, 4):
+        monkeypatch.setattr("hpcclear.results.checkpoint._KEPT", kept)
+        checkpoint = Checkpoint(tmp_path / str(kept), KEY, names=("m2", "C"))
+        for first in range(0, 55, 5):
+            records = outcomes(first, 5)
+            checkpoint.add(records, np.stack([records["sample"], 0.5 * records["sample"]], 1))
+            checkpoint.flush()
+        assert len(parts(tmp_path / str(kept))) == 4  # eight merged, and three
+        found.append((*checkpoint.contents(), checkpoint.completed()))
+    for one, two in zip(*found, strict=True):
+        assert len(one) == 55
+        assert one.tobytes() == two.tobytes()
+
+
 def test_samples_reach_disk_when_the_interval_is_over_and_not_before(tmp_path):
     clock = Clock()
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=5.0, clock=clock)

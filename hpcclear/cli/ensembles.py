@@ -80,18 +80,20 @@ def sample(
         _check_kind(points, statistics, raw, part, how.fresh)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
-        from hpcclear.ensemble.session import Options
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
 
         chosen = None if part is None else Part.parse(part)
         scene, place = scene_of(file, overrides), place_of(output)
-        options = Options(how.fresh, how.interval, how.progress)
         if statistics:
             kept = None if raw is None else place_of(raw)
-            describe_statistics(run_statistics(scene, place, ranks, raw=kept, options=options))
+            describe_statistics(
+                run_statistics(scene, place, ranks, raw=kept, options=how.options())
+            )
         else:
-            found = run_sample(scene, place, ranks, table=points, part=chosen, options=options)
+            found = run_sample(
+                scene, place, ranks, table=points, part=chosen, options=how.options()
+            )
             describe_samples(found)
 
     return on_ranks(program, how.time_limit)
@@ -142,11 +144,11 @@ def map_command(
     def program(ranks: "Ranks") -> None:
         from hpcclear.cli.printing import describe_map
         from hpcclear.ensemble.maps import run_map
-        from hpcclear.ensemble.session import Options
 
         axes = (x,) if y is None else (x, y)
-        options = Options(how.fresh, how.interval, how.progress)
-        describe_map(run_map(scene_of(file, overrides), axes, place_of(output), ranks, options))
+        describe_map(
+            run_map(scene_of(file, overrides), axes, place_of(output), ranks, how.options())
+        )
 
     return on_ranks(program, how.time_limit)
 
@@ -167,11 +169,9 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
 
     def program(ranks: "Ranks") -> int:
         from hpcclear.cli.wear import describe
-        from hpcclear.ensemble.session import Options
         from hpcclear.ensemble.wear import run_wear
 
-        options = Options(how.fresh, how.interval, how.progress)
-        return describe(run_wear(scene_of(file, overrides), place_of(output), ranks, options))
+        return describe(run_wear(scene_of(file, overrides), place_of(output), ranks, how.options()))
 
     return on_ranks(program, how.time_limit)
 
@@ -230,7 +230,6 @@ def effects(
     def program(ranks: "Ranks") -> int:
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
-        from hpcclear.ensemble.session import Options
         from hpcclear.study.extent import certificate_samples
 
         allowed = tolerance_of(tolerance)
@@ -241,7 +240,7 @@ def effects(
             scene,
             place_of(output or Path(f"{file.stem}-effects.nc")),
             ranks,
-            Options(how.fresh, how.interval, how.progress),
+            how.options(),
             tolerance=allowed,
             samples=certificate_samples(scene) if samples is None else samples,
             forces=forces,

@@ -14,6 +14,7 @@ from hpcclear.ranks.launcher import launched_rank
 from hpcclear.ranks.stopping import StopSwitch
 
 if TYPE_CHECKING:
+    from hpcclear.ensemble.session import Options
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
@@ -74,6 +75,12 @@ class How:
     time_limit: float | None
     interval: float
     progress: Any
+
+    def options(self) -> "Options":
+        """The same for a session of a run, but for the time limit, which is the process's."""
+        from hpcclear.ensemble.session import Options
+
+        return Options(self.fresh, self.interval, self.progress)
 
 
 def with_how(command: Callable[..., int]) -> Callable[..., int]:
