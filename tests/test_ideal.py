@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, admissible, assembled
 from running import scene_with
+from scipy.interpolate import PchipInterpolator
 from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model, row_of_parameters
 
 from hpcclear.base.outcome import Status
@@ -170,6 +171,26 @@ def test_tabulated_load_is_taken_at_the_crank_angle():
 
 
 ROWS = ((0.1, 1.0), (1.0, 3.0), (3.0, -2.0), (5.0, 0.5))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_curves_are_the_monotone_cubics_of_scipy(seed):
+    """Rows that rise, fall, stay level and lie unevenly, over many decades."""
+    random = np.random.default_rng(seed)
+    rows = np.sort(random.choice(6000, random.integers(2, 40), replace=False)) / 1000.0
+    values = random.integers(-3, 4, len(rows)) * 10.0 ** random.uniform(-8, 8)
+    three = np.concatenate([rows - at.TURN, rows, rows + at.TURN])
+    smooth = PchipInterpolator(three, np.tile(values, 3))
+    cells = periodic_cells(tuple(zip(rows, values, strict=True))).reshape(-1, 4)
+    width = at.TURN / at.CELLS
+    angle = np.arange(at.CELLS) * width
+    angle = np.where(angle < rows[0], angle + at.TURN, angle)
+    size = np.abs(values).max()
+    np.testing.assert_allclose(cells[:, 0], smooth(angle), rtol=0, atol=1e-13 * size)
+    slope = smooth.derivative()(angle)
+    np.testing.assert_allclose(
+        cells[:, 1], slope * width, rtol=0, atol=1e-12 * np.abs(slope).max() * width
+    )
 
 
 def test_straight_lines_between_rows():

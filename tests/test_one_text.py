@@ -1,5 +1,6 @@
 """Functions written out as one text: it does what their calls do, holds what is on, and is kept for the next process."""
 
+import ast
 import re
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from hpcclear.base.alike import written_once
 from hpcclear.base.jit import lane_function, scalar_function, written_kind
 from hpcclear.base.one_text import one_text, text_of
 from hpcclear.base.unrolled import written_out
@@ -135,3 +137,68 @@ def test_a_text_is_a_file_and_written_once():
     assert again is not text
     assert path.stat().st_mtime_ns == written
     assert one_text(motion, "kept", effects=effects, W=4).__name__ != text.__name__
+
+
+def defined(text):
+    """Functions of a text, the last the one that is asked for, as `written_once` takes them."""
+    return [(f, "scalar" if f.name.startswith("scalar") else "lane") for f in ast.parse(text).body]
+
+
+def merged(text):
+    return ast.unparse(ast.Module([ast.fix_missing_locations(f) for f, _ in written_once(defined(text))], []))  # fmt: skip
+
+
+ALIKE = """
+def gap(work, i):
+    r = work[4 + i] * work[10 + i]
+    return r
+
+def gap_2(work_2, i_2):
+    r_2 = work_2[5 + i_2] * work_2[17 + i_2]
+    return r_2
+
+def gap_3(work_3, i_3):
+    r_3 = work_3[6 + i_3] * work_3[24 + i_3]
+    return r_3
+
+def asked(work, i):
+    return (gap(work, i), gap_2(work, i), gap_3(work, i))
+"""
+
+
+def test_functions_that_differ_by_addresses_are_written_once():
+    text = merged(ALIKE)
+    assert text.count("def ") == 2
+    before, after = {}, {}
+    exec(ALIKE, before)
+    exec(text, after)
+    work = np.random.default_rng(1).normal(size=40)
+    assert after["asked"](work, 3) == before["asked"](work, 3)
+
+
+def test_what_is_alike_by_chance_alone_stays():
+    """Another operation, a number that is no address, a function that is not inlined, more distances than are worth it."""
+    for old, new in (
+        ("work_2[5 + i_2] *", "work_2[5 + i_2] +"),
+        ("work_2[5 + i_2] *", "2.0 * work_2[5 + i_2] *"),
+        ("work_2[5 + i_2] *", "work_2[5 * i_2] *"),
+    ):
+        assert merged(ALIKE.replace(old, new)).count("def ") == 3
+    assert merged(ALIKE.replace("gap", "scalar_gap")).count("def ") == 4
+    sums = "def f{n}(w{n}):\n    return ({items})\n\n"
+    rows = ((1, 2, 3, 4, 5), (2, 4, 6, 8, 10))
+    two = "".join(
+        sums.format(n=n, items=", ".join(f"w{n}[{a}]" for a in row)) for n, row in enumerate(rows)
+    )
+    assert merged(two + "def asked(w):\n    return (f0(w), f1(w))").count("def ") == 3
+
+
+def test_what_does_nothing_is_not_called():
+    """And what then does nothing either is left out as well; equal functions that are not inlined are one."""
+    text = merged(
+        "def empty(a):\n    pass\n\ndef outer(b):\n    empty(b)\n\ndef scalar_one(c):\n    return c\n\n"
+        "def scalar_two(d):\n    return d\n\ndef asked(e):\n    outer(e)\n    return scalar_one(e) + scalar_two(e)"
+    )
+    assert text == (
+        "def scalar_one(c):\n    return c\n\ndef asked(e):\n    pass\n    return scalar_one(e) + scalar_one(e)"
+    )

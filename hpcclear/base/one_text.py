@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numba import config
 
+from hpcclear.base.alike import written_once
 from hpcclear.base.jit import source_key, stands_apart, written_kind
 
 _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
@@ -666,13 +667,14 @@ def text_of(function: Any, name: str, known: dict[str, Any]) -> str:
         Known(known[p]) if p in known else ast.Name(p, ast.Load()) for p in parameters
     ]
     _Writer(written_kind(function) or "lane", shared).function(plain, name, arguments, {})
+    functions = written_once(shared.functions)
     lines = [f'"""{plain.__module__}.{plain.__name__}, all calls written out."""', ""]
-    if len(shared.functions) > 1:
+    if len(functions) > 1:
         lines += ["from numba import njit", "from hpcclear.base.jit import FASTMATH"]
     for (module, attribute), text in sorted(shared.imports.items()):
         renamed = f" as {text}" if text != attribute else ""
         lines.append(f"from {module} import {attribute}{renamed}")
-    for made, kind in shared.functions:
+    for made, kind in functions:
         lines += ["", ""] + ([_DECORATORS[kind]] if made.name != name else [])
         lines.append(ast.unparse(ast.fix_missing_locations(made)))
     return "\n".join([*lines, ""])

@@ -30,12 +30,28 @@ def periodic_cells(
     grid = angles[0] + np.mod(np.arange(cells + 1) * (at.TURN / cells) - angles[0], at.TURN)
     if interpolation == "linear":
         return np.column_stack(_straight(three, values, grid[:-1], at.TURN / cells)).ravel()
-    from scipy.interpolate import PchipInterpolator
+    value, slope = _monotone(three, values, grid)
+    return np.column_stack(_cubics(value, slope * (at.TURN / cells))).ravel()
 
-    smooth = PchipInterpolator(three, values)
-    return np.column_stack(
-        _cubics(smooth(grid), smooth.derivative()(grid) * (at.TURN / cells))
-    ).ravel()
+
+def _monotone(x: Array, y: Array, at_x: Array) -> tuple[Array, Array]:
+    """Value and slope of the monotone cubic through pairs (n,) at places (m,) not within its first or last piece.
+
+    As scipy's PchipInterpolator, whose import alone takes a third of a second of a first result.
+    """
+    width = np.diff(x)
+    rise = np.diff(y) / width
+    first, second = rise[:-1], rise[1:]
+    near, far = width[:-1] + 2 * width[1:], 2 * width[:-1] + width[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        harmonic = (near + far) / (near / first + far / second)
+    slope = np.zeros(len(x))  # those of the two ends are not asked for
+    slope[1:-1] = np.where(np.sign(first) * np.sign(second) > 0, harmonic, 0.0)
+    piece = np.clip(np.searchsorted(x, at_x, side="right") - 1, 1, len(x) - 3)
+    h = width[piece]
+    c0, c1, c2, c3 = _hermite(y[piece], y[piece + 1], slope[piece] * h, slope[piece + 1] * h)
+    s = (at_x - x[piece]) / h
+    return c0 + s * (c1 + s * (c2 + s * c3)), (c1 + s * (2 * c2 + s * 3 * c3)) / h
 
 
 def _cubics(height: Array, slope: Array) -> tuple[Array, Array, Array, Array]:

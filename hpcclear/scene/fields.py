@@ -49,9 +49,7 @@ def nearest(word: str, words: Sequence[str]) -> str:
 class Table(BaseModel):
     """A table of the scene file: frozen, and closed against unknown keys."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Keys that a user might expect here and that belong to another kind: reason and remedy."""
