@@ -60,6 +60,11 @@ PAIRS = [
         "friction: ambrosio",
         "effects.friction={law='ambrosio', coefficient=0.01, speeds=[0.001, 0.01]}",
     ),
+    added(
+        "friction: lugre",
+        "effects.friction={law='lugre', coefficient=0.01, static_coefficient=0.015, stribeck_speed=0.01, "
+        "bristle_stiffness=1e5}",
+    ),
     added("torque drive", FREE % "5.0"),
     Pair("tabulated torque", [*BARE, FREE % "5.0"], [*BARE, FREE % CURVE]),
     added("gravity", "effects.gravity=9.81"),

@@ -148,7 +148,9 @@ class Dense:
         depth = max(gap, 0.0)
         place = centre_b + (joint.bearing_radius + depth / 2) * n
         rate = (speed(journal, centre_j) - speed(bearing, centre_b)) @ n
-        sliding = (speed(journal, place) - speed(bearing, place)) @ t
+        # at the journal's own surface, which in contact is the same place
+        own = centre_j + (joint.bearing_radius - joint.clearance - depth / 2) * n
+        sliding = (speed(journal, own) - speed(bearing, place)) @ t
         elastic = joint.active * joint.stiffness * depth**1.5
         normal = max(elastic * joint.factor(rate), 0.0)
         tangential = normal * joint.friction(sliding)
@@ -158,6 +160,7 @@ class Dense:
             Q[body : body + 2] += sign * force
             Q[body + 2] += sign * cross(place - q[body : body + 2], force)
         seen = {"gap": gap, "normal": normal, "rate": rate, "tangential": tangential}
+        seen["sliding"] = sliding
         seen["loss"] = (normal - elastic) * rate + tangential * sliding
         if joint.film is not None:
             places = ((journal, centre_j), (bearing, centre_b))

@@ -159,10 +159,11 @@ def energy(scene: Scene, par, q, v, active) -> float:
 
 def energy_residual(scene: Scene, result: Run) -> tuple[float, float]:
     """What the energy balance misses over the run, J, and the energy that passed through."""
-    out, n = result.out, len(result.start) // 2
+    out, n, first = result.out, len(result.start) // 2, scene.bristles
     touching = np.zeros(2)
-    before = energy(scene, result.par, result.start[:n], result.start[n:], touching)
-    after = energy(scene, result.par, result.q[-1], result.v[-1], result.contacts[-1])
+    before = energy(scene, result.par, result.start[first:n], result.start[n + first :], touching)
+    q, v = result.q[-1, first:], result.v[-1, first:]
+    after = energy(scene, result.par, q, v, result.contacts[-1])
     drive, passed, lost, load = (
         float(x) for x in (out.drive_work, out.absolute_drive_work, out.dissipated, out.load_work)
     )

@@ -22,6 +22,14 @@ FRICTIONS = {
     "none": {"law": "none"},
     "coulomb": {"law": "coulomb", "coefficient": 0.05},
     "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
+    "lugre": {
+        "law": "lugre",
+        "coefficient": 0.05,
+        "static_coefficient": 0.08,
+        "stribeck_speed": 0.01,
+        "bristle_stiffness": 1e5,
+        "bristle_damping": 0.1,
+    },
 }
 IDEAL = {"kind": "ideal"}
 OIL = {"viscosity": 1e-3, "length": "20 mm"}
@@ -50,7 +58,8 @@ def allowed(row):
         # closed-form, not integrated: tests/test_ideal.py
         if row.get("drive") == "speed" and row.get("formulation") == "minimal":
             return False
-    return True
+    # bristles have no place among the nine coordinates
+    return row.get("friction") != "lugre" or row.get("formulation") != "baumgarte"
 
 
 TABLE = pairwise_table(FACTORS, allowed)
@@ -211,6 +220,11 @@ CONTRADICTIONS = [
     ({"drive": {**FREE, "torque": 1.0, "speed": 500.0}}, "drive.speed", "no prescribed speed"),
     ({"drive.torque": 1.0}, "drive.torque", "contradicts a prescribed"),
     ({"effects.contact": None}, "effects.contact", "needs a contact law"),
+    (
+        {"effects.friction": FRICTIONS["lugre"], "numerics.formulation": "baumgarte"},
+        "effects.friction.law",
+        "no place for bristles",
+    ),
 ]
 
 

@@ -24,6 +24,13 @@ FRICTIONS = {
     "none": {"law": "none"},
     "coulomb": {"law": "coulomb", "coefficient": 0.05},
     "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
+    "lugre": {
+        "law": "lugre",
+        "coefficient": 0.05,
+        "static_coefficient": 0.08,
+        "stribeck_speed": 0.01,
+        "bristle_stiffness": 1e4,
+    },
 }
 FACTORS = {
     "linkage": NAMES,

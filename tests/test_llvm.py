@@ -98,12 +98,17 @@ MARKERS = {
             par(at.O23.finite + at.FINITE_ROWS - 1),
         },
     ),
+    "lugre": (
+        set(),
+        {par(row) for row in range(at.BRISTLE_STIFFNESS, at.BRISTLE_INVERSE_SPEED + 1)},
+    ),
     "long_film": ({"film"}, {par(at.JOINT_12 + at.FILM_LONG), par(at.JOINT_23 + at.FILM_LONG)}),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {
     "latched": {par(at.JOINT_12 + at.DAMPING)},
     "ambrosio": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
+    "lugre": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
     "series": set(),
     "film": {par(at.JOINT_12 + at.FILM_SHORT), par(at.JOINT_23 + at.FILM_SHORT)},
     "baumgarte": set(),

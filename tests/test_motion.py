@@ -21,6 +21,8 @@ RESTITUTION_FACTOR = 0.4
 MU, RAMP = 0.1, 0.3
 DEAD = 0.05
 FILM = {"short": 8.0, "long": 20.0, "shear": 0.03, "floor": 0.04}
+BRISTLES = {"stiffness": 3e4, "damping": 0.7, "viscous": 0.02, "static": 0.16, "speed": 6.0}
+DEFLECTIONS = np.array([4e-6, -2e-6])  # of the bristles in both joints, m
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
 FULL = {"gravity", "load", "guide", "ledger", "series"}
@@ -35,11 +37,13 @@ MOTIONS = [
     ("two", FULL | {"latched", "ambrosio"}),
     ("two", FULL | {"fixed", "coulomb", "torque"}),
     ("two", FULL | {"latched", "coulomb", "film", "short_film", "long_film"}),
+    ("two", FULL | {"fixed", "lugre", "torque"}),
     ("O12", {"latched", "coulomb"}),
     ("O12", FULL | {"fixed", "ambrosio"}),
     ("O12", FULL | {"latched", "coulomb", "torque"}),
     ("O12", FULL | {"torque", "film", "short_film"}),
     ("O23", {"fixed", "coulomb"}),
+    ("O23", {"fixed", "lugre"}),
     ("O23", FULL | {"fixed", "film", "long_film"}),
     ("O23", FULL | {"latched", "coulomb"}),
     ("O23", FULL | {"fixed", "ambrosio", "torque"}),
@@ -95,12 +99,32 @@ def row_of_parameters(effects, rng):
             base + at.FILM_SHEAR: FILM["shear"],
             base + at.FILM_FLOOR: FILM["floor"],
         }
+    if "lugre" in effects:  # else rows of films of finite length or of nothing
+        values |= {
+            at.BRISTLE_STIFFNESS: BRISTLES["stiffness"],
+            at.BRISTLE_DAMPING: BRISTLES["damping"],
+            at.BRISTLE_VISCOUS: BRISTLES["viscous"],
+            at.BRISTLE_STATIC: BRISTLES["static"],
+            at.BRISTLE_INVERSE_SPEED: 1 / BRISTLES["speed"],
+        }
     for place, value in values.items():
         par[place] = value
     return par
 
 
-def joint_of(effects, par, base, active, impact_speed):
+def deflected(effects):
+    """Deflections of the bristles in the joints that are open."""
+    return DEFLECTIONS[["crank_rod" in effects, "rod_slider" in effects]]
+
+
+def bristle_rate(deflection, sliding):
+    """Rate of a deflection, m/s, by Canudas de Wit's equations."""
+    falls = math.exp(-((sliding / BRISTLES["speed"]) ** 2))
+    held = (MU + (BRISTLES["static"] - MU) * falls) / BRISTLES["stiffness"]
+    return sliding - abs(sliding) / held * deflection
+
+
+def joint_of(effects, par, base, active, impact_speed, deflection):
     def factor(rate):
         if "fixed" in effects:
             return 1 + DAMPING * rate
@@ -112,6 +136,10 @@ def joint_of(effects, par, base, active, impact_speed):
         if "ambrosio" in effects:
             size = min(max((abs(sliding) - DEAD) / RAMP, 0.0), 1.0)
             return MU * math.copysign(size, sliding)
+        if "lugre" in effects:
+            rate = bristle_rate(deflection, sliding)
+            spring, damper = BRISTLES["stiffness"] * deflection, BRISTLES["damping"] * rate
+            return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
     clearance, stiffness = par[base + at.CLEARANCE], par[base + at.CONTACT_STIFFNESS]
@@ -130,7 +158,7 @@ def dense_model(effects, par, contacts, feedback=False):
     ):
         if on(flag):
             joints[name] = joint_of(
-                effects, par, base, contacts[k], 1 / contacts[at.MAX_JOINTS + k]
+                effects, par, base, contacts[k], 1 / contacts[at.MAX_JOINTS + k], DEFLECTIONS[k]
             )
     return Dense(
         CRANK,
@@ -170,8 +198,11 @@ def reduced(effects, values):
 
 
 def seen_by_kernel(effects, par, q, v, contacts, t):
-    """Accelerations and rates of one state from the kernel."""
+    """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
     flags = at.Effects(**dict.fromkeys(effects, 1))
+    if "lugre" in effects:
+        z = deflected(effects)
+        q, v = np.concatenate([np.full(len(z), 7.0), q]), np.concatenate([z, v])
     out = np.zeros((1, len(q) + at.RATES))
     states = np.concatenate([q, v])[None]
     motion = motion_of(flags, 1).address
@@ -230,6 +261,12 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
         a, rates = seen_by_kernel(
             effects, par, reduced(effects, q), reduced(effects, v), contacts, t
         )
+        if "lugre" in effects:
+            seen = [mech.seen[name] for name in ("o12", "o23") if name in mech.seen]
+            pairs = zip(deflected(effects), seen, strict=True)
+            rates_of = [bristle_rate(z, one["sliding"]) for z, one in pairs]
+            np.testing.assert_allclose(a[: len(seen)], rates_of, rtol=1e-10)
+            a = a[len(seen) :]
         expected = reduced(effects, reference)
         np.testing.assert_allclose(a, expected, rtol=1e-10, atol=1e-10 * scale_of(reference))
         check_rates(effects, mech, rates, v)
@@ -261,7 +298,9 @@ def test_power_balance_closes_at_every_instant(topology, effects):
     ("topology", "effects"),
     [
         pytest.param(*case, marks=[] if k % 3 == 2 else pytest.mark.full)
-        for k, case in enumerate([*MOTIONS, ("none", FULL)])
+        for k, case in enumerate(
+            [*(one for one in MOTIONS if "lugre" not in one[1]), ("none", FULL)]
+        )
     ],
     ids=lambda x: x if isinstance(x, str) else "",
 )

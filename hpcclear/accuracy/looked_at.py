@@ -53,6 +53,7 @@ def end_of(scene: Scene, par: Array, q: Array, v: Array, phi: float = TURN) -> t
 
     Of the slider along its guide, or of a linkage's body `ALONG` a direction.
     """
+    q, v = q[scene.bristles :], v[scene.bristles :]
     if scene.is_planar:
         linkage = linkage_of(scene)
         period = float(views.Parameters(par).period)

@@ -33,6 +33,7 @@ def energies(
     tuple of ndarray, shape (m,)
         J.
     """
+    q, v = q[scene.bristles :], v[scene.bristles :]
     if scene.is_planar:
         return _of_linkage(scene, par, q, v, active, turn_time)
     first, second, free = topology(scene)

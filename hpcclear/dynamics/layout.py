@@ -44,6 +44,7 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
+    lugre: Any = None  # friction by bristles, a coordinate for each joint with clearance
 
 
 class Open(NamedTuple):
@@ -57,6 +58,14 @@ class Open(NamedTuple):
     joint_5: Any = None
     joint_6: Any = None
     joint_7: Any = None
+
+
+def bristles_of(effects: Effects) -> int:
+    """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
+
+    A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
+    """
+    return 0 if effects.lugre is None else sum(flag is not None for flag in open_of(effects))
 
 
 def open_of(effects: Effects) -> Open:
@@ -119,6 +128,14 @@ JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
 """First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
+(
+    BRISTLE_STIFFNESS,  # 1/m; these only with bristles, before all others of its own
+    BRISTLE_DAMPING,  # s/m
+    BRISTLE_VISCOUS,  # s/m
+    BRISTLE_STATIC,  # friction over normal force at rest
+    BRISTLE_INVERSE_SPEED,  # s/m, one over Stribeck's
+) = range(OWN, OWN + 5)
+BRISTLE_ROWS = 5
 FINITE = OWN + 192
 """First row of what films of finite length have besides, joint by joint, in scenes that have such a film."""
 FINITE_ROWS = 180

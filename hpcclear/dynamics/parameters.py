@@ -6,11 +6,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bearing import correction
 from hpcclear.dynamics.physics import contact
-from hpcclear.dynamics.planar.problem import parameters_of
+from hpcclear.dynamics.planar.problem import linkage_of, parameters_of
 from hpcclear.scene import Scene
+from hpcclear.scene.effects import LUGRE_ENTRIES
 from hpcclear.scene.points import Points
 
 SAME_LENGTH = 0.01
@@ -57,9 +59,11 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
             block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
             _joint_parameters(scene, get, key, f"{key}.materials", p[:, block:])
             _film_parameters(scene, get, joint, p, block)
+        _bristle_parameters(scene, get, p)
         return p
-    p = np.ones((get.size, at.OWN))
+    p = np.ones((get.size, _own_rows(scene)))
     p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
+    _bristle_parameters(scene, get, p)
     body = {
         name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
     }
@@ -130,6 +134,14 @@ def _joint_parameters(scene: Scene, get: Numbers, key: str, materials: str, p: A
     elif friction.law == "ambrosio" and friction.speeds is not None:
         p[:, at.DEAD_SPEED] = friction.speeds[0]
         p[:, at.INVERSE_RAMP] = 1.0 / (friction.speeds[1] - friction.speeds[0])
+    elif friction.law == "lugre":
+        p[:, at.INVERSE_RAMP] = 0.0
+
+
+def _bristle_parameters(scene: Scene, get: Numbers, p: Array) -> None:
+    """Fill what bristles have besides their joints' rows."""
+    if scene.bristles:
+        bristles.fill({name: get(f"effects.friction.{name}") for name in LUGRE_ENTRIES}, p)
 
 
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
@@ -154,6 +166,18 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
     inertia = sum(get(path) for path in masses) * p[:, at.CRANK_LENGTH] * p[:, at.SPEED] ** 2
     own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SHORT : at.FILM_SHEAR].sum(axis=1) / inertia
+
+
+def _own_rows(scene: Scene) -> int:
+    """Parameters of a sample but for those of films of finite length."""
+    if scene.is_planar:
+        return linkage_of(scene).parameter_rows
+    return at.OWN + (at.BRISTLE_ROWS if scene.bristles else 0)
+
+
+def parameter_rows(scene: Scene) -> int:
+    """Parameters of a sample."""
+    return finite_rows(scene) or _own_rows(scene)
 
 
 def finite_rows(scene: Scene) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.curves import periodic_cells
@@ -19,7 +20,7 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
-from hpcclear.dynamics.parameters import finite_rows, parameters, topology
+from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
@@ -125,7 +126,7 @@ class Problem:
         """The numbers that the stepper's control reads."""
         s = Settings(np.zeros(Settings.size))
         n = self.coordinates
-        length = min(self.atol[:n])
+        length = min(self.atol[at.bristles_of(self.effects) : n])
         s.rtol = self.rtol
         # An impact is located ten times better than positions are integrated, but not below round-off.
         s.gap_tolerance = max(0.1 * length, 4e-15)
@@ -177,13 +178,13 @@ class Problem:
 def coordinate_count(scene: Scene) -> int:
     """Coordinates that are integrated; 0 leaves closed-form kinematics."""
     if scene.is_planar:
-        return (
-            0 if planar.is_prescribed(scene) else len(planar.linkage_of(scene).forest.coordinates)
-        )
+        if planar.is_prescribed(scene):
+            return 0
+        return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
     if scene.numerics.formulation == "baumgarte":
         return 9  # three bodies in the plane
     first, second, free = topology(scene)
-    return {0: 0, 1: 2, 2: 4}[first + second] + free
+    return scene.bristles + {0: 0, 1: 2, 2: 4}[first + second] + free
 
 
 def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
@@ -212,6 +213,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         latched=_flag(contact_law in contact.LATCHED_LAWS),
         coulomb=_flag(friction_law == "coulomb"),
         ambrosio=_flag(friction_law == "ambrosio"),
+        lugre=_flag(friction_law == "lugre"),
         torque=_flag(free),
         torque_table=_flag(free and torque_is_table),
         gravity=_flag(e.gravity > 0.0),
@@ -263,7 +265,8 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     speed = drive.initial_speed if drive.kind == "torque" else drive.speed
     rate = 1e3 * min(1.0, scene.slider_crank.crank.length * abs(speed) / 25.0)
     velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
-    return (*coordinates, *velocities)
+    own = bristles.tolerances(scene, at.TURN / abs(speed))
+    return (*own[0], *coordinates, *own[1], *velocities)
 
 
 def implicit_method(scene: Scene) -> str:
@@ -275,8 +278,8 @@ def implicit_method(scene: Scene) -> str:
     method = scene.numerics.method
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
-    if scene.films():
-        return "stiff"  # a film's damping grows beyond all bounds as it gets thin
+    if scene.films() or scene.bristles:
+        return "stiff"  # a film's damping grows beyond all bounds as it gets thin; bristles give way within a micrometre
     par = Parameters(parameters(scene)[0])
     friction = scene.effects.friction.law
     contact_law = getattr(scene.effects.contact, "law", "hertz")
@@ -368,8 +371,7 @@ def problem_of(
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
         cycle=turns * at.TURN,
-        parameter_rows=finite_rows(scene)
-        or (at.OWN if linkage is None else linkage.parameter_rows),
+        parameter_rows=parameter_rows(scene),
         linkage=linkage,
         curves=curves,
         chosen=scene.objective.joints,

@@ -302,8 +302,11 @@ def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Recor
     accelerations, rates = _observed(problem, par, states, contacts, turn_time)
     ends = np.hstack([steps.q, steps.v])
     at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)[1]
-    n = problem.coordinates
+    n = problem.coordinates - scene.bristles
     works = _works_between(steps, at_steps.powers, k, s)
+    q, v, in_turn, accelerations = (
+        one[:, scene.bristles :] for one in (q, v, in_turn, accelerations)
+    )
     if scene.is_planar:
         seen = Seen(in_turn, v, turn_time, steps.revolution[k], contacts, rates, works)
         return times, planar_series(scene, par, seen), record

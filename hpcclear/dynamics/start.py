@@ -38,6 +38,8 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
     if free or baumgarte:
         q, v = [*q, np.zeros(count)], [*v, p.speed]
     start = Start.at_rest(count)
+    undeflected = [np.zeros(count)] * scene.bristles
+    q, v = [*undeflected, *q], [*undeflected, *v]
     n = len(q)
     if n:
         start.coordinates(n)[:] = np.transpose(q)

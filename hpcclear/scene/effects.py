@@ -75,31 +75,53 @@ class Contact(Table):
         return self.law in LATCHED_LAWS
 
 
+LUGRE_ENTRIES = (
+    "static_coefficient",
+    "stribeck_speed",
+    "bristle_stiffness",
+    "bristle_damping",
+    "viscous_coefficient",
+)
+"""Entries of friction by bristles alone."""
+
+
 class Friction(Table):
     """Tangential force of every clearance joint."""
 
-    law: Literal["none", "coulomb", "ambrosio"] = "none"
+    law: Literal["none", "coulomb", "ambrosio", "lugre"] = "none"
     coefficient: Annotated[float, Quantity("", least=0)] | None = None
-    """Coefficient of friction."""
+    """Coefficient of friction; LuGre: of fast sliding."""
     ramp_speed: Speed | None = None
     """Coulomb: sliding speed below which the force falls linearly to 0, m/s (default 0.01)."""
     speeds: tuple[Annotated[float, Quantity("m/s", least=0)], Speed] | None = None
     """Ambrosio: no friction below the first speed, full friction above the second, m/s."""
+    static_coefficient: Annotated[float, Quantity("", least=0)] | None = None
+    """LuGre: coefficient of friction from which surfaces at rest begin to slide, at least the coefficient."""
+    stribeck_speed: Speed | None = None
+    """LuGre: sliding speed at which friction has fallen from the static coefficient by 63 %, m/s."""
+    bristle_stiffness: Annotated[float, Quantity("1/m", above=0)] | None = None
+    """LuGre: friction over normal force for a metre of deflection, sigma_0 over the normal force, 1/m."""
+    bristle_damping: Annotated[float, Quantity("s/m", least=0)] | None = None
+    """LuGre: the same for a speed of deflection, sigma_1, s/m (default 0)."""
+    viscous_coefficient: Annotated[float, Quantity("s/m", least=0)] | None = None
+    """LuGre: the same for a sliding speed, sigma_2, s/m (default 0)."""
 
     @model_validator(mode="before")
     @classmethod
-    def _default_ramp(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and data.get("law") == "coulomb" and "ramp_speed" not in data:
-            return {**data, "ramp_speed": 0.01}
-        return data
+    def _defaults_of_law(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        defaults = {
+            "coulomb": {"ramp_speed": 0.01},
+            "lugre": {"bristle_damping": 0.0, "viscous_coefficient": 0.0},
+        }
+        return {**defaults.get(str(data.get("law")), {}), **data}
 
     @model_validator(mode="after")
     def _parameters_fit_law(self) -> "Friction":
         if self.law == "none":
-            if (
-                self.coefficient is not None
-                or self.ramp_speed is not None
-                or self.speeds is not None
+            if any(
+                getattr(self, name) is not None for name in type(self).model_fields if name != "law"
             ):
                 raise invalid(
                     'the law "none" has no parameters, and a parameter says that friction is meant',
@@ -116,6 +138,14 @@ class Friction(Table):
                 "coefficient",
                 None,
             )
+        if self.law == "lugre":
+            self._bristles_are_whole(self.coefficient)
+            return self
+        for name in LUGRE_ENTRIES:
+            if getattr(self, name) is not None:
+                raise invalid(
+                    f"the law {self.law!r} has no bristles", 'Remove it, or set law = "lugre"', name
+                )
         if self.law == "coulomb" and self.speeds is not None:
             raise invalid(
                 "the law 'coulomb' has one ramp speed",
@@ -140,6 +170,38 @@ class Friction(Table):
                 "the first speed must be below the second", "Write them in rising order", "speeds"
             )
         return self
+
+    def _bristles_are_whole(self, coefficient: float) -> None:
+        """An error for validators unless LuGre's law has its numbers and no other's."""
+        for name in ("ramp_speed", "speeds"):
+            if getattr(self, name) is not None:
+                raise invalid(
+                    "the law 'lugre' has no ramp: bristles hold at any speed",
+                    "Write stribeck_speed = 0.01 (m/s) and bristle_stiffness = 1e5 (1/m) instead",
+                    name,
+                )
+        for name, example in (
+            ("static_coefficient", f"{1.5 * coefficient:.3g}"),
+            ("stribeck_speed", "0.01 (m/s)"),
+            ("bristle_stiffness", "1e5 (1/m)"),
+        ):
+            if getattr(self, name) is None:
+                raise invalid(
+                    f"the law 'lugre' needs a {name}", f"Add {name} = {example} or so", name, None
+                )
+        static = self.static_coefficient or 0.0
+        if coefficient == 0.0 < static:
+            raise invalid(
+                "friction at rest alone is no law: bristles would give way at once",
+                "Write a coefficient above 0, or static_coefficient = 0 for no friction",
+                "coefficient",
+            )
+        if static < coefficient:
+            raise invalid(
+                f"must be at least the coefficient of sliding ({coefficient:g}): friction falls with speed",
+                "Write the larger of both coefficients here",
+                "static_coefficient",
+            )
 
 
 class GuideFriction(Table):

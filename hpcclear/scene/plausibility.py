@@ -41,11 +41,12 @@ def implausible(scene: SceneTables) -> Iterator[str]:
     effects = scene.effects
     if effects.gravity > 100.0:
         yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
-    if (effects.friction.coefficient or 0.0) > 1.0:
-        yield (
-            f"effects.friction.coefficient = {effects.friction.coefficient:g} is above 1; "
-            "lubricated bearings have 0.001 to 0.1"
-        )
+    for name in ("coefficient", "static_coefficient"):
+        if (getattr(effects.friction, name) or 0.0) > 1.0:
+            yield (
+                f"effects.friction.{name} = {getattr(effects.friction, name):g} is above 1; "
+                "lubricated bearings have 0.001 to 0.1"
+            )
 
 
 def _drive(scene: SceneTables) -> Iterator[str]:

@@ -76,7 +76,7 @@ def check_points(
     ------
     InputError
         If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
-        radius, or a rod is not longer than its crank.
+        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
     """
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
         for path in paths:
@@ -96,6 +96,20 @@ def check_points(
         )
         gap = np.broadcast_to(np.asarray(upper - lower), len(points))
         _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
+
+    if scene.effects.friction.law == "lugre":
+        sliding, static = (
+            np.asarray(entries(scene, points.paths, points.values, f"effects.friction.{name}"))
+            for name in ("coefficient", "static_coefficient")
+        )
+        alone = np.broadcast_to((sliding == 0) & (static > 0), len(points))
+        held = np.broadcast_to(static, len(points))
+        _refuse(
+            alone, held, "static_coefficient", "is friction at rest alone, which is no law", label
+        )
+        less = np.broadcast_to(static - sliding, len(points))
+        reason = "makes friction at rest less than sliding"
+        _refuse(less < 0, less, "static_coefficient - coefficient", reason, label)
 
 
 def _refuse(

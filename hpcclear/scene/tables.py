@@ -123,6 +123,13 @@ class SceneTables(Table):
                 key="effects.friction.law",
                 value=self.effects.friction.law,
             )
+        if self.bristles and not self.is_planar and self.numerics.formulation == "baumgarte":
+            raise invalid(
+                "the nine coordinates of Baumgarte's slider-crank have no place for bristles",
+                'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
+                key="effects.friction.law",
+                value="lugre",
+            )
         return self
 
     @model_validator(mode="after")
@@ -196,6 +203,11 @@ class SceneTables(Table):
         """Oil films by the labels of their joints."""
         tables = {name: self.clearance_joint(name).film for name in self.clearance_joints()}
         return {name: film for name, film in tables.items() if film is not None}
+
+    @property
+    def bristles(self) -> int:
+        """Joints whose friction has bristles, each with a state of its own."""
+        return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""

@@ -100,7 +100,7 @@ def _turned(motion: Motion) -> str:
     frame = forest.frames[drive.body]
     k = forest.index("angle", frame)
     if k is not None:
-        turned = f"work[{at.QS + k} * W + i]"
+        turned = f"work[{motion.coordinates + k} * W + i]"
     else:
         speed = at.SPEED
         if not isinstance(drive, TableDrive):

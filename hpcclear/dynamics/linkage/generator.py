@@ -6,7 +6,7 @@ contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
@@ -59,6 +59,15 @@ class Rows:
     free: int = 0
     curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
 
+    def behind(self, bristles: int) -> "Rows":
+        """The same of a motion whose coordinates come after so many of bristles."""
+        return replace(
+            self,
+            coordinates=self.coordinates + bristles,
+            velocities=self.velocities + bristles,
+            accelerations=self.accelerations + bristles,
+        )
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -79,6 +88,8 @@ class Motion:
         Names of the multipliers.
     curves : mapping
         Rows of tabulated values, by drive or load.
+    coordinates : int
+        Row of the first of the forest's coordinates.
     """
 
     source: str
@@ -88,6 +99,7 @@ class Motion:
     inputs: tuple[str, ...]
     constraints: tuple[str, ...]
     curves: Mapping[str, int] = field(default_factory=dict)
+    coordinates: int = at.QS
 
 
 def generate(
@@ -143,6 +155,7 @@ class _Generator:
             tuple(self.writer.inputs),
             tuple(row.name for row in self.constraints),
             self.rows.curves,
+            self.rows.coordinates,
         )
 
     def _described(self) -> str:

@@ -33,6 +33,8 @@ class Linkage:
         Every body by itself, with multipliers and feedback.
     follow : str
         A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
+    bristled : bool
+        Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
 
     Raises
     ------
@@ -41,14 +43,16 @@ class Linkage:
     """
 
     def __init__(
-        self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = ""
+        self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = "",
+        bristled: bool = False,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
+        self._bristles = len(mechanism.clearances) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
         self._on = On(friction=friction, gravity=gravity, follow=follow)
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
-        self._free = at.OWN
+        self._free = at.OWN + at.BRISTLE_ROWS * bristled
         for ledger in (False, True):
             for series in (False, True):
                 for responses in (False, True):
@@ -72,6 +76,7 @@ class Linkage:
         """A text, in the rows that those before it have taken."""
         if on not in self._texts:
             rows = Rows(parameters=self._given, free=self._free, curves=self.curve_rows)
+            rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
             self._texts[on] = text
             self._take({text.derived.get(name, name): row for name, row in text.parameters.items()})

@@ -14,10 +14,11 @@ import math
 
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.bristles import ratio_of
 from hpcclear.dynamics.linkage.lubrication import film_of, pressed
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.contact import elastic_force, normal_force
-from hpcclear.dynamics.physics.friction import friction_ratio, saturated
+from hpcclear.dynamics.physics.friction import saturated
 
 _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
 
@@ -135,22 +136,16 @@ def joint_force(effects, work, par, joint, relative, i, W):
     arm_bearing = par[(block + at.BEARING_RADIUS) * W + i] + 0.5 * depth
     arm_journal = par[(block + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
     sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
-    coulomb, ambrosio = effects.coulomb, effects.ambrosio
-    ratio = friction_ratio(
-        coulomb,
-        ambrosio,
-        par[(block + at.FRICTION) * W + i],
-        par[(block + at.DEAD_SPEED) * W + i],
-        par[(block + at.INVERSE_RAMP) * W + i],
-        sliding,
-    )
-    tangential = either_product(coulomb, ambrosio, normal, ratio)
-    fx = normal * nx - either_product(coulomb, ambrosio, tangential, ny)
-    fy = normal * ny + either_product(coulomb, ambrosio, tangential, nx)
-    moment_bearing = either_product(coulomb, ambrosio, tangential, arm_bearing)
-    moment_journal = either_product(coulomb, ambrosio, tangential, arm_journal)
+    coulomb = effects.coulomb
+    other = effects.lugre if effects.ambrosio is None else effects.ambrosio
+    ratio = ratio_of(effects, work, par, joint, sliding, i, W)
+    tangential = either_product(coulomb, other, normal, ratio)
+    fx = normal * nx - either_product(coulomb, other, tangential, ny)
+    fy = normal * ny + either_product(coulomb, other, tangential, nx)
+    moment_bearing = either_product(coulomb, other, tangential, arm_bearing)
+    moment_journal = either_product(coulomb, other, tangential, arm_journal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
-    loss = (normal - elastic) * rate + either_product(coulomb, ambrosio, tangential, sliding)
+    loss = (normal - elastic) * rate + either_product(coulomb, other, tangential, sliding)
     oil = film_of(effects, par, joint, relative, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = pressed(

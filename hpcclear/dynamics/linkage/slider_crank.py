@@ -89,12 +89,12 @@ def joints_of(effects: at.Effects) -> tuple[at.Joint, ...]:
 def motion_of(effects: at.Effects) -> Motion:
     """Its text, in the rows of the layout."""
     on = On(
-        friction=bool(effects.coulomb or effects.ambrosio or effects.film),
+        friction=bool(effects.coulomb or effects.ambrosio or effects.lugre or effects.film),
         gravity=bool(effects.gravity),
         ledger=bool(effects.ledger),
         series=bool(effects.series),
         responses=bool(effects.responses),
         follow="slider",
     )
-    rows = Rows(parameters=PARAMETERS, free=at.OWN)
+    rows = Rows(parameters=PARAMETERS, free=at.OWN).behind(at.bristles_of(effects))
     return generate(mechanism_of(effects), on, rows, cartesian=bool(effects.baumgarte), hoist=False)

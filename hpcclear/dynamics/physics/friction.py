@@ -3,6 +3,9 @@
 import math
 
 from hpcclear.base.jit import lane_function
+from hpcclear.dynamics.physics.exponential import falling
+
+_TINY = 1e-300  # keeps bristles that hold nothing from being divided by it
 
 
 @lane_function
@@ -26,3 +29,26 @@ def friction_ratio(coulomb, ambrosio, coefficient, dead_speed, inverse_ramp, sli
         return math.copysign(coefficient * 0.5 * (1.0 + abs(ramp) - abs(ramp - 1.0)), sliding_speed)
     else:
         return 0.0
+
+
+@lane_function
+def stribeck(sliding, static, inverse_speed, speed):
+    """Stribeck's curve: friction over normal force, `static` at rest, `sliding` far beyond the speed 1/`inverse_speed`."""
+    x = speed * inverse_speed
+    return sliding + (static - sliding) * falling(x * x)
+
+
+@lane_function
+def bristle_rate(stiffness, held, deflection, speed):
+    """Rate of the bristles' deflection, m/s, with LuGre's model (Canudas de Wit and others 1995, doi:10.1109/9.376053).
+
+    They are drawn along with the sliding speed (m/s) and give way as they come near `held`/`stiffness`, where steady sliding
+    keeps them; `stiffness`: friction over normal force for a metre; `held`: friction over normal force by `stribeck`.
+    """
+    return speed - stiffness * abs(speed) * deflection / (held + _TINY)
+
+
+@lane_function
+def bristle_ratio(stiffness, damping, viscous, deflection, rate, speed):
+    """Tangential over normal force: the bristles' spring (1/m), their damper (s/m), and what goes with the speed (s/m)."""
+    return stiffness * deflection + damping * rate + viscous * speed

@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
@@ -52,13 +53,16 @@ def linkage_of(scene: Scene) -> Linkage:
     cartesian = scene.numerics.formulation == "baumgarte"
     follow = tables_of(scene).followed or guided(mechanism, cartesian)
     _check_followed(scene, follow)
-    return Linkage(
+    linkage = Linkage(
         mechanism,
         follow=follow,
         gravity=scene.effects.gravity > 0.0,
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
+        bristled=scene.bristles > 0,
     )
+    bristles.check_room(scene, len(linkage.forest.coordinates))
+    return linkage
 
 
 def _check_followed(scene: Scene, follow: str) -> None:
@@ -179,8 +183,11 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     angles = [one.kind == "angle" for one in linkage.forest.coordinates]
     speed = at.TURN / float(period_of(linkage.mechanism)) * driven_length(linkage.mechanism)
     rate = 1e3 * min(1.0, speed / 25.0)
+    first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
     return (
+        *first,
         *(10.0 * a if angle else a for angle in angles),
+        *second,
         *((50.0 if angle else 1.0) * rate * a for angle in angles),
     )
 
@@ -197,11 +204,13 @@ def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
     """
     linkage = linkage_of(scene)
     trees = linkage.forest
+    first = scene.bristles  # which begin undeflected
     n = len(trees.coordinates)
     start = Start.at_rest(len(par))
+    places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
         made: Any = coordinates(trees, put_together(mechanism_of(tables_of(scene))))
-        start.coordinates(n)[:], start.velocities(n)[:] = made
+        places[:], speeds[:] = made
     else:
         for row in range(len(par)):
             try:
@@ -209,7 +218,7 @@ def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
                 made = coordinates(trees, put_together(mechanism_of(tables_of(one))))
             except InputError:
                 made = np.full((2, n), np.nan)
-            start.coordinates(n)[row], start.velocities(n)[row] = made
+            places[row], speeds[row] = made
     _start_contacts(scene, linkage, par, start)
     return start
 
