@@ -22,6 +22,8 @@ import numba
 import numpy as np
 from numba import config, njit
 
+from hpcclear.base.width import features
+
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
 
@@ -89,6 +91,8 @@ def doubles_in_a_vector() -> int:
 # Decided before the first decorator runs; an explicit NUMBA_CACHE_DIR of the user's own wins.
 if not os.environ.get("NUMBA_CACHE_DIR"):
     config.CACHE_DIR = str(cache_folder())
+if config.ENABLE_AVX and config.CPU_NAME is None and config.CPU_FEATURES is None:
+    config.CPU_FEATURES = features(Path(config.CACHE_DIR))
 
 _written: dict[Any, str] = {}
 _apart: set[Any] = set()

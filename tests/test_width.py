@@ -1,0 +1,107 @@
+"""Vectors of 256 or 512 bits: what the trial computes, what is kept of it, and that no result depends on it."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import pytest
+
+from hpcclear.base import width
+from hpcclear.base.errors import InputError
+
+WIDE = llvm.get_host_cpu_features().get("avx512f", False)
+SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
+wide = pytest.mark.skipif(not WIDE, reason="this processor has no vectors of 512 bits")
+
+
+@wide
+def test_both_widths_compute_the_same_bits():
+    found = []
+    for bits in width.WIDTHS:
+        x, y = ((ctypes.c_double * 64)(*[0.5 + k / 64 for k in range(64)]) for _ in "xy")
+        width.compiled(bits)(x, y, 7)
+        found.append(list(y))
+        assert list(y) != [0.5 + k / 64 for k in range(64)]
+    assert found[0] == found[1]
+
+
+@wide
+def test_the_trial_ends_with_one_of_them():
+    assert width.faster() in width.WIDTHS
+
+
+def test_an_answer_is_measured_once(tmp_path):
+    place = tmp_path / "vector-bits"
+    assert width.kept(place, lambda: 512) == 512
+    assert width.kept(place, lambda: pytest.fail("measured again")) == 512
+    place.write_text("1024")
+    assert width.kept(place, lambda: 256) == 256
+    assert list(tmp_path.iterdir()) == [place]
+
+
+def test_of_several_that_measure_the_first_is_followed(tmp_path):
+    place = tmp_path / "vector-bits"
+
+    def meanwhile():
+        place.write_text("256")
+        return 512
+
+    assert width.kept(place, meanwhile) == 256
+
+
+def test_where_nothing_can_be_kept_the_answer_holds(tmp_path):
+    assert width.kept(tmp_path / "missing" / "vector-bits", lambda: 512) == 512
+
+
+@pytest.mark.parametrize("processor", [{"avx2": True}, {"avx512f": False}])
+def test_without_wide_vectors_there_is_nothing_to_choose(processor, monkeypatch, tmp_path):
+    known = llvm.FeatureMap(processor)
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
+    monkeypatch.setattr(width, "faster", lambda: pytest.fail("tried"))
+    assert width.features(tmp_path) is None
+
+
+@pytest.mark.parametrize(("asked", "sign"), [("256", "+"), ("512", "-")])
+def test_a_width_may_be_set(asked, sign, monkeypatch, tmp_path):
+    known = llvm.FeatureMap({"avx512f": True})
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
+    monkeypatch.setattr(width, "faster", lambda: pytest.fail("tried"))
+    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", asked)
+    assert width.features(tmp_path) == f"+avx512f,{sign}prefer-256-bit"
+
+
+def test_another_width_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "128")
+    with pytest.raises(InputError, match="256 or 512"):
+        width.features(tmp_path)
+    answer = subprocess.run(
+        [sys.executable, "-m", "hpcclear", "simulate", SCENE, "-o", tmp_path / "r.nc"],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert answer.returncode == 2
+    assert "HPCCLEAR_VECTOR_BITS" in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+@wide
+@pytest.mark.full
+def test_no_result_depends_on_it(tmp_path):
+    """An ensemble in lanes, and a response by collocation, compiled for each."""
+    files = {}
+    for bits in map(str, width.WIDTHS):
+        settings = {**os.environ, "HPCCLEAR_VECTOR_BITS": bits}
+        out = tmp_path / bits
+        for words in (
+            ["sample", "jobs/quickstart.toml", "--set", "study.samples=64", "-o", out / "samples.nc"],
+            ["simulate", "jobs/slider_crank.toml", "-o", out / "response.nc",
+             "--set", "effects.friction=none", "--set", "numerics.method=lobatto"],
+        ):  # fmt: skip
+            out.mkdir(exist_ok=True)
+            command = [sys.executable, "-m", "hpcclear", *map(str, words)]
+            subprocess.run(command, env=settings, cwd=SCENE.parents[1], check=True, timeout=600)
+        files[bits] = [path.read_bytes() for path in sorted(out.glob("[rs]*.nc"))]
+        assert len(files[bits]) == 2
+    assert files["256"] == files["512"]
