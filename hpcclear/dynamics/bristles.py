@@ -10,6 +10,10 @@ from hpcclear.scene import Scene
 LEAST_RATIO = 1e-3
 """Friction over normal force that the bristles' tolerances stand for where it is less."""
 
+SMOOTH = 1e-299
+"""Steepness of a film that limits no step: with bristles, too, implicit steps go by the exponent of smooth motions. That halves
+them, and leaves f within some 1e-7 and the energy balance within 1e-7 at rtol 1e-6."""
+
 LENGTH = 1e-3
 """m; what the absolute tolerance of lengths refers to."""
 

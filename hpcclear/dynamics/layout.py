@@ -122,7 +122,7 @@ JOINT_BLOCKS = 27  # of all joints, one behind the other
     FILM_LONG,  # 12 mu L R^3/c^3, N s/m
     FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
     FILM_FLOOR,  # least thickness over the clearance
-    FILM_STEEPNESS,  # s/m, of the film's force over that of inertia
+    FILM_STEEPNESS,  # s/m, of the film's force over that of inertia; with bristles next to nothing, but not nothing
 ) = range(14)
 JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS

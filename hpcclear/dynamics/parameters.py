@@ -149,6 +149,7 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     film, own = scene.films().get(joint), p[:, block:]
     own[:, at.FILM_SHORT : at.JOINT_ROWS] = 0.0
     own[:, at.FILM_FLOOR] = 0.5
+    own[:, at.FILM_STEEPNESS] = bristles.SMOOTH if scene.bristles else 0.0
     if film is None:
         return
     key = scene.joint_key(joint)
