@@ -7,6 +7,7 @@ from running import SCENE, energy_residual, run, scene_with
 from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import implicit_method
 from hpcclear.dynamics.views import Parameters
@@ -128,6 +129,14 @@ def test_a_film_that_is_none_is_refused_with_the_reason(entry, value, reason):
     assert caught.value.key == f"joints.crank_rod.film.{entry}"
     assert reason in caught.value.reason
     assert caught.value.remedy
+
+
+def test_a_joint_without_play_has_no_film():
+    """Or implicit steps of the other one would go by the exponent of smooth motions, friction's ramp or not."""
+    rows = parameters(scene_with({"joints.rod_slider": {"kind": "ideal"}}))
+    assert (rows[:, at.JOINT_23 + at.FILM_SHORT : at.JOINT_23 + at.JOINT_ROWS] == 0.0).all()
+    rows = parameters(scene_with({"joints.crank_rod": {"kind": "ideal"}}))
+    assert (rows[:, at.JOINT_12 + at.FILM_SHORT : at.JOINT_12 + at.JOINT_ROWS] == 0.0).all()
 
 
 def test_a_finite_film_is_for_one_length_over_diameter():

@@ -90,6 +90,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     p[:, at.BAUMGARTE_BETA2] = scene.numerics.beta**2
     _outside_parameters(scene, get, p)
     for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
+        p[:, base + at.FILM_SHORT : base + at.JOINT_ROWS] = 0.0
         if joint in scene.clearance_joints():
             key = scene.joint_key(joint)
             _joint_parameters(scene, get, key, key, p[:, base:])
