@@ -81,6 +81,25 @@ PAIRS = [
     ),
     *(
         added(
+            f"wear of both joints, {words}",
+            *(
+                f"joints.{joint}.wear={{length=0.02, {surfaces}}}"
+                for joint in ("crank_rod", "rod_slider")
+            ),
+            f"wear={{profile='angular', harmonics={waves}}}",
+        )
+        for words, surfaces, waves in (
+            ("profile of 3 waves", "bearing={coefficient=1e-15}", 3),
+            ("profile of 4 waves", "bearing={coefficient=1e-15}", 4),
+            (
+                "profile of 3 waves, journals too",
+                "bearing={coefficient=1e-15}, journal={coefficient=1e-15}",
+                3,
+            ),
+        )
+    ),
+    *(
+        added(
             f"{model} oil film of {viscosity}",
             *(
                 f"joints.{joint}.film={{model='{model}', viscosity='{viscosity}', length='{length}'}}"

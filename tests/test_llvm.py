@@ -81,6 +81,11 @@ MARKERS = {
         set(),
         {work(at.RATE_NOW + joint.sliding_power) for joint in (at.O12, at.O23)},
     ),
+    "bearing_waves": ({"waves"}, {par(at.WAVES), par(at.WAVES + 7)}),
+    "profile": (
+        {"waves", "bearing_waves", "wear"},
+        {work(at.RATE_NOW + at.ANGLES), work(at.RATE_NOW + at.ANGLES + 5)},
+    ),
     "film": (
         {"short_film"},
         {

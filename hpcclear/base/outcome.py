@@ -13,6 +13,9 @@ JOINTS = ("crank_rod", "rod_slider")
 MAX_JOINTS = 8
 """Joints that a record has room for; datasets hold those that the scene has."""
 
+WAVE_ROWS = 32
+"""Numbers that profiles around the surfaces of all joints have room for."""
+
 
 class Status(IntEnum):
     """Outcome of one simulation. Numbers are NaN unless it is `valid`."""
@@ -124,7 +127,7 @@ RESPONSES = (
 )
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
-ON_REQUEST = (*RESPONSES, "sliding_work", "energy_error")
+ON_REQUEST = (*RESPONSES, "sliding_work", "sliding_waves", "energy_error")
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
@@ -161,6 +164,11 @@ OUTCOME = np.dtype(
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
+        (
+            "sliding_waves",
+            np.float64,
+            WAVE_ROWS,
+        ),  # likewise, by the contact's angle; NaN unless told
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
         ("kick_growth", np.float64),  # mean logarithm of the growth of a kick per revolution

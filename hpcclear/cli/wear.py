@@ -30,7 +30,7 @@ def describe(found: "Finished") -> int:
         if count and not status.valid:
             rows.append((status.name.lower(), f"{count}: {status.message}. {status.remedy}"))
     rows += [("unsure", text) for text in doubts(content)]
-    rows += [*_ends(content), *_lifetimes(content), *_causes(content)]
+    rows += [*_ends(content), *_lifetimes(content), *_profiles(content), *_causes(content)]
     out.print(table("Wear", rows + _load(found)))
     out.print(f"wear     {found.output}")
     if good.any() or np.isfinite(content["lifetime"]).any():
@@ -78,6 +78,29 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
             low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])
             text = f"{float(one['exceedance']):.3g} (95 % limits {low:.3g} to {high:.3g})"
             rows.append((f"P(clearance {name} > limit)", text))
+    return rows
+
+
+def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
+    """What it makes that surfaces wear where they touch: the largest clearance around, and lives, beside even wear."""
+    if "local_clearance" not in content:
+        return []
+    rows = []
+    for name in content["joint"].to_numpy():
+        last = content.isel(cycle=-1).sel(joint=name)
+        largest, even = (
+            quantity(float(np.nanmedian(last[one])), "m")
+            for one in ("local_clearance", "even_clearance")
+        )
+        rows.append(
+            (f"largest around {name}", f"{largest} at the end; {even} worn evenly (medians)")
+        )
+    if any(name.startswith("limit_") for name in content.attrs):
+        cycles, told = float(content["cycle"][-1]), []
+        for name in ("lifetime_quantile", "even_lifetime_quantile"):
+            value = float(content[name].sel(quantile=0.5))
+            told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
+        rows.append(("median life", f"{told[0]}; {told[1]} worn evenly"))
     return rows
 
 

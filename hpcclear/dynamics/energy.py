@@ -1,9 +1,13 @@
 """The mechanical energy of whole states, and how well a run closed its balance."""
 
+from typing import Any
+
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import baumgarte, geometry
+from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.parameters import topology
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.response import contacts_on, elastic_energy
@@ -52,10 +56,26 @@ def energies(
     for k, is_open in enumerate((first, second)):
         if is_open:
             gap = np.hypot(m.eccentricity_x[:, k], m.eccentricity_y[:, k])
-            gap = np.maximum(gap - p.clearance[..., k], 0.0)
+            direction = np.arctan2(m.eccentricity_y[:, k], m.eccentricity_x[:, k])
+            turns = (m.rod_angle, m.crank_angle if k == 0 else 0.0)
+            gap = gap - p.clearance[..., k] - _depth(scene, par, k, direction, turns)
+            gap = np.maximum(gap, 0.0)
             on = active[:, k] if latched else 1.0
             total = total + 0.4 * p.stiffness[..., k] * on * gap**2.5
     return kinetic, total
+
+
+def _depth(scene: Scene, par: Array, place: int, direction: Array, turns: Any) -> Array | float:
+    """How much wider than round a joint is in a direction (m,), m; `turns`: angles of bearing and journal, rad."""
+    counts = scene.waves()
+    row = at.WAVES + 4 * sum(counts.values()) * place
+    depth: Array | float = 0.0
+    for count, turn in zip(counts.values(), turns, strict=True):
+        for n in range(1, count + 1):
+            angle = n * (direction - turn)
+            depth = depth + par[..., row] * np.cos(angle) + par[..., row + 1] * np.sin(angle)
+            row += 4
+    return depth
 
 
 def _of_linkage(
@@ -66,6 +86,13 @@ def _of_linkage(
     kinetic, potential, eccentricity = linkage.energies(par, q, v, time, scene.effects.gravity)
     p, count = Parameters(par), len(eccentricity)
     gaps = np.hypot(eccentricity[:, 0], eccentricity[:, 1]).T - p.clearance[..., :count]
+    if any(scene.waves().values()):
+        pose = linkage.poses.at(par, q, v, time)[0]
+        angles = {body.name: pose.angle[k] for k, body in enumerate(linkage.mechanism.bodies)}
+        for k, joint in enumerate(linkage.mechanism.clearances):
+            turns = tuple(angles.get(split(one)[0], 0.0) for one in (joint.bearing, joint.journal))
+            direction = np.arctan2(eccentricity[k, 1], eccentricity[k, 0])
+            gaps[:, k] -= _depth(scene, par, k, direction, turns)
     on = contacts_on(scene, active, count)
     return kinetic, kinetic + potential + elastic_energy(p.stiffness[..., :count], gaps, on)
 

@@ -217,6 +217,10 @@ def outcome_records(
         records[name][~(valid & (name in told))] = np.nan
     records["sliding_work"] = sliding_work(outcome) if worn else np.nan
     records["sliding_work"][~valid] = np.nan
+    records["sliding_waves"] = (
+        outcome.profile * (outcome.time / outcome.revolutions)[:, None] if worn else np.nan
+    )
+    records["sliding_waves"][~valid] = np.nan
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1)

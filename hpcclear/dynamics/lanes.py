@@ -21,12 +21,14 @@ from hpcclear.dynamics.implicit.stiff import implicit_code
 from hpcclear.dynamics.linkage.observe import observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
+from hpcclear.dynamics.stepping.profile import profile_code
 from hpcclear.dynamics.stepping.settings import (
     COUNTERS,
     FINISHED,
     MOTION,
     MOTION_OF_EIGHT,
     NEXT_SLOT,
+    PROFILE,
     RECORDED,
     SLOTS,
     numbers_of,
@@ -126,6 +128,8 @@ class Lanes:
             self._codes = (n, Codes(special_code().address, explicit, implicit))
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        if self._rules.profile:
+            self._method.numbers[PROFILE] = profile_code(effects, self.width).address
         self._compiled = (
             True  # last: a stepper must not call what an interrupted compilation left out
         )

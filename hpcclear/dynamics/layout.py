@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hpcclear.base.outcome import MAX_JOINTS
+from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 
 TURN = 6.283185307179586  # rad
 
@@ -40,6 +40,12 @@ class Effects(NamedTuple):
     sliding: Any = None  # sliding speeds, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
+    waves: Any = (
+        None  # surfaces that are out of round; how many waves around bearing and journal have:
+    )
+    bearing_waves: Any = None
+    journal_waves: Any = None
+    profile: Any = None  # where around these the sliding work is done
     film: Any = None  # oil in joints with clearance
     short_film: Any = None
     long_film: Any = None
@@ -73,6 +79,30 @@ def open_of(effects: Effects) -> Open:
     if effects.joints is not None:
         return Open(*[1] * effects.joints)
     return Open(effects.crank_rod, effects.rod_slider)
+
+
+class Waves(NamedTuple):
+    """Where the waves around both surfaces of a joint stand among `WAVE_ROWS`: cosine and sine of one, of two and so on."""
+
+    bearing: int  # first row
+    bearing_count: int
+    journal: int
+    journal_count: int
+
+    def rows(self) -> range:
+        """All of them."""
+        return range(self.bearing, self.journal + 2 * self.journal_count)
+
+
+def waves_of(effects: Effects) -> tuple[Waves, ...]:
+    """Those of each place of joints, up to the last open one."""
+    bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
+    stride = 2 * (bearing + journal)
+    places = [k for k, flag in enumerate(open_of(effects)) if flag is not None]
+    return tuple(
+        Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
+        for k in range(max(places, default=-1) + 1)
+    )
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
@@ -136,7 +166,10 @@ OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
     BRISTLE_INVERSE_SPEED,  # s/m, one over Stribeck's
 ) = range(OWN, OWN + 5)
 BRISTLE_ROWS = 5
-FINITE = OWN + 192
+WAVES = OWN + 192
+"""First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
+of them another, its slope's."""
+FINITE = WAVES + 2 * WAVE_ROWS
 """First row of what films of finite length have besides, joint by joint, in scenes that have such a film."""
 FINITE_ROWS = 180
 PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS
@@ -160,7 +193,13 @@ FOLLOWED_ACCELERATION = (
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
 FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
 SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-RATES = SLIDING_POWERS + MAX_JOINTS
+ANGLES = SLIDING_POWERS + MAX_JOINTS
+"""Of each joint cosine and sine of the contact's angle in the bearing, then in the journal; these and what follows are for
+profiles of wear only, and stand last, so that others need not pass over them."""
+PROFILES = (
+    ANGLES + 4 * MAX_JOINTS
+)  # sliding powers times waves of these angles, in the order of `waves_of`
+RATES = PROFILES + WAVE_ROWS
 
 
 class Integrated(NamedTuple):
@@ -175,6 +214,7 @@ _PLACES = range(MAX_JOINTS)
 GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
 _FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
 _SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
+_PROFILES = tuple(Integrated(PROFILES + k, "profile") for k in range(WAVE_ROWS))
 MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
     Integrated(ABS_DRIVE_POWER, "ledger"),
@@ -186,8 +226,9 @@ MEASURES = (
     Integrated(FOLLOWED_ACROSS, "responses"),
     *_SLIDING,
 )
-INTEGRATED = (*GAPS, *MEASURES)
-"""All that is integrated. The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
+INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
+"""All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
+The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
@@ -326,6 +367,7 @@ START = START_CONTACTS + 2 * MAX_JOINTS
 class Joint(NamedTuple):
     """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
 
+    place: int
     block: int  # of parameters
     finite: int
     gap: int  # rates
@@ -340,8 +382,8 @@ class Joint(NamedTuple):
 
 JOINTS = tuple(
     Joint(
-        JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k, SLIDINGS + k,
-        SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
+        k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
+        SLIDINGS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip
@@ -390,6 +432,7 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
+    profile: Any  # where around joints sliding work is done is told
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`
 
@@ -398,7 +441,7 @@ def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
-    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses)
+    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses, e.profile)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

@@ -36,6 +36,11 @@ class Numbers:
         column = self._columns.get(path)
         return np.full(self.size, self.scene.number(path)) if column is None else column
 
+    def known(self, path: str) -> Array:
+        """The same, 0 of an entry that the scene has not."""
+        there = path in self._columns or path in self.scene.numeric_paths()
+        return self(path) if there else np.zeros(self.size)
+
 
 def topology(scene: Scene) -> tuple[bool, bool, bool]:
     """Whether O12 is open, O23 is open, and the crank is free."""
@@ -47,6 +52,7 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
+    p = _with_waves(scene, get, p) if any(scene.waves().values()) else p
     return _with_finite_films(scene, get, p) if finite_rows(scene) else p
 
 
@@ -179,7 +185,51 @@ def _own_rows(scene: Scene) -> int:
 
 def parameter_rows(scene: Scene) -> int:
     """Parameters of a sample."""
-    return finite_rows(scene) or _own_rows(scene)
+    waves = at.FINITE if any(scene.waves().values()) else 0
+    return finite_rows(scene) or max(_own_rows(scene), waves)
+
+
+def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
+    """With the waves of surfaces that are out of round; of surfaces without they are 0."""
+    rows = np.zeros((len(p), at.FINITE))
+    rows[:, : p.shape[1]] = p
+    for joint in scene.clearance_joints():
+        own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
+        paths = wave_paths(scene, joint)
+        for k in range(len(paths) // 2):
+            cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
+            n = int(paths[2 * k].rpartition("_")[2])
+            own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
+    return rows
+
+
+def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
+    """First row of a joint's waves among `layout.WAVE_ROWS`, and how many.
+
+    Raises
+    ------
+    InputError
+        If there are more than rows.
+    """
+    rows = 2 * sum(scene.waves().values())
+    first = rows * _place(scene, joint)
+    if first + rows > at.WAVE_ROWS:
+        raise InputError(
+            "wear.harmonics" if scene.wear is not None and scene.wear.waves else f"{scene.joint_key(joint)}.out_of_round",
+            rows // 2, f"all joints together have room for {at.WAVE_ROWS // 2} waves",
+            f"Take {at.WAVE_ROWS // 2 // (_place(scene, joint) + 1) // 2} around each surface at most",
+        )  # fmt: skip
+    return first, rows
+
+
+def wave_paths(scene: Scene, joint: str) -> list[str]:
+    """Entries of a joint's waves, in the order of their rows."""
+    return [
+        f"{scene.joint_key(joint)}.out_of_round.{surface}.{part}_{n + 1}"
+        for surface, count in scene.waves().items()
+        for n in range(count)
+        for part in ("cosine", "sine")
+    ]
 
 
 def finite_rows(scene: Scene) -> int:

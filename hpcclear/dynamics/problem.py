@@ -140,6 +140,8 @@ class Problem:
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
         s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
+        last = at.waves_of(self.effects)[-1:]
+        s.profiled = last[0].rows().stop if last and self.effects.profile else 0
         s.chosen = 0.0 if self.chosen else 1.0
         s.chosen[list(self.chosen)] = 1.0
         s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
@@ -203,6 +205,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     friction_law = e.friction.law if count else None
     torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
     load_is_table = isinstance(e.slider_load, tuple)
+    waves = scene.waves()
     models = {film.model for film in scene.films().values()}
     return at.Effects(
         crank_rod=_flag(first),
@@ -225,6 +228,10 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
         wear=_flag(bool(scene.worn_joints())),
+        waves=_flag(any(waves.values())),
+        bearing_waves=waves["bearing"] or None,
+        journal_waves=waves["journal"] or None,
+        profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
         film=_flag(bool(models)),
         short_film=_flag("short" in models),
         long_film=_flag("long" in models),

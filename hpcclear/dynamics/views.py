@@ -130,6 +130,9 @@ class Outcome(View):
     stiff_steps = Column(at.OUT_STIFF_STEPS)
     mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_12))  # N
     sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
+    profile = Column(
+        slice(at.OUT_MEAN + at.place(at.PROFILES), at.OUT_MEAN + len(at.INTEGRATED))
+    )  # W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there
     sliding_work = _of_joints(at.OUT_TOTAL + at.place(at.SLIDING_POWERS))  # J
     peak_moment = Column(at.OUT_MOMENT)  # N m
     acceleration_deviation = Column(
@@ -175,6 +178,7 @@ class Settings(View):
     implicit = Column(settings.IMPLICIT)
     cycle = Column(settings.CYCLE)  # rad
     parameter_rows = Column(settings.PARAMETER_ROWS)
+    profiled = Column(settings.PROFILED)
     chosen = _of_joints(settings.CHOSEN)
     atol = Column(slice(settings.ATOL, settings.SETTINGS))  # all places
     atol_coordinates = Column(slice(settings.ATOL, settings.ATOL + at.MAX_COORDINATES))

@@ -16,10 +16,11 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
-from hpcclear.dynamics.parameters import Numbers
+from hpcclear.dynamics.parameters import Numbers, wave_paths
 from hpcclear.dynamics.wear.curves import Curves, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Asking, Life, Plan, Seen, life
+from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points, saving
@@ -108,16 +109,24 @@ def inputs_of(scene: Scene) -> Points | None:
 
 
 class States:
-    """States of wear as designs: random inputs that do not wear, then clearance and bearing radius of every worn joint."""
+    """States of wear as designs: random inputs that do not wear, then clearance and bearing radius of every worn joint, then,
+    where profiles are followed, the waves around its surfaces."""
 
     def __init__(self, scene: Scene, inputs: Points | None, joints: Joints) -> None:
         own = [f"{scene.joint_key(name)}." for name in scene.worn_joints()]
         changing = [f"{key}{entry}" for key in own for entry in ("clearance", "bearing_radius")]
+        self.relief = relief_of(scene)
+        waves = [path for name in scene.worn_joints() for path in wave_paths(scene, name)]
+        waves = waves if self.relief.size else []
+        changing += waves
         driven = [path for paths in (() if inputs is None else inputs.paths) for path in paths]
         free = [path for path in driven if path not in changing and ".wear." not in path]
         get = Numbers(scene, inputs)
         fixed = [get(path) for path in free]
         self.names = (*free, *changing)
+        self._new = (
+            np.stack([get.known(path) for path in waves], -1) if waves else np.zeros((get.size, 0))
+        )
         self._fixed = np.stack(fixed, axis=-1) if fixed else np.empty((get.size, 0))
         self._joints = joints
 
@@ -129,31 +138,46 @@ class States:
             [clearance * kicks, np.broadcast_to(radius, kicks.shape[:1] + radius.shape)], -1
         )
         fixed = np.repeat(self._fixed[number][None], len(kicks), axis=0)
-        return np.concatenate([fixed, state.reshape(len(kicks), -1)], axis=1)
+        parts = [fixed, state.reshape(len(kicks), -1)]
+        if self.relief.size:
+            worn = np.zeros(self._new.shape[1])
+            if asked.moments is not None:
+                worn = self.relief.waves(self._joints[number], asked.moments).ravel()
+            parts.append(np.repeat((self._new[number] + worn)[None], len(kicks), axis=0))
+        return np.concatenate(parts, axis=1)
 
     def points(self, rows: Array) -> Points:
         """Such designs, shape (n, names), as points."""
         return Points(self.names, rows, tuple((name,) for name in self.names))
 
 
+def relief_of(scene: Scene) -> Relief:
+    """What profiles of wear are made of."""
+    assert scene.wear is not None
+    return Relief(**scene.waves()) if scene.wear.waves else FLAT
+
+
 def follow(
-    scene: Scene, joints: Joints, states: States, ranks: Ranks, checkpoint: Checkpoint
+    scene: Scene,
+    joints: Joints,
+    states: States,
+    ranks: Ranks,
+    checkpoint: Checkpoint,
+    first: int = 0,
 ) -> list[Life]:
-    """All lives to their ends; raises as `sample_points`."""
+    """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
     plan = Plan(
         scene.wear.cycles, scene.wear.tolerance, float(_averaged(scene)), scene.wear.copies,
         scene.wear.most_copies,
     )  # fmt: skip
-    worn = [scene.clearance_joints().index(name) for name in scene.worn_joints()]
-    if not scene.is_planar:
-        worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]
+    relief = relief_of(scene)
+    worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]
     going: dict[int, tuple[Asking, Asked]] = {}
     ended: dict[int, Life] = {}
     for number in range(len(joints.clearance)):
-        asking = life(joints[number], plan)
+        asking = life(joints[number], plan, relief)
         _go_on(number, asking, None, going, ended)
-    first = 0
     while going:
         rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
         design = np.concatenate(rows)
@@ -169,7 +193,9 @@ def follow(
         answers = np.split(records, np.cumsum([len(part) for part in rows])[:-1])
         waiting, going = going, {}
         for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
-            _go_on(number, asking, _seen(answer, worn, len(scene.joint_labels)), going, ended)
+            _go_on(
+                number, asking, _seen(answer, worn, len(scene.joint_labels), relief), going, ended
+            )
     return [ended[number] for number in range(len(joints.clearance))]
 
 
@@ -200,10 +226,14 @@ def _go_on(
         ended[number] = end.value
 
 
-def _seen(records: Records, worn: list[int], joints: int) -> Seen:
+def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> Seen:
+    moments = None
+    if relief.size:
+        rows = [slice(k * relief.size, (k + 1) * relief.size) for k in worn]
+        moments = np.stack([records["sliding_waves"][:, row] for row in rows], axis=1)
     return Seen(
         records["sliding_work"][:, worn], records["objective"],
-        records["peak_contact_force"][:, :joints], records["status"],
+        records["peak_contact_force"][:, :joints], records["status"], moments,
     )  # fmt: skip
 
 
@@ -246,9 +276,14 @@ def run_wear(
             units = dict(zip(named.names, named.units, strict=True))
             checkpoint = session.opened(states.names, units)
             lives = follow(scene, joints, states, ranks, checkpoint)
+            even = None
+            if states.relief.size:  # the same lives, worn evenly, for comparison
+                done = sum(one.simulations for one in lives)
+                evenly = scene.with_({"wear.profile": "uniform"})
+                even = follow(evenly, joints, states, ranks, checkpoint, done)
             with saving(checkpoint.flush):
                 content = session.write(
-                    lives_dataset(scene, inputs, joints, lives, session.attributes)
+                    lives_dataset(scene, inputs, joints, lives, session.attributes, even)
                 )
         session.close()
     return session.finished(content, began)
@@ -263,11 +298,13 @@ def lives_dataset(
     joints: Joints,
     lives: list[Life],
     attributes: dict[str, str],
+    even: list[Life] | None = None,
 ) -> xr.Dataset:
-    """Lives and their statistics as a dataset of kind ``wear``."""
+    """Lives and their statistics as a dataset of kind ``wear``; `even`: the same worn evenly, where profiles were followed."""
     assert scene.wear is not None
-    cycles = ages_of(scene)
-    found = [curves(one, joints[k], cycles) for k, one in enumerate(lives)]
+    cycles, relief = ages_of(scene), relief_of(scene)
+    angles = np.linspace(0.0, 2.0 * np.pi, scene.wear.bins, endpoint=False)
+    found = [curves(one, joints[k], cycles, relief, angles) for k, one in enumerate(lives)]
     labels = len(scene.joint_labels)
     values = {
         "clearance": _stacked(found, "clearance"),
@@ -282,7 +319,8 @@ def lives_dataset(
         ),
     }
     limits = scene.wear.limit.given()
-    ends = np.array([lifetime(one, joints[k], limits) for k, one in enumerate(lives)])
+    ends = np.array([lifetime(one, joints[k], limits, relief) for k, one in enumerate(lives)])
+    local = _stacked(found, "local")
     data: dict[str, Any] = {
         **values,
         "clearance_limit": np.stack([one.limit for one in lives]),
@@ -296,8 +334,11 @@ def lives_dataset(
         "flags": np.array(
             [0 if one.certain else int(Flag.TARGET_MISSED) for one in lives], np.int8
         ),
-        **statistics(values, ends, lives, cycles, limits.get("clearance")),
+        **statistics(values, ends, lives, cycles, limits.get("clearance"), local),
     }
+    if even is not None:
+        data |= {"local_clearance": local, "sharpest": np.array([one.sharpest for one in lives])}
+        data |= _profiles(relief, found, angles) | _evenly(joints, even, cycles, limits)
     names = () if inputs is None else inputs.names
     growth = values["clearance"][:, -1] - values["clearance"][:, 0]
     data["rank_correlation"] = np.array(
@@ -307,11 +348,13 @@ def lives_dataset(
     )
     if inputs is not None:
         data |= {name: inputs.column(name) for name in names}
-    coords = {
+    coords: dict[str, Any] = {
         "life": np.arange(len(lives)), "joint": np.array(scene.worn_joints(), dtype=str),
         "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
         "random_input": np.array(names, dtype=str),
     }  # fmt: skip
+    if even is not None:
+        coords["angle"] = angles
     units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
     words = None if inputs is None else inputs.words
     told = {
@@ -320,6 +363,30 @@ def lives_dataset(
         **{f"limit_{name}": value for name, value in limits.items()},
     }
     return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
+
+
+def _profiles(relief: Relief, found: list[Curves], angles: Array) -> dict[str, Array]:
+    """Quantiles over lives of the depth of both surfaces by the angle, (quantile, cycle, joint, angle), m."""
+    aside = relief.around(_stacked(found, "waves"), angles)
+    mean = {"bearing_profile": "bearing", "journal_profile": "journal"}
+    return {
+        name: quantiles(_stacked(found, surface)[..., None] + aside[..., k, :], LEVELS)
+        for k, (name, surface) in enumerate(mean.items())
+    }
+
+
+def _evenly(
+    joints: Joints, lives: list[Life], cycles: Array, limits: dict[str, float]
+) -> dict[str, Array]:
+    """What lives come to when their surfaces wear evenly."""
+    found = [curves(one, joints[k], cycles) for k, one in enumerate(lives)]
+    ends = np.array([lifetime(one, joints[k], limits) for k, one in enumerate(lives)])
+    return {
+        "even_clearance": _stacked(found, "clearance"),
+        "even_lifetime": ends,
+        "even_lifetime_quantile": quantiles(ends, LEVELS),
+        "even_simulations": np.array([one.simulations for one in lives]),
+    }
 
 
 def doubts(content: xr.Dataset) -> list[str]:
@@ -335,6 +402,13 @@ def doubts(content: xr.Dataset) -> list[str]:
     if moving:
         text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
         texts.append(f"{text}; raise numerics.transient_revolutions")
+    if "sharpest" in content:
+        narrow = int((content["sharpest"] > 1.0).sum())
+        if narrow:
+            texts.append(
+                f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "
+                "lower wear.harmonics"
+            )
     return texts
 
 
@@ -343,11 +417,13 @@ def _stacked(found: list[Curves], name: str) -> Array:
 
 
 def statistics(
-    values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None
-) -> dict[str, Array]:
+    values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None,
+    local: Array | None = None,
+) -> dict[str, Array]:  # fmt: skip
     """Quantiles over lives, survival and exceedance with limits; lives that failed are left out.
 
-    `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit` of the clearance, m.
+    `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit`, m, is what the
+    largest clearance around a joint, `local`, exceeds; the mean where that is not given.
 
     A life whose bearing is worn through counts, with a clearance above any limit from there on.
     """
@@ -369,7 +445,8 @@ def statistics(
         "survival_upper": 1.0 - dead_lower,
     }
     if limit is not None:
-        made |= dict(_exceeded(clearance, limit))
+        largest = clearance if local is None else np.where(gone[..., None], np.inf, local)
+        made |= dict(_exceeded(largest, limit))
     return made
 
 

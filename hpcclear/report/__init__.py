@@ -29,7 +29,7 @@ from hpcclear.report.figures.surrogates import (
     surfaces_figure,
 )
 from hpcclear.report.figures.timing import timing_figure
-from hpcclear.report.figures.wear import fan_figure, survival_figure
+from hpcclear.report.figures.wear import fan_figure, profile_figure, survival_figure
 
 __all__ = [
     "bifurcation_figure",
@@ -45,6 +45,7 @@ __all__ = [
     "penetration_figure",
     "phase_figure",
     "poincare_figure",
+    "profile_figure",
     "response_figure",
     "samples_figure",
     "save",

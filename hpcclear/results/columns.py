@@ -193,7 +193,9 @@ RESPONSE: Columns = {
 SAMPLES: Columns = {
     "sample": count(("sample",), "number of the sample in the design"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
+    "wave": count(("wave",), "number of a wave around a surface, joint by joint: cosine and sine of one, of two and so on"),
     **_outcome("sample"),
+    "sliding_waves": number(("sample", "wave"), "J", "sliding work of a revolution times waves of the contact's angle"),
 }
 
 SENSITIVITY: Columns = {
@@ -386,7 +388,19 @@ WEAR: Columns = {
     "cycle": number(("cycle",), "1", "revolutions since new"),
     "quantile": number(("quantile",), "1", "share of lives that do not exceed"),
     "random_input": text(("random_input",), "random input"),
+    "angle": number(("angle",), "rad", "angle around a surface, in its body"),
     "clearance": number(("life", "cycle", "joint"), "m", "radial clearance", required=True),
+    "local_clearance": number(("life", "cycle", "joint"), "m", "largest clearance around the joint"),
+    "bearing_profile": number(("quantile", "cycle", "joint", "angle"), "m",
+        "quantiles of the depth of wear around the bearing"),
+    "journal_profile": number(("quantile", "cycle", "joint", "angle"), "m",
+        "quantiles of the depth of wear around the journal"),
+    "sharpest": number(("life",), "1", "largest curvature of a groove over that of the clearance circle"),
+    "even_clearance": number(("life", "cycle", "joint"), "m", "clearance of the same life with surfaces that wear evenly"),
+    "even_lifetime": number(("life",), "1",
+        "revolutions until the first limit is passed with surfaces that wear evenly; infinite if none is"),
+    "even_lifetime_quantile": number(("quantile",), "1", "quantiles of the life with surfaces that wear evenly"),
+    "even_simulations": count(("life",), "number of simulations with surfaces that wear evenly"),
     "bearing_depth": number(("life", "cycle", "joint"), "m", "mean depth of wear of the bearing", required=True),
     "journal_depth": number(("life", "cycle", "joint"), "m", "mean depth of wear of the journal", required=True),
     "objective": number(("life", "cycle"), "objective", f"objective f, {MEAN_GAP.words}", required=True),

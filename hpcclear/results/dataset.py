@@ -18,13 +18,24 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS, JUDGED, MAPPED, ON_REQUEST, OUTCOME, STEADY, Status
+from hpcclear.base.outcome import (
+    JOINTS,
+    JUDGED,
+    MAPPED,
+    MAX_JOINTS,
+    ON_REQUEST,
+    OUTCOME,
+    STEADY,
+    WAVE_ROWS,
+    Status,
+)
 from hpcclear.results import netcdf
 from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
 LINKAGE_DIMS = {"body", "point", "pin"}
+FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle"}
 """Coordinates that only a linkage's files have."""
 
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
@@ -81,7 +92,7 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    least = set(table.coords) - LINKAGE_DIMS if whole else set()
+    least = set(table.coords) - FURTHER_DIMS if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
     missing = table.required - set(data)
@@ -224,12 +235,15 @@ def samples_dataset(
     kept = [name for name in OUTCOME.names or () if name not in left_out]
     data |= {name: at_joints(records[name], joints) for name in kept}
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
+    if "sliding_waves" in kept:
+        coords["wave"] = np.arange(WAVE_ROWS)
     return dataset("samples", coords, data, attributes, units, objective, words)
 
 
 def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
     """Values of records at the joints there are, shape (n, joints); of a quantity without joints as they are."""
-    return values[:, : len(joints)] if values.ndim > 1 else values
+    of_joints = values.ndim > 1 and values.shape[1] == MAX_JOINTS
+    return values[:, : len(joints)] if of_joints else values
 
 
 def records(samples: xr.Dataset) -> np.ndarray:
@@ -396,7 +410,7 @@ def _fault(content: xr.Dataset, kind: str | None) -> str | None:
     if kind is not None and found != kind:
         return f"it holds {found}, not {kind}"
     table = KINDS[found]
-    missing = (table.required | (set(table.coords) - LINKAGE_DIMS)) - set(content.variables)
+    missing = (table.required | (set(table.coords) - FURTHER_DIMS)) - set(content.variables)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
     for key, variable in content.variables.items():

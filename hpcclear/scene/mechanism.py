@@ -17,6 +17,7 @@ from hpcclear.scene.fields import (
     invalid,
 )
 from hpcclear.scene.film import Film, check_film
+from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
 
@@ -139,6 +140,8 @@ class ClearanceJoint(Table):
     """How its surfaces wear; left out, they do not."""
     film: Film | None = None
     """Oil between its surfaces; left out, the joint is dry."""
+    out_of_round: OutOfRound | None = None
+    """Waves around its surfaces; left out, they are round."""
 
     @property
     def journal_radius(self) -> float:
@@ -149,6 +152,7 @@ class ClearanceJoint(Table):
     def _journal_fits(self) -> "ClearanceJoint":
         check_journal(self.clearance, self.bearing_radius)
         check_film(self.film, self.clearance, self.bearing_radius)
+        check_waves(self.out_of_round, self.clearance, self.film)
         return self
 
 

@@ -23,6 +23,7 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.mechanism import Material, check_journal
+from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
 Angle = Annotated[float, Quantity("rad")]
@@ -167,11 +168,14 @@ class PlanarClearance(Table):
     """How its surfaces wear; left out, they do not."""
     film: Film | None = None
     """Oil between its surfaces; left out, the joint is dry."""
+    out_of_round: OutOfRound | None = None
+    """Waves around its surfaces; left out, they are round."""
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":
         check_journal(self.clearance, self.bearing_radius)
         check_film(self.film, self.clearance, self.bearing_radius)
+        check_waves(self.out_of_round, self.clearance, self.film)
         return self
 
 

@@ -209,6 +209,20 @@ class SceneTables(Table):
         """Joints whose friction has bristles, each with a state of its own."""
         return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
 
+    def waves(self) -> dict[str, int]:
+        """How many waves bearings and journals have around them at most: in the scene, or as wear makes them."""
+        found = {"bearing": 0, "journal": 0}
+        tables = [self.clearance_joint(name) for name in self.clearance_joints()]
+        for surface in found:
+            shapes = [
+                getattr(t.out_of_round, surface) for t in tables if t.out_of_round is not None
+            ]
+            found[surface] = max((s.given() for s in shapes if s is not None), default=0)
+            worn = [t.wear for t in tables if t.wear is not None and getattr(t.wear, surface)]
+            if self.wear is not None and worn:
+                found[surface] = max(found[surface], self.wear.waves)
+        return found
+
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""
         if isinstance(self.mechanism, Planar):

@@ -1,6 +1,6 @@
 """Wear of a joint with clearance, and the lives that `hpcclear wear` follows, as in the scene file."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
@@ -95,9 +95,20 @@ class Lives(Table):
     """Simulations at a state of wear, kicked by 1e-9 of the clearance: where motion is chaotic they part."""
     most_copies: Annotated[int, Count(2, 1024)] = 32
     """Where the limits of rate and f are wider than the tolerance allows."""
+    profile: Literal["uniform", "angular"] = "uniform"
+    """Where surfaces wear: evenly, or where they touch."""
+    harmonics: Annotated[int, Count(1, 8)] = 3
+    """Waves around a surface that an angular profile is made of; the more, the narrower what a contact wears at a time."""
+    bins: Annotated[int, Count(4, 3600)] = 72
+    """Angles that an angular profile is told at."""
     points: Annotated[int, Count(2, 10**4)] = 41
     """Revolutions that curves are told at."""
     limit: Limits = Limits()
+
+    @property
+    def waves(self) -> int:
+        """Waves around a surface that wears; 0 of one that wears evenly."""
+        return self.harmonics if self.profile == "angular" else 0
 
     @model_validator(mode="after")
     def _copies_in_order(self) -> "Lives":

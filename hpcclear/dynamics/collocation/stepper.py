@@ -17,6 +17,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
+from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -25,6 +26,7 @@ from hpcclear.dynamics.stepping.settings import (
     MAX_STEPS,
     MOTION_OF_EIGHT,
     PARAMETER_ROWS,
+    PROFILE,
     RTOL,
 )
 from hpcclear.dynamics.stepping.stops import integrate_gap, stop_free_crank, wrap_crank
@@ -295,6 +297,8 @@ def advance(n, rules, block, queue, method, record, m, budget):
         goes_on = status == OK
         if goes_on and work[at.ACCEPT] == 1.0:
             record_nodes(record, counters, work, m, book, n)
+            if rules.profile:
+                run_motion(method.numbers[PROFILE], work, tables)
             ended = commit(effects, work, stages, n, 1)
             record_step(record, counters, work, stages, book, n, 1)
             full = no_room(record, counters)

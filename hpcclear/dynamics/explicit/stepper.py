@@ -15,9 +15,10 @@ from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.switching import settle_methods
 from hpcclear.dynamics.implicit.stiff import ask_implicit
+from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.record import record_step
-from hpcclear.dynamics.stepping.settings import CYCLE, GAP_TOLERANCE
+from hpcclear.dynamics.stepping.settings import CYCLE, GAP_TOLERANCE, PROFILE
 from hpcclear.dynamics.stepping.special import END_OF_REVOLUTION, END_OF_STEP, NEXT_SAMPLE, ask
 
 
@@ -100,6 +101,8 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
         if stiff > 0.0:
             ask_implicit(codes.implicit, numbers, block, method, memory, W)
         running += judge_steps(codes.special, rules, n, numbers, block, queue, settings, W)
+        if rules.profile:
+            run_motion(numbers[PROFILE], work, method.tables)
         ended = commit(at.Stepped(rules, method.measures), work, block.stages, n, W)
         full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
         if ended > 0.0:

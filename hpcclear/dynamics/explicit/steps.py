@@ -46,13 +46,13 @@ def start_state(work, n, W):
 
 
 @lane_function
-def adopt_fresh(work, stages, n, W):
+def adopt_fresh(effects, work, stages, n, W):
     """Take over accelerations and rates at the start of the step on fresh lanes of the explicit method only."""
     for i in range(W):
         if work[at.FRESH * W + i] > work[at.STIFF * W + i]:
             for k in range(n):
                 stages[k * W + i] = work[(at.ACC + k) * W + i]
-            for r in range(at.RATES):
+            for r in range(at.PROFILES if effects.rules.profile else at.ANGLES):
                 work[(at.RATE_OLD + r) * W + i] = work[(at.RATE_NOW + r) * W + i]
             work[at.FRESH * W + i] = 0.0
             work[at.EVALUATIONS * W + i] += 1.0
@@ -123,7 +123,7 @@ def take_explicit_steps(effects, motion, step, tables, stiff, W):
         begin_stage(work, effects.rules.free, weights[tab.NODES + s], W)
         run_motion(motion, work, tables)
         if s == 0:
-            adopt_fresh(work, step.stages, step.n, W)
+            adopt_fresh(effects, work, step.stages, step.n, W)
         else:
             weigh_stage(effects, step, s, W)
     step_error(effects, step, W)

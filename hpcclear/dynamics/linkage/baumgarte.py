@@ -31,6 +31,7 @@ from hpcclear.dynamics.linkage.motion import (
     store_power,
     torque_of,
 )
+from hpcclear.dynamics.linkage.roundness import turns_if
 from hpcclear.dynamics.physics.angles import sincos
 
 (X1, Y1, X2, Y2, THETA2, X3, Y3, THETA3, PHI1) = range(9)
@@ -60,10 +61,12 @@ def feedback(par, c, dc, i, W):
 
 
 @lane_function
-def open_joint(flag, effects, work, par, joint, relative, i, W):
+def open_joint(flag, effects, work, par, joint, relative, turns, i, W):
     """Contact and friction of a joint with clearance (see `motion.joint_force`); nothing for an ideal one."""
     if flag is not None:
-        return joint_force(effects, work, par, joint, relative, i, W)
+        return joint_force(
+            effects, work, par, joint, relative, turns_if(effects.waves, turns), i, W
+        )
     else:
         return 0.0, 0.0, 0.0, 0.0, 0.0
 
@@ -124,10 +127,10 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W):
     de23 = (v3 - (vx2 - far * spin * st), work[(at.VS + Y3) * W + i] - (vy2 + far * spin * ct))
     spin3 = work[(at.VS + THETA3) * W + i]
     force_1 = open_joint(
-        crank_rod, effects, work, par, at.O12, (*e12, *de12, omega, spin), i, W
+        crank_rod, effects, work, par, at.O12, (*e12, *de12, omega, spin), (ct, st, c, s), i, W
     )  # fmt: skip
     force_2 = open_joint(
-        rod_slider, effects, work, par, at.O23, (*e23, *de23, spin3, spin), i, W
+        rod_slider, effects, work, par, at.O23, (*e23, *de23, spin3, spin), (ct, st, 1.0, 0.0), i, W
     )  # fmt: skip
     # acceleration of the crank pin but for that of the crank angle
     pin = (rx - crank * c * omega * omega, ry - crank * s * omega * omega)

@@ -41,6 +41,7 @@ class On(NamedTuple):
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     follow: str = ""  # a guided body, or body.point
+    waves: bool = False  # surfaces of the joints with clearance are out of round
 
 
 @dataclass(frozen=True)
@@ -180,16 +181,26 @@ class _Generator:
         relative = ", ".join(
             write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)
         )
+        turns = self._turns(joint) if self.on.waves else "None"
         made = [write.fresh(f"{name}_{joint.name}") for name in ("fx", "fy", "mb", "mj", "loss")]
-        call = f"joint_force(effects, work, par, joints[{k}], ({relative}), i, W)"
+        call = f"joint_force(effects, work, par, joints[{k}], ({relative}), {turns}, i, W)"
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
         self.balance.pulls += [Pull(joint.journal, (-fx, -fy)), Pull(joint.bearing, (fx, fy))]
-        if self.on.friction:
+        if self.on.friction or self.on.waves:
             for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
                 if split(place)[0] != GROUND:
                     self.balance.twists.append(Twist(split(place)[0], moment))
         self.losses.append(loss)
+
+    def _turns(self, joint: Clearance) -> str:
+        """Cosines and sines of the angles of both bodies of a joint, which waves around its surfaces turn with."""
+        kin, found = self.kinematics, []
+        for place in (joint.bearing, joint.journal):
+            body = split(place)[0]
+            own = (ONE, ZERO) if body == GROUND else kin.offset(body)
+            found += [*kin.rotated(self.forest.frames[body], own)]
+        return f"({', '.join(self.writer.text(term) for term in found)})"
 
     def _load(self, load: Force | Torque | Spring) -> None:
         kin, write, power = self.kinematics, self.writer, ZERO

@@ -31,6 +31,8 @@ class Linkage:
         In the joints with clearance: of contact or of a film.
     cartesian : bool
         Every body by itself, with multipliers and feedback.
+    waves : bool
+        Whether surfaces of joints with clearance are out of round.
     follow : str
         A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
     bristled : bool
@@ -44,12 +46,12 @@ class Linkage:
 
     def __init__(
         self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = "",
-        bristled: bool = False,
+        bristled: bool = False, waves: bool = False,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
         self._bristles = len(mechanism.clearances) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
-        self._on = On(friction=friction, gravity=gravity, follow=follow)
+        self._on = On(friction=friction, gravity=gravity, follow=follow, waves=waves)
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN + at.BRISTLE_ROWS * bristled
@@ -65,10 +67,10 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
-        if self._free > at.FINITE:
+        if self._free > at.WAVES:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
-                f"need {self._free - at.OWN} parameters, and there is room for {at.FINITE - at.OWN}",
+                f"need {self._free - at.OWN} parameters, and there is room for {at.WAVES - at.OWN}",
                 "Take fewer bodies or points",
             )  # fmt: skip
 

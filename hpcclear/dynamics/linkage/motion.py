@@ -16,6 +16,12 @@ from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bristles import ratio_of
 from hpcclear.dynamics.linkage.lubrication import film_of, pressed
+from hpcclear.dynamics.linkage.roundness import (
+    less,
+    store_angles,
+    tilted,
+    waves_here,
+)
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.contact import elastic_force, normal_force
 from hpcclear.dynamics.physics.friction import saturated
@@ -102,13 +108,14 @@ def guide_friction(guide, par, speed, reaction, i, W):
 
 @apart
 @lane_function
-def joint_force(effects, work, par, joint, relative, i, W):
+def joint_force(effects, work, par, joint, relative, turns, i, W):
     """Contact, friction and film in one open joint.
 
     `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
-    velocities of journal and bearing. Gap |e| - c, normal force (with a film: the size of both forces) and gap rate go to
+    velocities of journal and bearing; `turns`: cosines and sines of the angles of bearing and journal, for surfaces that
+    are out of round. Gap (|e| - c of round ones), normal force (with a film: the size of both forces) and gap rate go to
     their rows.
-    Returns the force on the bearing (the journal gets the opposite), the moments of friction force and film on
+    Returns the force on the bearing (the journal gets the opposite), the moments of friction force, waves and film on
     bearing and journal about their own centres, and the dissipated power.
     """
     ex, ey, vx, vy, spin_journal, spin_bearing = relative
@@ -119,8 +126,10 @@ def joint_force(effects, work, par, joint, relative, i, W):
     inverse = 1.0 / math.sqrt(square)
     nx = ex * inverse
     ny = ey * inverse
-    gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
-    rate = vx * nx + vy * ny
+    round_gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
+    here = waves_here(effects.waves, effects, par, joint, relative, (nx, ny, inverse), turns, i, W)
+    gap = less(effects.waves, round_gap, here.bearing + here.journal)
+    rate = less(effects.waves, vx * nx + vy * ny, here.widening)
     depth = 0.5 * (gap + abs(gap))
     stiffness = par[(block + at.CONTACT_STIFFNESS) * W + i]
     normal = normal_force(
@@ -133,8 +142,10 @@ def joint_force(effects, work, par, joint, relative, i, W):
         inverse_impact,
     )
     normal = switched(effects.latched, normal, active)
-    arm_bearing = par[(block + at.BEARING_RADIUS) * W + i] + 0.5 * depth
-    arm_journal = par[(block + at.JOURNAL_RADIUS) * W + i] - 0.5 * depth
+    radius = less(effects.waves, par[(block + at.BEARING_RADIUS) * W + i], -here.bearing)
+    arm_bearing = radius + 0.5 * depth
+    radius = less(effects.waves, par[(block + at.JOURNAL_RADIUS) * W + i], here.journal)
+    arm_journal = radius - 0.5 * depth
     sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
     coulomb = effects.coulomb
     other = effects.lugre if effects.ambrosio is None else effects.ambrosio
@@ -144,6 +155,7 @@ def joint_force(effects, work, par, joint, relative, i, W):
     fy = normal * ny + either_product(coulomb, other, tangential, nx)
     moment_bearing = either_product(coulomb, other, tangential, arm_bearing)
     moment_journal = either_product(coulomb, other, tangential, arm_journal)
+    side = tilted(effects.waves, here, (nx, ny, inverse), normal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, other, tangential, sliding)
     oil = film_of(effects, par, joint, relative, (nx, ny, gap), i, W)
@@ -155,7 +167,14 @@ def joint_force(effects, work, par, joint, relative, i, W):
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
     store_rate(effects.wear, work, joint.sliding_power, normal * abs(sliding), i, W)
-    return fx + oil[0], fy + oil[1], moment_bearing + oil[2], oil[3] - moment_journal, loss + oil[4]
+    store_angles(effects, work, joint, here, i, W)
+    return (
+        fx + oil[0] + side[0],
+        fy + oil[1] + side[1],
+        moment_bearing + oil[2] + side[2],
+        oil[3] - moment_journal + side[3],
+        loss + oil[4],
+    )
 
 
 @lane_function

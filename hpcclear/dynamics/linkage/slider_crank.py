@@ -95,6 +95,7 @@ def motion_of(effects: at.Effects) -> Motion:
         series=bool(effects.series),
         responses=bool(effects.responses),
         follow="slider",
+        waves=bool(effects.waves),
     )
     rows = Rows(parameters=PARAMETERS, free=at.OWN).behind(at.bristles_of(effects))
     return generate(mechanism_of(effects), on, rows, cartesian=bool(effects.baumgarte), hoist=False)

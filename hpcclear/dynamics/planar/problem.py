@@ -60,6 +60,7 @@ def linkage_of(scene: Scene) -> Linkage:
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
         bristled=scene.bristles > 0,
+        waves=any(scene.waves().values()),
     )
     bristles.check_room(scene, len(linkage.forest.coordinates))
     return linkage
@@ -125,6 +126,8 @@ def check_columns(scene: Scene, points: Points | None) -> None:
     known = _varied(scene)
     for name, paths in zip(points.names, points.paths, strict=True):
         for path in paths:
+            if ".out_of_round." in path:
+                continue  # noughts of a round surface may be varied
             if path.startswith("mechanism.") and path not in known and scene.number(path) == 0.0:
                 raise InputError(
                     name, 0.0, f"drives {path}, which is nought in this scene: nothing is there to be varied",
@@ -225,7 +228,8 @@ def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
 
 def _moves_start(path: str) -> bool:
     entry = path.split(".")[-1]
-    return path.startswith("mechanism.") and entry not in NOT_GEOMETRY
+    shaped = path.startswith("mechanism.") and ".out_of_round." not in path
+    return shaped and entry not in NOT_GEOMETRY
 
 
 def scene_of(scene: Scene, points: Points, row: int) -> Scene:

@@ -57,7 +57,7 @@ def with_columns(planar: Planar, structure: Mechanism, points: Points) -> Mechan
     tables: Any = planar
     for k, paths in enumerate(points.paths):
         for path in paths:
-            if path.startswith("mechanism."):
+            if path.startswith("mechanism.") and ".out_of_round." not in path:
                 tables = _put(tables, path.split(".")[1:], points.values[:, k])
     return with_numbers(structure, **_tables(tables))
 

@@ -219,6 +219,7 @@ def record_of(
         "point_acceleration_deviation",
         "peak_point_acceleration",
         "sliding_work",
+        "sliding_waves",
     ):
         record[name] = each[name].mean(axis=0)
     if mean.stretch == 1:

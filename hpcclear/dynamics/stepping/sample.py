@@ -14,6 +14,7 @@ from hpcclear.dynamics.stepping.settings import (
     NEXT_SLOT,
     OBJECTIVE_TOLERANCE,
     PARAMETER_ROWS,
+    PROFILED,
     SLOTS,
     SMALLEST_STEP,
     TRANSIENT,
@@ -27,7 +28,7 @@ AVERAGE_CAP = int(Status.AVERAGE_CAP)
 UNFINISHED = -1
 
 JOINTS = at.MAX_JOINTS
-RATES = len(at.INTEGRATED)
+RATES = len(at.INTEGRATED) - at.WAVE_ROWS  # but for profiles of wear
 ACCELERATION = at.place(at.FOLLOWED_ACCELERATION)
 SQUARE = at.place(at.FOLLOWED_SQUARE)
 ACROSS = at.place(at.FOLLOWED_ACROSS)
@@ -79,7 +80,7 @@ def finish(lane, W, n, status, block, queue, settings):
         out[slot, at.OUT_ACTIVE + k] = work[(at.ACTIVE + k) * W + lane]
         out[slot, at.OUT_INVERSE_IMPACT + k] = work[(at.INVERSE_IMPACT + k) * W + lane]
         out[slot, at.OUT_LATCHED + k] = book[(at.LATCHED + k) * W + lane]
-    for r in range(RATES):
+    for r in range(RATES + int(settings[PROFILED])):
         out[slot, at.OUT_TOTAL + r] = book[(at.TOTAL + r) * W + lane]
     count = book[at.COUNT_F * W + lane]
     spread = math.sqrt(book[at.M2_F * W + lane] / (count - 1.0)) if count > 1.0 else math.nan
@@ -98,7 +99,7 @@ def finish_averages(lane, W, work, book, out, slot, settings):
     """Means, peak and deviation over the averaged revolutions; those of rates that no effect asked for mean nothing."""
     time = book[at.TIME_SUM * W + lane]
     if time > 0.0:
-        for r in range(RATES):
+        for r in range(RATES + int(settings[PROFILED])):
             out[slot, at.OUT_MEAN + r] = book[(at.AVERAGED + r) * W + lane] / time
         total = 0.0
         for k in range(JOINTS):
@@ -183,7 +184,7 @@ def book_objective(lane, W, book, f):
 @lane_event
 def book_averages(lane, W, work, book, time, settings):
     """Add a revolution to the books of the averaged ones."""
-    for r in range(RATES):
+    for r in range(RATES + int(settings[PROFILED])):
         integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
         book[(at.AVERAGED + r) * W + lane] += integral
     book[at.TIME_SUM * W + lane] += time
@@ -207,11 +208,13 @@ def end_revolution(lane, W, work, book, settings):
     book[at.REVOLUTION * W + lane] = revolution
     if work[at.AVERAGING * W + lane] == 1.0:
         book_averages(lane, W, work, book, time, settings)
-    for r in range(RATES):
+    for r in range(RATES + int(settings[PROFILED])):
         integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
         book[(at.TOTAL + r) * W + lane] += integral
-    for r in range(at.RATES):
+    for r in range(at.ANGLES):
         work[(at.INTEGRAL + r) * W + lane] = 0.0
+    for r in range(int(settings[PROFILED])):
+        work[(at.INTEGRAL + at.PROFILES + r) * W + lane] = 0.0
     work[at.TIME * W + lane] = 0.0
     for k in range(JOINTS):
         work[(at.ENDED + k) * W + lane] = 0.0

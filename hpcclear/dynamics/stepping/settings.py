@@ -22,8 +22,9 @@ from hpcclear.dynamics import layout as at
     IMPLICIT,  # 0 never, 1 where the motion is stiff, 2 always
     CYCLE,  # rad, by which the driven body turns in a revolution
     PARAMETER_ROWS,  # how many parameters a sample has
+    PROFILED,  # how many rates of profiles of wear there are to integrate
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
-) = range(16)
+) = range(17)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 
@@ -32,14 +33,14 @@ SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 COUNTERS = 4
 
 # ---- numbers by which a stepper asks for what is compiled apart from it
-(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT) = range(8)
-RULES = 8  # the first of them
+(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT, PROFILE) = range(9)
+RULES = 9  # the first of them
 NUMBERS = RULES + len(at.Rules._fields)
 
 
 def numbers_of(rules: at.Rules, width: int, n: int, measures: int) -> Integers:
     """Those of a stepper of `width` lanes, whose motions have no addresses yet."""
-    return np.array([0, 0, 0, width, n, measures, 0, 0, *rules], np.int64)
+    return np.array([0, 0, 0, width, n, measures, 0, 0, 0, *rules], np.int64)
 
 
 @lane_function
@@ -49,9 +50,9 @@ def rules_in(numbers, begin, end):
     if begin is not None:
         return at.Rules(
             numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
-            numbers[r + 5], numbers[r + 6], begin, end,
+            numbers[r + 5], numbers[r + 6], numbers[r + 7], begin, end,
         )  # fmt: skip
     return at.Rules(
         numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
-        numbers[r + 5], numbers[r + 6], numbers[r + 7], numbers[r + 8],
+        numbers[r + 5], numbers[r + 6], numbers[r + 7], numbers[r + 8], numbers[r + 9],
     )  # fmt: skip

@@ -10,6 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import Life
+from hpcclear.dynamics.wear.relief import FLAT, LOOKED_AT, Relief
 
 FINE = 4000
 """Revolutions at which a limit is looked for, between which the curves are straight."""
@@ -17,22 +18,33 @@ FINE = 4000
 
 @dataclass(frozen=True)
 class Curves:
-    """Values at revolutions: (n, worn joints), (n,), and `peak` (n, joints); NaN beyond a life's end."""
+    """Values at revolutions: (n, worn joints), (n,), and `peak` (n, joints); NaN beyond a life's end.
+
+    `clearance` is the mean around a joint, `local` the largest; `waves` (n, worn joints, size) as of `Relief`, m.
+    """
 
     bearing: Array
     journal: Array
     clearance: Array
     objective: Array
     peak: Array
+    local: Array
+    waves: Array
 
 
-def curves(found: Life, joints: Joints, cycles: Array) -> Curves:
-    """A life at revolutions (n,): its work by cubics through the ends of jumps with their rates, the rest straight."""
+def curves(
+    found: Life, joints: Joints, cycles: Array, relief: Relief = FLAT, angles: Array = LOOKED_AT
+) -> Curves:
+    """A life at revolutions (n,): its work by cubics through the ends of jumps with their rates, the rest straight.
+
+    `angles`: where the largest clearance is looked for, rad.
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     if not found.nodes:
         nothing = np.full((len(cycles), len(joints.clearance)), np.nan)
-        return Curves(nothing, nothing, nothing, nothing[:, 0], nothing[:, :0])
+        waves = np.full((*nothing.shape, relief.size), np.nan)
+        return Curves(nothing, nothing, nothing, nothing[:, 0], nothing[:, :0], nothing, waves)
     at = np.array([node.cycle for node in found.nodes])
     work = np.stack([node.work for node in found.nodes])
     if len(at) > 1:
@@ -50,20 +62,37 @@ def curves(found: Life, joints: Joints, cycles: Array) -> Curves:
     peak = np.stack([np.interp(cycles, places, column) for column in peaks.T], axis=-1)
     objective[beyond], peak[beyond] = np.nan, np.nan
     counted = joints.counted(work)
+    waves = relief.waves(joints, _moments(found, joints, counted))
+    clearance = joints.worn(work)[0]
     return Curves(
-        joints.bearing * counted, joints.journal * counted, joints.worn(work)[0], objective, peak
-    )
+        joints.bearing * counted, joints.journal * counted, clearance, objective, peak,
+        clearance + relief.deepest(waves, angles), waves,
+    )  # fmt: skip
 
 
-def lifetime(found: Life, joints: Joints, limits: Mapping[str, float]) -> float:
+def _moments(found: Life, joints: Joints, counted: Array) -> Array:
+    """Moments (n, joints, size), J, by counted work (n, joints): straight between the ends of jumps, as they were made."""
+    at = joints.counted(np.stack([node.work for node in found.nodes]))
+    every = np.stack([node.moments for node in found.nodes])
+    made = np.empty((*counted.shape, every.shape[-1]))
+    for joint, number in np.ndindex(*every.shape[1:]):
+        made[:, joint, number] = np.interp(counted[:, joint], at[:, joint], every[:, joint, number])
+    made[np.isnan(counted)] = np.nan
+    return made
+
+
+def lifetime(
+    found: Life, joints: Joints, limits: Mapping[str, float], relief: Relief = FLAT
+) -> float:
     """Revolutions until a limit is passed ("clearance", "peak_contact_force", "objective"), or the bearing is worn through.
 
+    It is the largest clearance around a joint that passes its limit.
     Infinite where none is passed by the end; NaN of a life that failed before it could show.
     """
     fine = np.linspace(0.0, found.ended, FINE) if found.ended > 0.0 else np.zeros(1)
-    seen = curves(found, joints, fine)
+    seen = curves(found, joints, fine, relief)
     values = {
-        "clearance": seen.clearance, "peak_contact_force": seen.peak, "objective": seen.objective[:, None],
+        "clearance": seen.local, "peak_contact_force": seen.peak, "objective": seen.objective[:, None],
     }  # fmt: skip
     ends = [
         _crossing(fine, column, limit)

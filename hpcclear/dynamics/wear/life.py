@@ -6,6 +6,9 @@ E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). What is gone on fro
 whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
 how far it is, half-way, from the middle between both ends. What limits of E and f leave open is not held against a jump.
 
+Where profiles are followed (`relief`), the moments of the work go with it: of what is done in a jump they have the share
+found at its start, or half-way.
+
 Copies of odd number wait longer before they are measured. Where they differ from the others by more than both scatter, the
 transient is not over: their difference widens the limits, and is told.
 """
@@ -19,6 +22,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.wear.law import Joints
+from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.statistics.random.replicates import student
 
 FIRST_GROWTH = 0.1
@@ -58,24 +62,27 @@ class Seen:
     """What simulations at a state of wear came to.
 
     `work`: sliding work in a revolution of worn joints (copies, joints), J; `objective`: f (copies,); `peak`: peak forces
-    of all joints of the scene (copies, joints), N; `status` (copies,).
+    of all joints of the scene (copies, joints), N; `status` (copies,); `moments`: of the work in a revolution (copies, joints,
+    size), J, as of `Relief`, where profiles are followed.
     """
 
     work: Array
     objective: Array
     peak: Array
     status: Integers
+    moments: Array | None = None
 
 
 @dataclass(frozen=True)
 class Asked:
     """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies.
 
-    Those of odd number are to wait longer.
+    Those of odd number are to wait longer. `moments` as of `Node`.
     """
 
     work: Array
     copies: range
+    moments: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,8 @@ class Node:
 
     `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
     joint of the scene, N; `drift`: difference beyond scatter between copies that waited longer and the others, of the
-    rates and of f (joints + 1,), relative.
+    rates and of f (joints + 1,), relative; `moments`: of what `Joints.counted` says of the work done, (joints, size), J, as of
+    `Relief`; `share` and `share_limit`: of the moments in the rate.
     """
 
     cycle: float
@@ -95,6 +103,9 @@ class Node:
     objective_limit: float
     peak: Array
     drift: Array
+    moments: Array
+    share: Array
+    share_limit: Array
 
 
 @dataclass
@@ -103,7 +114,7 @@ class Life:
 
     `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m; `error`: sum
     over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either half, m; `drift`:
-    the largest of any rate or f at any state.
+    the largest of any rate or f at any state; `sharpest`: as of `Relief`, likewise.
     """
 
     nodes: list[Node]
@@ -114,6 +125,7 @@ class Life:
     error: Array = field(default_factory=lambda: np.zeros(0))
     certain: bool = True
     drift: float = 0.0
+    sharpest: float = 0.0
     simulations: int = 0
 
 
@@ -125,29 +137,34 @@ class _EndedError(Exception):
 
 
 Asking = Generator[Asked, Seen, Life]
+State = tuple[float, Array, Array]
+"""Revolutions, work done (joints,), J, and its moments (joints, size)."""
 
 
-def life(joints: Joints, plan: Plan) -> Asking:
+def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
     """Follow one life; yields what is to be simulated, is sent what came of it, returns the `Life`.
 
     Parameters
     ----------
     joints : Joints, arrays (joints,)
     plan : Plan
+    relief : Relief
+        What profiles are made of; by default surfaces wear evenly.
     """
     nothing = np.zeros(len(joints.clearance))
     found = Life(nodes=[], limit=nothing, error=nothing)
     variance = np.zeros(len(joints.clearance))
     try:
-        here = yield from _look(found, joints, plan, 0.0, np.zeros(len(variance)), None)
+        new = np.zeros((len(variance), relief.size))
+        here = yield from _look(found, joints, plan, relief, (0.0, nothing, new), None)
         found.nodes.append(here)
-        asked = _growing(joints, here, FIRST_GROWTH)
+        asked = _growing(joints, relief, here, FIRST_GROWTH)
         while here.cycle < plan.cycles:
-            asked = min(asked, _growing(joints, here, MOST_GROWTH))
+            asked = min(asked, _growing(joints, relief, here, MOST_GROWTH))
             length = min(asked, plan.cycles - here.cycle)
             if length < min(plan.shortest, plan.cycles - here.cycle):
                 raise _EndedError(Status.JUMP_TOO_SHORT)
-            half, end, error = yield from _jump(found, joints, plan, here, length)
+            half, end, error = yield from _jump(found, joints, plan, relief, here, length)
             asked = length * min(max(_SAFETY / math.sqrt(max(error, 1e-9)), _SHRINK), _GROW)
             if end is not None:
                 found.halves.append(half)
@@ -156,6 +173,7 @@ def life(joints: Joints, plan: Plan) -> Asking:
                 # rates that rise and fall again within a jump are told by its end as well
                 apart = np.maximum(np.abs(half.rate - here.rate), np.abs(end.rate - half.rate))
                 found.error = found.error + joints.grown(here.work, 0.5 * length * apart)
+                found.error = found.error + _shifted(joints, relief, here, half, length)[0]
                 here = end
     except _EndedError as stop:
         found.status = stop.status
@@ -164,18 +182,42 @@ def life(joints: Joints, plan: Plan) -> Asking:
     return found
 
 
-def _growing(joints: Joints, here: Node, growth: float) -> float:
-    """Revolutions in which a clearance grows by that much, relative; no end where nothing wears."""
-    speed = joints.speed(here.work) * here.rate / joints.worn(here.work)[0]
+def _growing(joints: Joints, relief: Relief, here: Node, growth: float) -> float:
+    """Revolutions in which a clearance grows by that much where it does most, relative; no end where nothing wears."""
+    crowded = 1.0 + relief.deepest(relief.waves(joints, here.share)) / np.maximum(
+        joints.slope, 1e-300
+    )
+    speed = crowded * joints.speed(here.work) * here.rate / joints.worn(here.work)[0]
     return growth / float(speed.max()) if speed.max() > 0.0 else math.inf
 
 
+def _moved(joints: Joints, here: Node, share: Array, work: Array) -> Array:
+    """Moments (joints, size), J, once so much work is done, shared out around the surfaces like this."""
+    counted: Array = joints.counted(work) - joints.counted(here.work)
+    return here.moments + share * counted[:, None]
+
+
+def _shifted(
+    joints: Joints, relief: Relief, here: Node, half: Node, length: float
+) -> tuple[Array, Array]:
+    """By how much a jump at once and in two halves differ in what profiles add to the clearance, halved as the difference of
+    their rates is, and what is open of it, m, (joints,)."""
+    work = here.work + length * half.rate
+    apart = 0.5 * (_moved(joints, here, half.share, work) - _moved(joints, here, here.share, work))
+    counted = joints.counted(work) - joints.counted(here.work)
+    open_ = 0.5 * np.hypot(half.share_limit, here.share_limit) * counted[:, None]
+    aside = relief.around(relief.waves(joints, apart))
+    spread: Array = np.sqrt(np.square(relief.waves(joints, open_)).sum(axis=-1))
+    return np.abs(aside).max(axis=-1).sum(axis=-1), spread
+
+
 def _jump(
-    found: Life, joints: Joints, plan: Plan, here: Node, length: float
+    found: Life, joints: Joints, plan: Plan, relief: Relief, here: Node, length: float
 ) -> Generator[Asked, Seen, tuple[Node, Node | None, float]]:
     """Half-way, the end unless the jump is refused, and its error over the tolerance."""
     work = here.work + 0.5 * length * here.rate
-    half = yield from _look(found, joints, plan, here.cycle + 0.5 * length, work, length)
+    state = here.cycle + 0.5 * length, work, _moved(joints, here, here.share, work)
+    half = yield from _look(found, joints, plan, relief, state, length)
     gone = here.work + length * half.rate
     clearance = joints.worn(gone)[0]
     allowed = plan.tolerance * clearance
@@ -184,9 +226,12 @@ def _jump(
         for one in (np.abs(half.rate - here.rate), np.hypot(half.rate_limit, here.rate_limit))
     )
     error = float((np.maximum(apart - open_, 0.0) / allowed).max())
+    shifted, unknown = _shifted(joints, relief, here, half, length)
+    error = max(error, float((np.maximum(shifted - unknown, 0.0) / allowed).max()))
     if error > 1.0:
         return half, None, error
-    end = yield from _look(found, joints, plan, here.cycle + length, gone, length)
+    state = here.cycle + length, gone, _moved(joints, here, half.share, gone)
+    end = yield from _look(found, joints, plan, relief, state, length)
     bent = abs(half.objective - 0.5 * (here.objective + end.objective))
     known = math.sqrt(
         half.objective_limit**2 + 0.25 * (here.objective_limit**2 + end.objective_limit**2)
@@ -209,23 +254,27 @@ def _placed(half: Node, here: Node, end: Node, joints: Joints) -> Node:
 
 
 def _look(
-    found: Life, joints: Joints, plan: Plan, cycle: float, work: Array, length: float | None
+    found: Life, joints: Joints, plan: Plan, relief: Relief, state: State, length: float | None
 ) -> Generator[Asked, Seen, Node]:
-    """Simulate a state of wear until its limits are within what a jump of that length may be off, or copies run out."""
+    """Simulate a state of wear until its limits are within what a jump of that length may be off, or copies run out.
+
+    `state`: revolutions, work done and its moments.
+    """
+    _, work, moments = state
     clearance, radius = joints.worn(work)
     if (clearance >= radius).any():
         raise _EndedError(Status.WORN_THROUGH)
     seen: list[Seen] = []
     done, wanted = 0, plan.copies
     while True:
-        answer = yield Asked(work, range(done, wanted))
+        answer = yield Asked(work, range(done, wanted), moments if relief.size else None)
         found.simulations += wanted - done
         failed = [s for s in answer.status.tolist() if not Status(s).valid]
         if failed:
             raise _EndedError(Status(failed[0]))
         seen.append(answer)
         done = wanted
-        node = _node(cycle, work, seen)
+        node = _node(state, seen)
         # what limit and drift of the rate leave open of the next jump
         if length is None:
             first = FIRST_GROWTH * clearance / np.maximum(node.rate, 1e-300)
@@ -241,21 +290,31 @@ def _look(
         if sure or moving or done >= plan.most_copies:
             found.certain &= bool(sure)
             found.drift = max(found.drift, float(node.drift.max()))
+            found.sharpest = max(
+                found.sharpest, relief.sharpest(relief.waves(joints, moments), clearance)
+            )
             return node
         wanted = min(2 * done, plan.most_copies)
 
 
-def _node(cycle: float, work: Array, seen: list[Seen]) -> Node:
+def _node(state: State, seen: list[Seen]) -> Node:
+    cycle, work, moments = state
     rates = np.concatenate([one.work for one in seen])
     values = np.concatenate([one.objective for one in seen])
     peaks = np.concatenate([one.peak for one in seen])
     every = np.column_stack([rates, values])
     mean, scatter = every.mean(axis=0), every.std(axis=0, ddof=1)
     drift = _drift(every)
-    limit = np.hypot(student(0.95, len(every) - 1) / math.sqrt(len(every)) * scatter, drift)
+    sure = student(0.95, len(every) - 1) / math.sqrt(len(every))
+    limit = np.hypot(sure * scatter, drift)
+    done = [
+        np.zeros((len(s.work), *moments.shape)) if s.moments is None else s.moments for s in seen
+    ]
+    shares = np.concatenate(done) / np.maximum(rates, 1e-300)[..., None]
     return Node(
         cycle, work, mean[:-1], limit[:-1], float(mean[-1]), float(limit[-1]), peaks.mean(axis=0),
-        drift / np.maximum(np.abs(mean), 1e-300),
+        drift / np.maximum(np.abs(mean), 1e-300), moments,
+        shares.mean(axis=0), sure * shares.std(axis=0, ddof=1),
     )  # fmt: skip
 
 

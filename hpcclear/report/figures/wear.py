@@ -86,3 +86,54 @@ def survival_figure(wear: xr.Dataset) -> "Figure":
     panel.legend(loc="lower left")
     style.settle(axes)
     return figure
+
+
+AGES = 4
+"""Ages of a life that profiles are drawn at."""
+
+
+@style.drawn
+def profile_figure(wear: xr.Dataset) -> "Figure":
+    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives.
+
+    Of a dataset of kind ``wear``.
+
+    Raises
+    ------
+    InputError
+        Surfaces wear evenly.
+    """
+    if "bearing_profile" not in wear:
+        raise InputError(
+            "wear.profile", "uniform", "surfaces wear evenly: there is no profile", 'Set it to "angular"'
+        )  # fmt: skip
+    panels = [
+        (str(name), surface, depths)
+        for name in wear["joint"].to_numpy()
+        for surface in ("bearing", "journal")
+        if (depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)).max() > 0.0
+    ]
+    ages = np.unique(np.linspace(0, wear.sizes["cycle"] - 1, AGES + 1).round().astype(int))[1:]
+    rows = max(-(-len(panels) // 2), 1)
+    figure, axes = style.grid(rows, 2, 12.0 + 50.0 * rows, subplot_kw={"projection": "polar"})
+    angle = np.append(wear["angle"].to_numpy(), 2.0 * np.pi)
+    for panel in axes.ravel()[len(panels) :]:
+        panel.remove()
+    for panel, (name, surface, depths) in zip(axes.ravel(), panels, strict=False):
+        scale = labels.scale("m", depths.to_numpy())
+        for shade, one in zip(
+            np.linspace(0.3, 1.0, len(ages)), depths.isel(cycle=ages), strict=True
+        ):
+            value = scale.factor * one.to_numpy()
+            panel.plot(
+                angle, np.append(value, value[0]), color=style.PALETTE["blue"], alpha=shade,
+                label=f"{float(one['cycle']):.3g}",
+            )  # fmt: skip
+        panel.set_title(f"{name}\n{scale.label(surface)}")
+        panel.set_rmin(0.0)
+        panel.tick_params(labelsize=style.SMALL)
+        panel.set_rlabel_position(60.0)
+    if panels:
+        handles, words = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, words, title="revolutions", loc="outside lower center", ncols=AGES)
+    return figure

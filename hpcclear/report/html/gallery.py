@@ -73,6 +73,11 @@ _RESULTS: tuple[Drawing, ...] = (
         wear.survival_figure,
         "Lives that have passed no limit, with 95 % limits (Clopper and Pearson).",
     ),
+    (
+        "wear",
+        wear.profile_figure,
+        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over lives.",
+    ),
     ("timing", timing.timing_figure, "Where the ranks' time went, by rank and by stage."),
 )
 """Kind of file, figure, caption."""

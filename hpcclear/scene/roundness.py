@@ -1,0 +1,72 @@
+"""Surfaces of a joint that are out of round, as in the scene file."""
+
+from hpcclear.scene.fields import Length, Table, invalid
+from hpcclear.scene.film import Film
+
+MOST_WAVES = 8
+"""Around a surface."""
+
+Wave = Length
+
+
+class Waves(Table):
+    """How much deeper than round a surface lies, m: a sum of cosines and sines of whole multiples of the angle in its body.
+
+    The angle is counted from the x axis of the body, a slider-crank's from a link's first joint to its second.
+    """
+
+    cosine_1: Wave = 0.0
+    sine_1: Wave = 0.0
+    cosine_2: Wave = 0.0
+    sine_2: Wave = 0.0
+    cosine_3: Wave = 0.0
+    sine_3: Wave = 0.0
+    cosine_4: Wave = 0.0
+    sine_4: Wave = 0.0
+    cosine_5: Wave = 0.0
+    sine_5: Wave = 0.0
+    cosine_6: Wave = 0.0
+    sine_6: Wave = 0.0
+    cosine_7: Wave = 0.0
+    sine_7: Wave = 0.0
+    cosine_8: Wave = 0.0
+    sine_8: Wave = 0.0
+
+    def given(self) -> int:
+        """The number of the last wave that is not nought."""
+        found = [
+            n for n in range(1, MOST_WAVES + 1)
+            if getattr(self, f"cosine_{n}") or getattr(self, f"sine_{n}")
+        ]  # fmt: skip
+        return max(found, default=0)
+
+    def steepest(self) -> float:
+        """What the depth can come to at most, m."""
+        return sum(abs(getattr(self, name)) for name in type(self).model_fields)
+
+
+class OutOfRound(Table):
+    """Waves around the surfaces of a joint with clearance; one that is left out is round."""
+
+    bearing: Waves | None = None
+    journal: Waves | None = None
+
+
+def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -> None:
+    """An error for validators unless some clearance is left everywhere around, m, and the joint is dry."""
+    if waves is None:
+        return
+    if film is not None:
+        raise invalid(
+            "an oil film is that of round surfaces", "Remove out_of_round, or film",
+            key="out_of_round", value=None,
+        )  # fmt: skip
+    for name in ("bearing", "journal"):
+        own = getattr(waves, name)
+        if own is not None and own.steepest() >= clearance:
+            raise invalid(
+                f"waves come to {own.steepest():g} m, and the clearance is {clearance:g} m: the journal may not fit",
+                "Make them smaller than the clearance",
+                key=f"out_of_round.{name}",
+                value=own.steepest(),
+            )
