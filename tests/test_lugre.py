@@ -12,6 +12,7 @@ from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.physics.exponential import falling
@@ -239,6 +240,23 @@ def test_methods_agree():
         scene = bristled({"numerics.method": method, "numerics.max_steps": 10**7}, 1e-9)
         found[method] = float(run(scene).out.objective)
     assert found == pytest.approx(dict.fromkeys(found, found["dormand-prince"]), rel=1e-8)
+
+
+@pytest.mark.full
+def test_samples_beside_others_have_the_bits_of_single_ones():
+    scene = bristled()
+    rng = np.random.default_rng(0)
+    columns = {
+        ("mechanism.rod.mass",): rng.uniform(0.1, 0.4, 24),
+        ("effects.friction.coefficient",): rng.uniform(0.01, 0.15, 24),
+        ("effects.friction.bristle_stiffness",): 10 ** rng.uniform(3, 7, 24),
+    }
+    points = Points(("m2", "mu", "stiffness"), np.transpose(list(columns.values())), tuple(columns))
+    par = parameters(scene, points)
+    start = start_states(scene, par)
+    together, alone = (Lanes(problem_of(scene), width).run(par, start) for width in (16, 1))
+    assert (alone.status == Status.OK).all()
+    np.testing.assert_array_equal(together.rows, alone.rows)
 
 
 @pytest.mark.full

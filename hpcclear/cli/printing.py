@@ -72,14 +72,18 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         from hpcclear.study import lives  # loads the statistics: not for every command
 
         lives.check(scene)
-    states = 2 * coordinate_count(scene)
+    states = 2 * (coordinate_count(scene) - scene.bristles)
+    bristles = f" + {scene.bristles} deflections of bristles" if scene.bristles else ""
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
     method = integrator_of(scene)
     if (alone := integrator_of(scene, single=True)) != method:
         method += f" ({alone} for a single response)"
     rows += [
-        ("states", f"{states} (positions and velocities) + {open_joints} integrals of the gaps"),
+        (
+            "states",
+            f"{states} (positions and velocities){bristles} + {open_joints} integrals of the gaps",
+        ),
         ("method", f"{method}, rtol {scene.numerics.rtol:g}"),
         (
             "revolutions",
