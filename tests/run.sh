@@ -66,8 +66,8 @@ case $profile in
 full) choice=() ;;
 quick) for name in "${long[@]}"; do choice+=("--ignore=tests/test_$name.py"); done ;;
 esac
-# Two at a time: many tests wait for a compiler or for mpiexec. The limit is for what hangs, on a busy machine too.
-step "tests, serial and under mpiexec" python -m pytest -q --timeout 3600 -n 2 --dist loadfile --no-loadscope-reorder --durations=20 \
+# Three at a time on two cores: many tests wait for mpiexec, for a kill or for a stop. The limit is for what hangs, on a busy machine too.
+step "tests, serial and under mpiexec" python -m pytest -q --timeout 3600 -n 3 --dist loadfile --no-loadscope-reorder --durations=20 \
     ${choice[@]+"${choice[@]}"} ${words[@]+"${words[@]}"}
 if [ "$profile" = full ]; then
     step "job scripts on Slurm" bash tests/slurm/run.sh

@@ -65,6 +65,7 @@ def silent(text: str) -> None:
 # ---- integration ----------------------------------------------------------------------------------
 
 
+@pytest.mark.full  # test_order.py has it of steps of one length
 def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
     profile = Profile(
         **{**vars(TINY), "rungs": tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22))}
