@@ -81,6 +81,7 @@ MARKERS = {
         set(),
         {work(at.RATE_NOW + joint.sliding_power) for joint in (at.O12, at.O23)},
     ),
+    "threshold": ({"wear"}, {par(at.THRESHOLDS), par(at.THRESHOLDS + 3)}),
     "bearing_waves": ({"waves"}, {par(at.WAVES), par(at.WAVES + 7)}),
     "profile": (
         {"waves", "bearing_waves", "wear"},

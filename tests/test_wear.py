@@ -87,6 +87,43 @@ def test_a_journal_that_turns_under_a_constant_load_does_linear_work(revolutions
     assert float(found.out.sliding_power[0]) == pytest.approx(power, rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("threshold", "share"), [(7e5, 0.0), (5e5, 1.0), (500.0 / (8e-4 * 1.05), 0.5)]
+)
+def test_a_pressure_below_the_threshold_does_no_work_that_wears(threshold, share):
+    """The load's pressure is F/(2 R L) = 625 kPa; from a threshold to a tenth more the share that counts goes from 0 to 1."""
+    plain = load_scene(ROTOR).with_({"numerics.transient_revolutions": 60})
+    worn = plain.with_({"mechanism.joints.main.wear.threshold": threshold})
+    (before, after) = (float(run(one).out.sliding_power[0]) for one in (plain, worn))
+    assert after == pytest.approx(share * before, rel=1e-8)
+    assert effects_of(plain).threshold is None
+
+
+def test_work_above_a_threshold_is_that_of_an_independent_integration():
+    """Two joints, one with a threshold that half of its work is below."""
+    threshold = 5e6
+    size = 2.0 * 0.02 * 0.02
+
+    class Above(Sliding):
+        def derivative(self, t, y):
+            found = super().derivative(t, y)
+            (journal, bearing, speeds, spins) = self.ends(t, y)[0]
+            force, _ = self.joints[0].forces(journal, bearing, speeds, spins)
+            n = (journal - bearing) / max(abs(journal - bearing), 1e-300)
+            pressure = abs((force * n.conjugate()).real) / size
+            found[8] *= min(max((pressure / threshold - 1.0) / 0.1, 0.0), 1.0)
+            return found
+
+    scene = scene_with(
+        {**WORN, "joints.crank_rod.wear.threshold": threshold}, rtol=1e-12
+    )  # ends of the ramp fall within steps
+    y, _ = Above(scene.resolved()).run(0, 1, "DOP853", 1e-11)
+    found = run(scene).out.sliding_work
+    np.testing.assert_allclose(found[:2], y[8:], rtol=1e-6)
+    all_of_it = float(run(scene_with(WORN, rtol=1e-11)).out.sliding_work[0])
+    assert 0.1 * all_of_it < found[0] < 0.95 * all_of_it
+
+
 def test_sliding_work_is_told_where_a_joint_wears_and_nothing_else_changes():
     plain = hpcclear.evaluate(scene_with({"effects.contact": HUNT_CROSSLEY}), {"m3": [0.14]})
     worn = hpcclear.evaluate(scene_with(WORN), {"m3": [0.14]})
@@ -115,6 +152,7 @@ def test_wear_is_an_effect_of_scenes_with_a_worn_joint():
             "journal.coefficient",
         ),
         ({"length": 0.02}, "bearing"),
+        ({**WEAR, "threshold": 0.0}, "threshold"),
         ({**WEAR, "running_in": {"factor": 0.5, "work": 1e6}}, "running_in.factor"),
         ({**WEAR, "running_in": {"factor": 2.0, "work": 0.0}}, "running_in.work"),
         ({**WEAR, "running_in": {"factor": 2.0}}, "running_in.work"),

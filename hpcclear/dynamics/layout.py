@@ -45,6 +45,7 @@ class Effects(NamedTuple):
     )
     bearing_waves: Any = None
     journal_waves: Any = None
+    threshold: Any = None  # of the pressure, below which nothing wears
     profile: Any = None  # where around these the sliding work is done
     film: Any = None  # oil in joints with clearance
     short_film: Any = None
@@ -169,7 +170,9 @@ BRISTLE_ROWS = 5
 WAVES = OWN + 192
 """First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
 of them another, its slope's."""
-FINITE = WAVES + 2 * WAVE_ROWS
+THRESHOLDS = WAVES + 2 * WAVE_ROWS
+"""First row of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1."""
+FINITE = THRESHOLDS + 2 * MAX_JOINTS
 """First row of what films of finite length have besides, joint by joint, in scenes that have such a film."""
 FINITE_ROWS = 180
 PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS

@@ -19,6 +19,10 @@ SAME_LENGTH = 0.01
 """By how much length over diameter may differ between samples of a film of finite length, relative: worn bearings are wider."""
 
 
+RAMP = 0.1
+"""Of a threshold of wear, relative: beyond it by so much, all of the force wears."""
+
+
 class Numbers:
     """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
 
@@ -52,7 +56,7 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
-    p = _with_waves(scene, get, p) if any(scene.waves().values()) else p
+    p = _with_waves(scene, get, p) if _has_further(scene) else p
     return _with_finite_films(scene, get, p) if finite_rows(scene) else p
 
 
@@ -185,12 +189,16 @@ def _own_rows(scene: Scene) -> int:
 
 def parameter_rows(scene: Scene) -> int:
     """Parameters of a sample."""
-    waves = at.FINITE if any(scene.waves().values()) else 0
-    return finite_rows(scene) or max(_own_rows(scene), waves)
+    return finite_rows(scene) or (at.FINITE if _has_further(scene) else _own_rows(scene))
+
+
+def _has_further(scene: Scene) -> bool:
+    """Whether there are parameters of waves or of thresholds of wear."""
+    return any(scene.waves().values()) or scene.has_thresholds
 
 
 def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With the waves of surfaces that are out of round; of surfaces without they are 0."""
+    """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
     rows = np.zeros((len(p), at.FINITE))
     rows[:, : p.shape[1]] = p
     for joint in scene.clearance_joints():
@@ -200,7 +208,19 @@ def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
             cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
             n = int(paths[2 * k].rpartition("_")[2])
             own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
+        row = at.THRESHOLDS + 2 * _place(scene, joint)
+        rows[:, row : row + 2] = _share_that_wears(scene, get, joint)
     return rows
+
+
+def _share_that_wears(scene: Scene, get: Numbers, joint: str) -> Array:
+    """Slope, 1/N, and offset of the share of a joint's normal force that wears, shape (samples, 2); 0 and 1 for all of it."""
+    key, wear = scene.joint_key(joint), scene.clearance_joint(joint).wear
+    if wear is None or wear.threshold is None:
+        return np.tile([0.0, 1.0], (get.size, 1))
+    size = 2.0 * get(f"{key}.bearing_radius") * get(f"{key}.wear.length")
+    slope = 1.0 / (RAMP * get(f"{key}.wear.threshold") * size)
+    return np.stack([slope, np.full(get.size, -1.0 / RAMP)], axis=-1)
 
 
 def waves_at(scene: Scene, joint: str) -> tuple[int, int]:

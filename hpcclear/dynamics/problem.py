@@ -231,6 +231,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         waves=_flag(any(waves.values())),
         bearing_waves=waves["bearing"] or None,
         journal_waves=waves["journal"] or None,
+        threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
         film=_flag(bool(models)),
         short_film=_flag("short" in models),

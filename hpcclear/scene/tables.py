@@ -209,6 +209,12 @@ class SceneTables(Table):
         """Joints whose friction has bristles, each with a state of its own."""
         return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
 
+    @property
+    def has_thresholds(self) -> bool:
+        """Whether some joint wears from a pressure on only."""
+        worn = [self.clearance_joint(name).wear for name in self.worn_joints()]
+        return any(wear is not None and wear.threshold is not None for wear in worn)
+
     def waves(self) -> dict[str, int]:
         """How many waves bearings and journals have around them at most: in the scene, or as wear makes them."""
         found = {"bearing": 0, "journal": 0}

@@ -53,6 +53,8 @@ class Wear(Table):
     bearing: WornSurface | None = None
     journal: WornSurface | None = None
     running_in: RunningIn | None = None
+    threshold: Annotated[float, Quantity("Pa", above=0)] | None = None
+    """Pressure (normal force over diameter times length) that wears nothing, Pa; from a tenth more on all of it counts."""
 
     @model_validator(mode="after")
     def _something_wears(self) -> "Wear":

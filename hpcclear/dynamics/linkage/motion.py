@@ -166,7 +166,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
-    store_rate(effects.wear, work, joint.sliding_power, normal * abs(sliding), i, W)
+    wearing = force_that_wears(effects.threshold, par, joint, normal, i, W)
+    store_rate(effects.wear, work, joint.sliding_power, wearing * abs(sliding), i, W)
     store_angles(effects, work, joint, here, i, W)
     return (
         fx + oil[0] + side[0],
@@ -175,6 +176,17 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
         oil[3] - moment_journal + side[3],
         loss + oil[4],
     )
+
+
+@lane_function
+def force_that_wears(threshold, par, joint, normal, i, W):
+    """The normal force, or 0 where its pressure is below a threshold, with a ramp between."""
+    if threshold is not None:
+        row = at.THRESHOLDS + 2 * joint.place
+        share = par[row * W + i] * normal + par[(row + 1) * W + i]
+        return normal * (0.5 * (1.0 + abs(share) - abs(share - 1.0)))
+    else:
+        return normal
 
 
 @lane_function
