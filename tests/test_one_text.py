@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hpcclear.base.alike import written_once
 from hpcclear.base.jit import lane_function, scalar_function, written_kind
 from hpcclear.base.one_text import one_text, text_of
+from hpcclear.base.text.alike import written_once
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import written_by

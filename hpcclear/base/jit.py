@@ -32,8 +32,10 @@ def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
     parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
     parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
-    writers = ("alike.py", "one_text.py", "outcome.py", "unrolled.py")
-    return sorted(parts | {root / "base" / name for name in writers})
+    parts |= set((root / "base" / "text").glob("*.py"))
+    return sorted(
+        parts | {root / "base" / name for name in ("one_text.py", "outcome.py", "unrolled.py")}
+    )
 
 
 @cache
