@@ -164,6 +164,14 @@ def test_all_mechanisms_share_a_stepper():
     assert len(steppers) == 1
 
 
+def test_lanes_begin_where_a_line_of_the_cache_does():
+    """Of any width; else every vector is fetched from two lines, or none is, by chance."""
+    for width in (1, 4, 32):
+        lanes = Lanes(problem_of(scene_with()), width)
+        assert lanes._block.work.ctypes.data % 64 == 0
+        assert (lanes._block.work == 0.0).all()
+
+
 def test_no_stepper_names_a_rate_of_its_own():
     """A rate is one entry of `layout.INTEGRATED` and its formula in the motion."""
     names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
