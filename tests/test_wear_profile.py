@@ -260,6 +260,8 @@ def test_the_work_of_a_journal_at_rest_is_done_in_one_place():
           "joints.crank_rod.film": {"viscosity": 1e-3, "length": 0.02, "model": "short"}},
          "joints.crank_rod.out_of_round"),
         ({"wear": {"profile": "lumpy"}}, "wear.profile"),
+        ({"wear": {"profile": "angular"}, "joints.crank_rod.wear": WEAR,
+          "joints.crank_rod.film": {"viscosity": 1e-3, "length": 0.02, "model": "short"}}, "wear.profile"),
         ({"wear": {"harmonics": 0}}, "wear.harmonics"),
     ],
 )  # fmt: skip

@@ -8,7 +8,7 @@ import xarray as xr
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import _load, console, table
-from hpcclear.ensemble.wear import doubts
+from hpcclear.ensemble.lives import doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
 

@@ -133,6 +133,18 @@ class SceneTables(Table):
         return self
 
     @model_validator(mode="after")
+    def _profiles_are_of_dry_joints(self) -> Self:
+        oiled = [name for name in self.worn_joints() if name in self.films()]
+        if self.wear is not None and self.wear.waves and oiled:
+            raise invalid(
+                f"joint {oiled[0]} carries oil, and a film is that of round surfaces",
+                'Set it to "uniform", or remove the film',
+                key="wear.profile",
+                value=self.wear.profile,
+            )
+        return self
+
+    @model_validator(mode="after")
     def _objective_s_joints_are_there(self) -> Self:
         chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
         clearance = self.clearance_joints()
