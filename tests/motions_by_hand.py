@@ -59,6 +59,7 @@ def two_open(effects, work, par, phi, omega, i, W):
             omega,
             spin,
         ),
+        None,
         i,
         W,
     )
@@ -75,6 +76,7 @@ def two_open(effects, work, par, phi, omega, i, W):
             0.0,
             spin,
         ),
+        None,
         i,
         W,
     )
@@ -135,6 +137,7 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
             omega,
             spin,
         ),
+        None,
         i,
         W,
     )
@@ -201,6 +204,7 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
             0.0,
             spin,
         ),
+        None,
         i,
         W,
     )

@@ -36,7 +36,7 @@ def plain(function, made=None):
 def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
     return tuple(
-        at.Joint(10 * k, 0, *(FREE + 20 * k + j - at.RATE_NOW for j in range(6)),
+        at.Joint(k, 10 * k, 0, *(FREE + 20 * k + j - at.RATE_NOW for j in range(6)),
                  FREE + 20 * k + 6, FREE + 20 * k + 7)
         for k, _ in enumerate(mechanism.clearances)
     )  # fmt: skip

@@ -20,7 +20,7 @@ def ratio_of(effects, work, par, joint, sliding, i, W):
     """
     if effects.lugre is not None:
         only_second = effects.crank_rod is None and effects.rod_slider is not None
-        number = joint.gap - at.GAP - (1 if only_second else 0)
+        number = joint.place - (1 if only_second else 0)
         stiffness = par[at.BRISTLE_STIFFNESS * W + i]
         deflection = work[(at.VS + number) * W + i]
         held = stribeck(
