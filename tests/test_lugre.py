@@ -9,13 +9,13 @@ from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
 from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
+from hpcclear.base.bits import falling
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.physics.exponential import falling
 from hpcclear.dynamics.physics.friction import bristle_rate, bristle_ratio, stribeck
 from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.dynamics.start import start_states

@@ -2,8 +2,8 @@
 
 import math
 
+from hpcclear.base.bits import falling
 from hpcclear.base.jit import lane_function
-from hpcclear.dynamics.physics.exponential import falling
 
 _TINY = 1e-300  # keeps bristles that hold nothing from being divided by it
 

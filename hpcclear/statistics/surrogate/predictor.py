@@ -2,13 +2,13 @@
 
 Everything runs along the training points, the one long dimension, so that a design's result does
 not depend on which other designs are in the batch. Numba has no vectorised exponential of its own;
-the polynomial one below lets LLVM keep these loops in vector registers.
+the polynomial one of `hpcclear.base.bits` lets LLVM keep these loops in vector registers.
 """
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
+from numba import njit
+
+from hpcclear.base.bits import falling
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
@@ -20,54 +20,10 @@ LANES = 8
 """Training points are padded to a multiple of this, so that vectorised loops have no tail."""
 
 
-@intrinsic
-def _bits_as_float(typingctx, bits):  # type: ignore[no-untyped-def]
-    """The float64 with these 64 bits."""
-
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), codegen
-
-
-@intrinsic
-def _float_as_bits(typingctx, value):  # type: ignore[no-untyped-def]
-    """The 64 bits of a float64."""
-
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), codegen
-
-
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def gaussian(square: float) -> float:
-    """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise.
-
-    Range reduction to |r| <= ln(2)/2 and a Taylor polynomial of degree 13; the power of two is put
-    together from its bits. Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits.
-    """
-    x = -min(0.5 * square, STEEPEST)
-    shifted = x * 1.4426950408889634 + 6755399441055744.0
-    power = shifted - 6755399441055744.0
-    r = x - power * 0.6931471803691238
-    r = r - power * 1.9082149292705877e-10
-    p = 1.6059043836821613e-10
-    p = p * r + 2.08767569878681e-09
-    p = p * r + 2.505210838544172e-08
-    p = p * r + 2.755731922398589e-07
-    p = p * r + 2.7557319223985893e-06
-    p = p * r + 2.48015873015873e-05
-    p = p * r + 0.0001984126984126984
-    p = p * r + 0.001388888888888889
-    p = p * r + 0.008333333333333333
-    p = p * r + 0.041666666666666664
-    p = p * r + 0.16666666666666666
-    p = p * r + 0.5
-    p = p * r + 1.0
-    p = p * r + 1.0
-    bits: int = _float_as_bits(shifted)  # type: ignore[call-arg]
-    return p * _bits_as_float((bits + 1023) << 52)  # type: ignore[call-arg]
+    """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise."""
+    return falling(0.5 * square, STEEPEST)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
