@@ -106,7 +106,8 @@ WORN = {"joints.crank_rod.wear": {"length": 0.02, "journal": {"coefficient": 1e-
 
 
 def test_what_is_asked_for_is_in_the_file():
-    records = evaluate_records(asking({"numerics.energy": True, **WORN}), NOTHING, lanes=1)
+    everything = {"numerics.energy": True, **WORN, "wear": {"profile": "angular"}}
+    records = evaluate_records(asking(everything), NOTHING, lanes=1)
     content = dataset.samples_dataset((), np.empty((1, 0)), {}, records)
     asked_for = {name for name in ON_REQUEST if "point" not in name}  # no point is followed
     assert asked_for <= set(content.data_vars) <= set(KINDS["samples"].data)
