@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
+from hpcclear.cli.printing import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
@@ -332,3 +333,11 @@ def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
             load_scene({**content, table: value})
     with pytest.raises(InputError, match="belongs to a slider-crank"):
         rocker("effects.slider_load=3")
+
+
+def test_what_a_sample_of_a_linkage_costs_is_told(capsys):
+    """`check` measures it, with whatever mass there is."""
+    describe_scene(load_scene(LINKAGES / "crank_rocker.toml"), cost=True)
+    told = capsys.readouterr().out
+    assert "time a sample" in told
+    assert "all samples" in told

@@ -173,8 +173,8 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     from hpcclear.dynamics.evaluator import DEFAULT_LANES
     from hpcclear.scene.points import Points
 
-    path = "mechanism.slider.mass"
-    columns = Points(("m3",), np.full((DEFAULT_LANES, 1), scene.number(path)), ((path,),))
+    path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))
+    columns = Points(("mass",), np.full((DEFAULT_LANES, 1), scene.number(path)), ((path,),))
     start = time.perf_counter()
     record = evaluate_records(scene, columns)[0]
     first = time.perf_counter() - start

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
@@ -95,8 +96,10 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
 
 def _steady(scene: Scene, response: xr.Dataset, name: str) -> xr.Dataset:
     """The response after its transient."""
-    if int(response["status"]) != 0:
-        raise InputError("responses", name, "its simulation failed", "Look at it with simulate")
+    status = Status(int(response["status"]))
+    if status is not Status.OK:
+        reason = f"its simulation ended as {status.name.lower()}: {status.message}"
+        raise InputError("responses", name, reason, status.remedy)
     turn = 2.0 * np.pi * scene.numerics.transient_revolutions
     return response.isel(time=np.flatnonzero(response["crank_angle"].to_numpy() >= turn - 1e-9))
 
