@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if any is red.
-#   bash tests/run.sh           short profile, under 15 minutes on two cores
+#   bash tests/run.sh           short profile, some 20 minutes on two cores with nothing compiled
 #   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
 #   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
 # --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:
