@@ -1,10 +1,20 @@
 """What revolutions of copies say: periods, limits, spin-up, drift. On series that are known."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import stats
 
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import judging
+from hpcclear.dynamics.steady.copies import scales
+from hpcclear.dynamics.steady.effort import Sample
+from hpcclear.dynamics.steady.procedure import loosest
+from hpcclear.scene import load_scene
+
+JOBS = Path(__file__).parent.parent / "jobs"
 
 RNG_SEEDS = range(400)
 
@@ -109,3 +119,19 @@ def test_the_projection_has_the_objective_for_its_mean():
     gaps = np.random.default_rng(3).uniform(0.5, 1.5, (5, 8, 2))
     mean = gaps.reshape(-1, 2).mean(axis=0)
     assert judging.projected(gaps).mean() == pytest.approx(np.hypot(*mean), rel=1e-14)
+
+
+@pytest.mark.parametrize(("play", "share"), [(3e-4, 1.0), (1e-4, 1.0), (2e-5, 0.2)])
+@pytest.mark.parametrize(("job", "usual"), [("hunt_crossley", 1e-5), ("slider_crank", 1e-6)])
+def test_chaotic_means_begin_at_a_tolerance_that_the_play_allows(job, usual, play, share):
+    """The smaller of the two plays counts; a damping that keeps the impact speed asks for more."""
+    scene = load_scene(JOBS / f"{job}.toml").with_({"joints.rod_slider.clearance": play})
+    par = parameters(scene)
+    sample = Sample(par, start_states(scene, par), scales(scene), job == "slider_crank", False)
+    assert loosest(sample) == pytest.approx(share * usual, rel=1e-12)
+
+
+def test_a_joint_without_play_asks_for_nothing():
+    scene = load_scene(JOBS / "hunt_crossley.toml").with_({"joints.rod_slider": {"kind": "ideal"}})
+    par = parameters(scene)
+    assert loosest(Sample(par, start_states(scene, par), scales(scene), False, False)) == 1e-5

@@ -12,9 +12,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
@@ -681,3 +683,14 @@ def test_what_copies_disagree_on_cannot_be_told():
     verdict, text = claims.ResponseEvidence({"names": names, "statistics": series}).judged(wanted)
     assert verdict == claims.OPEN
     assert re.search(r"told from 0 beyond \d+\.\d %", text)
+
+
+def test_a_response_that_fails_says_how_it_ended():
+    response = xr.Dataset({"status": int(Status.STEP_CAP)})
+    with pytest.raises(InputError, match="step_cap") as refused:
+        responses._steady(
+            load_scene(pathlib.Path(__file__).parent.parent / "jobs" / "slider_crank.toml"),
+            response,
+            "original",
+        )
+    assert Status.STEP_CAP.remedy in str(refused.value)

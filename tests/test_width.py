@@ -105,3 +105,8 @@ def test_no_result_depends_on_it(tmp_path):
         files[bits] = [path.read_bytes() for path in sorted(out.glob("[rs]*.nc"))]
         assert len(files[bits]) == 2
     assert files["256"] == files["512"]
+
+
+def test_a_trial_that_llvm_refuses_decides_nothing(monkeypatch):
+    monkeypatch.setattr(width, "_TRIAL", "what is this?")
+    assert width.faster() == 256

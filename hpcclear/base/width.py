@@ -134,8 +134,11 @@ def _keep(place: Path, text: str) -> None:
 
 
 def faster() -> int:
-    """512 if the trial takes less than `GAIN` of the time with it; shorter where LLVM cannot make the trial."""
-    trials = {width: compiled(width) for width in WIDTHS}
+    """512 if the trial takes less than `GAIN` of the time with it; else 256, also where LLVM cannot compile the trial."""
+    try:
+        trials = {width: compiled(width) for width in WIDTHS}
+    except RuntimeError:  # of another version: nothing depends on it but speed
+        return 256
     x, y = ((ctypes.c_double * _LANES)(*[0.5 + k / _LANES for k in range(_LANES)]) for _ in "xy")
     best = dict.fromkeys(WIDTHS, float("inf"))
     for _ in range(_PHASES):

@@ -40,7 +40,7 @@ class Waves(Table):
         ]  # fmt: skip
         return max(found, default=0)
 
-    def steepest(self) -> float:
+    def deepest(self) -> float:
         """What the depth can come to at most, m."""
         return sum(abs(getattr(self, name)) for name in type(self).model_fields)
 
@@ -63,10 +63,10 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
         )  # fmt: skip
     for name in ("bearing", "journal"):
         own = getattr(waves, name)
-        if own is not None and own.steepest() >= clearance:
+        if own is not None and own.deepest() >= clearance:
             raise invalid(
-                f"waves come to {own.steepest():g} m, and the clearance is {clearance:g} m: the journal may not fit",
+                f"waves come to {own.deepest():g} m, and the clearance is {clearance:g} m: the journal may not fit",
                 "Make them smaller than the clearance",
                 key=f"out_of_round.{name}",
-                value=own.steepest(),
+                value=own.deepest(),
             )

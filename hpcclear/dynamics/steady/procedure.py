@@ -31,10 +31,10 @@ def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Stretch
     found, growth = yield from look(effort, target)
     if isinstance(found, Mean):
         return found
-    return (yield from ensemble(effort, target, min(found, _loosest(sample)), growth))
+    return (yield from ensemble(effort, target, min(found, loosest(sample)), growth))
 
 
-def _loosest(sample: Sample) -> float:
+def loosest(sample: Sample) -> float:
     """The looser tolerance of an ensemble at first, at most: positions are held to a share of themselves, not of the play."""
     play = Parameters(sample.par).clearance
     narrow = min(float(play[play > 0.0].min()) / USUAL, 1.0)
