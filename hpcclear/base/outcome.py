@@ -54,7 +54,7 @@ _TEXT = {
     ),
     Status.STEP_TOO_SMALL: (
         "the step size fell below the resolution of the time",
-        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range",
+        "loosen numerics.rtol; if that does not help, the stiffness of the contact is out of range, or a bar bends too far",
     ),
     Status.NOT_FINITE: (
         "the state became infinite or undefined",

@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.linkage import baumgarte, geometry
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.parameters import topology
@@ -49,9 +50,11 @@ def energies(
     else:
         phi = p.speed * turn_time + np.zeros(q.shape[1])
         omega = p.speed + np.zeros(q.shape[1])
-    m = geometry.motion((first, second), par.T, phi, omega, q[rows], v[rows])
-    kinetic = geometry.kinetic_energy(m, par.T)
+    m, bar = bent_motion(scene, par, (phi, omega), q[rows], v[rows])
+    kinetic = geometry.kinetic_energy(m, par.T) + (0.0 if bar is None else bar.kinetic)
     total = kinetic + geometry.potential_energy(m, par.T, scene.effects.gravity)
+    if bar is not None:
+        total = total + bar.strain + scene.effects.gravity * bar.raised(m.rod_angle)
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     for k, is_open in enumerate((first, second)):
         if is_open:

@@ -52,6 +52,7 @@ class Effects(NamedTuple):
     long_film: Any = None
     finite_film: Any = None
     lugre: Any = None  # friction by bristles, a coordinate for each joint with clearance
+    bending: Any = None  # of a slider-crank's rod: how many modes, each a coordinate
 
 
 class Open(NamedTuple):
@@ -167,6 +168,8 @@ OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
     BRISTLE_INVERSE_SPEED,  # s/m, one over Stribeck's
 ) = range(OWN, OWN + 5)
 BRISTLE_ROWS = 5
+BENDING = OWN + BRISTLE_ROWS
+"""First row of what a slider-crank's rod that bends has, in the order of `linkage.bending.entries`."""
 WAVES = OWN + 192
 """First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
 of them another, its slope's."""

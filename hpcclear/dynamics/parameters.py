@@ -6,9 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import bristles
+from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bearing import correction
+from hpcclear.dynamics.linkage.bending import entries
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar.problem import linkage_of, parameters_of
 from hpcclear.scene import Scene
@@ -74,6 +75,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     p = np.ones((get.size, _own_rows(scene)))
     p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
     _bristle_parameters(scene, get, p)
+    bending.fill(scene, get, p)
     body = {
         name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
     }
@@ -184,6 +186,8 @@ def _own_rows(scene: Scene) -> int:
     """Parameters of a sample but for those of films of finite length."""
     if scene.is_planar:
         return linkage_of(scene).parameter_rows
+    if scene.modes:
+        return at.BENDING + len(entries(scene.modes))
     return at.OWN + (at.BRISTLE_ROWS if scene.bristles else 0)
 
 

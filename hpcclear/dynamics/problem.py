@@ -10,20 +10,21 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics import bristles
+from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
 from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
-from hpcclear.dynamics.planar.tables import curves_of
+from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
 from hpcclear.dynamics.views import Outcome, Parameters, Settings
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -126,7 +127,10 @@ class Problem:
         """The numbers that the stepper's control reads."""
         s = Settings(np.zeros(Settings.size))
         n = self.coordinates
-        length = min(self.atol[at.bristles_of(self.effects) : n])
+        modes = self.effects.bending or 0
+        if self.linkage is not None:
+            modes = modes_of(self.linkage.mechanism)
+        length = min(self.atol[at.bristles_of(self.effects) + modes : n])
         s.rtol = self.rtol
         # An impact is located ten times better than positions are integrated, but not below round-off.
         s.gap_tolerance = max(0.1 * length, 4e-15)
@@ -186,7 +190,8 @@ def coordinate_count(scene: Scene) -> int:
     if scene.numerics.formulation == "baumgarte":
         return 9  # three bodies in the plane
     first, second, free = topology(scene)
-    return scene.bristles + {0: 0, 1: 2, 2: 4}[first + second] + free
+    closed = 2 if scene.modes else 0  # a rod that bends turns and lets the slider go by itself
+    return scene.bristles + scene.modes + {0: closed, 1: 2, 2: 4}[first + second] + free
 
 
 def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
@@ -217,6 +222,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         coulomb=_flag(friction_law == "coulomb"),
         ambrosio=_flag(friction_law == "ambrosio"),
         lugre=_flag(friction_law == "lugre"),
+        bending=None if scene.is_planar else scene.modes or None,
         torque=_flag(free),
         torque_table=_flag(free and torque_is_table),
         gravity=_flag(e.gravity > 0.0),
@@ -263,7 +269,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
         lengths, free = [True, True, True, True, False, True, True, False], True
     elif first and second:
         lengths = [True, True, False, True]
-    elif first or second:
+    elif first or second or scene.modes:
         lengths = [False, True]
     else:
         lengths = []
@@ -274,7 +280,8 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     rate = 1e3 * min(1.0, scene.slider_crank.crank.length * abs(speed) / 25.0)
     velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
     own = bristles.tolerances(scene, at.TURN / abs(speed))
-    return (*own[0], *coordinates, *own[1], *velocities)
+    bent = bending.tolerances(_bars_of(scene), a, rate * a) if scene.modes else ()
+    return (*own[0], *bent, *coordinates, *own[1], *(rate * a for _ in bent), *velocities)
 
 
 def implicit_method(scene: Scene) -> str:
@@ -284,6 +291,10 @@ def implicit_method(scene: Scene) -> str:
     It is the same for a single response and for an ensemble.
     """
     method = scene.numerics.method
+    if method == "auto" and scene.modes:
+        mechanism = _bars_of(scene)
+        if max(bending.swings(mechanism)) * float(planar.period_of(mechanism)) > bending.STIFF:
+            return "always"  # there is no stretch of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
     if scene.films() or scene.bristles:
@@ -296,6 +307,11 @@ def implicit_method(scene: Scene) -> str:
     damping = par.damping * (contact_law != "hertz")
     stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
     return "stiff" if (stiff & is_open).any() else "never"
+
+
+def _bars_of(scene: Scene) -> Mechanism:
+    """The mechanism whose bars bend."""
+    return planar.linkage_of(scene).mechanism if scene.is_planar else slider_crank_mechanism(scene)
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:

@@ -11,6 +11,7 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
@@ -18,11 +19,12 @@ from hpcclear.dynamics.evaluator import outcome_records, responses_told
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
+from hpcclear.dynamics.linkage.bending import Bent
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.planar.response import Seen
+from hpcclear.dynamics.planar.response import Seen, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.problem import (
@@ -231,9 +233,10 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     """Labels along what a linkage's series have besides time and joints."""
+    modes = {"mode": scene.mode_labels} if scene.modes else {}
     if not scene.is_planar:
-        return None
-    found = planar_labels(linkage_of(scene).mechanism)
+        return modes or None
+    found = planar_labels(linkage_of(scene).mechanism) | modes
     return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
 
 
@@ -319,15 +322,17 @@ def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Recor
     rows = baumgarte.minimal_rows(first, second) if nine else list(range(n - free))
     if turning:
         phi, omega = q[:, -1], v[:, -1]
-    if first or second:
+    if first or second or scene.modes:
         slider = accelerations[:, rows[-1]]
     else:
         rigid = ideal.ideal_response(
             problem.effects, par, problem.load_table, phi, omega, accelerations[:, n - 1]
         )
         slider = rigid[ideal.SLIDER_A]
-    m = geometry.motion((first, second), par, phi, omega, q[:, rows].T, v[:, rows].T)
-    data |= _series(scene, m, par, rates, contacts, works)
+    m, bar = bent_motion(scene, par, (phi, omega), q[:, rows].T, v[:, rows].T)
+    data |= _series(scene, m, par, rates, contacts, works, bar)
+    if bar is not None:
+        data |= mode_series(scene.modes, q, v, bar.strain)
     return (
         times,
         data | {"crank_angle": phi, "crank_speed": omega, "slider_acceleration": slider},
@@ -350,9 +355,10 @@ def _turn_starts(steps: Steps) -> tuple[Array, Array]:
 
 
 def _series(
-    scene: Scene, m: geometry.Motion, par: Array, rates: Rates, contacts: Array, works: Array
-) -> dict[str, Array]:
-    """Every time series of the response."""
+    scene: Scene, m: geometry.Motion, par: Array, rates: Rates, contacts: Array, works: Array,
+    bar: Bent | None = None,
+) -> dict[str, Array]:  # fmt: skip
+    """Every time series of the response but those of modes."""
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
     gaps = np.where(open_, rates.gap[:, :2], 0.0)
     stiffness = np.where(open_, Parameters(par).stiffness[:2], 0.0)
@@ -361,8 +367,12 @@ def _series(
     elastic = geometry.elastic_energy(gaps, active, stiffness)
     kinetic = geometry.kinetic_energy(m, par)
     potential = geometry.potential_energy(m, par, scene.effects.gravity)
+    strain: Array | float = 0.0
+    if bar is not None:
+        kinetic, strain = kinetic + bar.kinetic, bar.strain
+        potential = potential + scene.effects.gravity * bar.raised(m.rod_angle)
     driving, _, dissipated, load = works.T
-    total = kinetic + elastic + potential
+    total = kinetic + elastic + potential + strain
     return {
         "slider_position": m.slider,
         "slider_velocity": m.slider_speed,

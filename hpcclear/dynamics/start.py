@@ -31,14 +31,14 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
         zero = np.zeros(count)
         q = [p.crank_near, zero, *q, zero, zero]
         v = [zero, p.crank_near * p.speed, *v, zero, zero]
-    elif not (first or second):
+    elif not (first or second or scene.modes):
         q, v = [], []
     elif not (first and second):
         q, v = q[2:], v[2:]  # an ideal joint leaves the rod's angle and the slider
     if free or baumgarte:
         q, v = [*q, np.zeros(count)], [*v, p.speed]
     start = Start.at_rest(count)
-    undeflected = [np.zeros(count)] * scene.bristles
+    undeflected = [np.zeros(count)] * (scene.bristles + scene.modes)
     q, v = [*undeflected, *q], [*undeflected, *v]
     n = len(q)
     if n:

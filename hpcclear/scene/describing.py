@@ -3,19 +3,13 @@
 from collections.abc import Iterator
 from typing import Any
 
-from hpcclear.scene.mechanism import TorqueDrive
+from hpcclear.scene.mechanism import TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.plausibility import implausible
 from hpcclear.scene.tables import SceneTables
 
 NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
-
-
-def slender_inertia(mass: float, length: float) -> float:
-    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass
-    would have."""
-    return mass * length**2 / 12
 
 
 def effects_on(scene: SceneTables) -> Iterator[str]:
@@ -28,6 +22,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         yield f"wear of joint {name}"
     for name, film in scene.films().items():
         yield f"{film.model} oil film of {film.viscosity:g} Pa s in joint {name}"
+    for key, bar in scene.bending().items():
+        number = f"{bar.modes} modes" if bar.modes > 1 else "one mode"
+        yield f"bending of {key.rpartition('.')[2]} in {number}, {bar.stiffness:g} N m2"
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"
@@ -90,6 +87,19 @@ def warnings(scene: SceneTables) -> Iterator[str]:
                 f"{variable.range[1]:g} {variable.unit}, and the scene's own value {own[0]:g} "
                 "lies outside"
             )
+    yield from unused(scene)
+
+
+def unused(scene: SceneTables) -> Iterator[str]:
+    """What a study states and nothing of it reads."""
+    study = scene.study
+    if study is None or study.groups or study.sensitivity.groups == ():
+        return
+    if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own
+        yield (
+            "study.sensitivity is not used: no variables are named that would be fitted together, and those there are have no "
+            "usual groups; name them in study.sensitivity.groups, and in study.sensitivity.parameter what is held fixed"
+        )
 
 
 def differences(first: SceneTables, second: SceneTables) -> list[str]:

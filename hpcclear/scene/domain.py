@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.mechanism import slender_inertia
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 from hpcclear.scene.variables import Variable
@@ -147,7 +148,8 @@ def slender_inertias(
     """
     link = inertia.rpartition(".")[0]
     mass, length = (entries(scene, paths, values, f"{link}.{part}") for part in ("mass", "length"))
-    return mass * length**2 / 12
+    found: Array | float = slender_inertia(mass, length)
+    return found
 
 
 def entries(

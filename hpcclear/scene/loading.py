@@ -1,5 +1,6 @@
 """From a TOML file, or a mapping, to a `Scene`: reading and overrides."""
 
+import itertools
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,9 @@ LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 _DOTTED = re.compile(
     r"""(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){17}"""
 )
+
+
+_NOTE = "# set: "  # before each override, at the head of a scene's text
 
 
 def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Scene:
@@ -47,9 +51,15 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     content = dict(with_values(content, folder))
     scene = validated(Scene, content)
-    notes = "".join(f"# set: {override}\n" for override in overrides)
+    notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
     scene._text = notes + (scene.to_toml() if text is None else text)
     return scene
+
+
+def scene_of_text(text: str, name: str) -> Scene:
+    """The scene of a text that result files carry: what was set is noted at its head; errors as `load_scene`."""
+    notes = itertools.takewhile(lambda line: line.startswith(_NOTE), text.splitlines())
+    return load_scene(parse(text, name), [line.removeprefix(_NOTE) for line in notes])
 
 
 def _read(path: Path) -> str:

@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from hpcclear.scene.bending import Bending
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -21,8 +22,14 @@ from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
 
+def slender_inertia(mass: Any, length: Any) -> Any:
+    """Inertia m L^2/12 of a uniform thin rod about its middle, kg m2: the least a bar of that mass
+    would have."""
+    return mass * length**2 / 12
+
+
 class Link(Table):
-    """A rigid bar between two joints."""
+    """A bar between two joints, rigid unless it bends."""
 
     length: PositiveLength
     """Distance between its joints, m."""
@@ -33,6 +40,8 @@ class Link(Table):
     mass_center: Length
     """Distance of the mass centre from its first joint along the link, m; may lie beyond either
     pin."""
+    bending: Bending | None = None
+    """Of the rod: how it bends; left out, it is rigid."""
 
 
 class Slider(Table):
@@ -52,6 +61,13 @@ class Mechanism(Table):
 
     @model_validator(mode="after")
     def _assembles(self) -> "Mechanism":
+        if self.crank.bending is not None:
+            raise invalid(
+                "the drive turns the crank, which clamps it, and modes are those of pinned ends",
+                "Leave it out, or let the rod bend",
+                key="crank.bending",
+                value=None,
+            )
         if self.rod.length <= self.crank.length:
             raise invalid(
                 f"the rod must be longer than the crank ({self.crank.length:g} m), "

@@ -91,6 +91,7 @@ def quantities() -> Mapping[str, Quantity]:
 _WORDS = {
     "mass_center": "position of the mass centre of the {0}, from its first joint",
     "inertia": "inertia of the {0} about its mass centre",
+    "inertia_ratio": "inertia of the {0} over that of a slender bar",
     "clearance": "radial clearance of the joint {0}",
 }
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hpcclear.scene.bending import Bending, check_bars
 from hpcclear.scene.fields import (
     Count,
     Curve,
@@ -22,7 +23,7 @@ from hpcclear.scene.fields import (
     nearest,
 )
 from hpcclear.scene.film import Film, check_film
-from hpcclear.scene.mechanism import Material, check_journal
+from hpcclear.scene.mechanism import Material, check_journal, slender_inertia
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
@@ -79,13 +80,15 @@ NOWHERE = Place(x=0.0, y=0.0)
 
 
 class PlanarBody(Table):
-    """A rigid body."""
+    """A body, rigid unless it is a bar that bends."""
 
     name: str
     mass: Mass
     """kg."""
     inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """About its mass centre, kg m2; of no consequence where it cannot turn."""
+    inertia_ratio: Annotated[float, Quantity("", above=0)] | None = None
+    """Of a bar, in place of its inertia: this over that of a slender bar, m L^2/12, so that it follows mass and length."""
     length: Annotated[float, Quantity("m", above=0)] | None = None
     """Of a bar: it has the points a, at its origin, and b, so far along its x axis, m."""
     mass_center: Length | None = None
@@ -96,6 +99,15 @@ class PlanarBody(Table):
     """Where joints and loads act, in the body's own axes, m."""
     start_angle: Angle = 0.0
     """Rough angle at the start, rad: assembly starts from it. Of a driven body, its angle at the start."""
+    bending: Bending | None = None
+    """Of a bar between two pins: how it bends; left out, it is rigid."""
+
+    @property
+    def own_inertia(self) -> Any:
+        """Its inertia, kg m2, however that is stated."""
+        if self.inertia_ratio is None:
+            return self.inertia
+        return self.inertia_ratio * slender_inertia(self.mass, self.length)
 
     @model_validator(mode="after")
     def _bar_or_points(self) -> "PlanarBody":
@@ -107,7 +119,21 @@ class PlanarBody(Table):
                     key="mass_center",
                     value=self.mass_center,
                 )
+            if self.inertia_ratio is not None:
+                raise invalid(
+                    "is over that of a slender bar, and this body has no length",
+                    "Give its length, or write inertia",
+                    key="inertia_ratio",
+                    value=self.inertia_ratio,
+                )
             return self
+        if self.inertia_ratio is not None and self.inertia:
+            raise invalid(
+                "stands beside the inertia itself",
+                "Remove one of the two",
+                key="inertia_ratio",
+                value=self.inertia_ratio,
+            )
         if (self.center.x, self.center.y) != (0.0, 0.0):
             raise invalid(
                 "a bar's mass centre is given by mass_center",
@@ -354,6 +380,11 @@ class Planar(Table):
                     key="followed",
                     value=self.followed,
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _bars_may_bend(self) -> "Planar":
+        check_bars(self)
         return self
 
     @model_validator(mode="after")

@@ -32,6 +32,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
     if not scene.is_planar:
         yield from _drive(scene)
         yield from _bodies(scene)
+        yield from _rod(scene)
     yield from _joints(scene)
     yield from _films(scene)
     if scene.numerics.beta == 0.0 and (
@@ -81,6 +82,22 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
                 f"mechanism.{name}.mass = {mass:g} kg is more than five steel cubes as long as the rod "
                 f'({heaviest:.3g} kg); if grams are meant, write "{mass:g} g"'
             )
+
+
+def _rod(scene: SceneTables) -> Iterator[str]:
+    """A rod that bends should not buckle under the inertia that its drive gives it."""
+    mechanism, drive = scene.slider_crank, scene.drive
+    rod = mechanism.rod
+    if rod.bending is None:
+        return
+    speed = drive.initial_speed if isinstance(drive, TorqueDrive) else drive.speed
+    inertia = (rod.mass + mechanism.slider.mass) * mechanism.crank.length * speed**2
+    buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
+    if inertia > 0.5 * buckling:
+        yield (
+            f"mechanism.rod.bending.stiffness = {rod.bending.stiffness:g} N m2 buckles under {buckling:.3g} N, and the inertia "
+            f"of rod and slider comes to {inertia:.3g} N; deflections are no longer small there"
+        )
 
 
 def _joints(scene: SceneTables) -> Iterator[str]:

@@ -45,7 +45,9 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
 
     Play in a joint that ``numerics.objective_joints`` names is none of them: the study asks about it.
     """
-    return (*_plays(scene), *_films(scene), *_laws(scene), *_outside(scene), *_drives(scene))
+    return (
+        *_plays(scene), *_films(scene), *_laws(scene), *_bendings(scene), *_outside(scene), *_drives(scene)
+    )  # fmt: skip
 
 
 def _plays(scene: Scene) -> Iterator[Switch]:
@@ -63,6 +65,11 @@ def _plays(scene: Scene) -> Iterator[Switch]:
 def _films(scene: Scene) -> Iterator[Switch]:
     for label in scene.films():
         yield Switch(f"oil film in {label}", {f"{scene.joint_key(label)}.film": None})
+
+
+def _bendings(scene: Scene) -> Iterator[Switch]:
+    for key in scene.bending():
+        yield Switch(f"bending of {key.rpartition('.')[2]}", {f"{key}.bending": None})
 
 
 def _laws(scene: Scene) -> Iterator[Switch]:

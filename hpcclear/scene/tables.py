@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, of_joints
 from hpcclear.base.outcome import RESPONSES
+from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
 from hpcclear.scene.film import Film
@@ -133,6 +134,11 @@ class SceneTables(Table):
         return self
 
     @model_validator(mode="after")
+    def _bending_fits(self) -> Self:
+        check_scene(self, self.bending())
+        return self
+
+    @model_validator(mode="after")
     def _profiles_are_of_dry_joints(self) -> Self:
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
@@ -220,6 +226,30 @@ class SceneTables(Table):
     def bristles(self) -> int:
         """Joints whose friction has bristles, each with a state of its own."""
         return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
+
+    def bending(self) -> dict[str, Bending]:
+        """How bodies bend, by the dotted paths of the bodies that do."""
+        if isinstance(self.mechanism, Planar):
+            tables = {
+                f"mechanism.bodies.{body.name}": body.bending for body in self.mechanism.bodies
+            }
+        else:
+            tables = {"mechanism.rod": self.mechanism.rod.bending}
+        return {key: table for key, table in tables.items() if table is not None}
+
+    @property
+    def modes(self) -> int:
+        """Modes of bending of all bodies, each a coordinate."""
+        return sum(table.modes for table in self.bending().values())
+
+    @property
+    def mode_labels(self) -> tuple[str, ...]:
+        """Labels along the dimension ``mode``: "rod.1" and so on, in the order of the coordinates."""
+        return tuple(
+            f"{key.rpartition('.')[2]}.{mode}"
+            for key, table in self.bending().items()
+            for mode in range(1, table.modes + 1)
+        )
 
     @property
     def has_thresholds(self) -> bool:

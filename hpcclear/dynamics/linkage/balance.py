@@ -4,11 +4,21 @@ A row is d'Alembert's principle along a column of `kinematics.Kinematics`: masse
 of coordinates are solved; those of prescribed angles and guides give moments and reactions afterwards.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.expression import NOWHERE, ZERO, Term, Vector, Writer, named, plus
-from hpcclear.dynamics.linkage.kinematics import CENTER, Column, Kinematics, Move
+from hpcclear.dynamics.linkage.expression import (
+    NOWHERE,
+    ONE,
+    ZERO,
+    Term,
+    Vector,
+    Writer,
+    across,
+    named,
+    plus,
+)
+from hpcclear.dynamics.linkage.kinematics import CENTER, Column, Kinematics, Move, Point
 from hpcclear.dynamics.linkage.parts import GROUND, Body, split
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -24,10 +34,11 @@ class Pull(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """A moment on a body."""
+    """A moment on a body; `point`: where, of a bar that bends."""
 
     body: str
     moment: Term
+    point: str = ""
 
 
 class Balance:
@@ -78,7 +89,33 @@ class Balance:
                     total = total + self.mass_of(body)
                 else:
                     pairs.append((self.mass_of(body), columns[first], columns[second]))
+            if body.name in self.kinematics.bends:
+                moved = self.moved_by(body.name)
+                for one, two in ((first, second), (second, first)):
+                    if one in columns and two in moved:
+                        pairs.append((ONE, columns[one], moved[two]))
+                total = total + self._bent_mass(body.name, first, second)
         return total + self.inner(pairs)
+
+    def moved_by(self, body: str) -> dict[Column, Held]:
+        """Derivatives of a bent bar's first moment (`bending`) by all that changes it."""
+        bend, frame = self.kinematics.bends[body], self.forest.frames[body]
+        found = {Column("angle", frame): (frame, across(bend.moved()))}
+        modes = zip(bend.kinds, bend.modes, strict=True)
+        return found | {Column(kind, body): (frame, bend.moved_by(k)) for kind, k in modes}
+
+    def _bent_mass(self, body: str, first: Column, second: Column) -> Term:
+        """What bending adds to an entry of the mass matrix, besides products of first moment and mass centre."""
+        bend, turns = self.kinematics.bends[body], Column("angle", self.forest.frames[body])
+        if first == second == turns:
+            return bend.spun()
+        modes = {Column(kind, body): k for kind, k in zip(bend.kinds, bend.modes, strict=True)}
+        if first in modes and first == second:
+            return bend.modal_mass
+        for one, two in ((first, second), (second, first)):
+            if one == turns and two in modes:
+                return bend.turned(modes[two])
+        return ZERO
 
     def inner(self, pairs: Iterable[tuple[Term, Held, Held]], rates: tuple[Term, ...] = ()) -> Term:
         """Sum of mass times the products of two vectors held in frames, times rates."""
@@ -131,7 +168,22 @@ class Balance:
         for twist in self.twists:
             if column == ("angle", self.forest.frames[twist.body]):
                 total = total + twist.moment
-        return total + self._weight(column) + self._turning(column)
+            bend = self.kinematics.bends.get(twist.body)
+            if bend is not None and column.body == twist.body and column.kind in bend.kinds:
+                mode = 1 + bend.kinds.index(column.kind)
+                total = total + bend.slope(mode, twist.point) * twist.moment
+        return total + self._weight(column) + self._turning(column) + self._bent(column)
+
+    def _bent(self, column: Column) -> Term:
+        """What acts within a bent bar: on its turning, and on its modes."""
+        for body, bend in self.kinematics.bends.items():
+            frame = self.forest.frames[body]
+            if column == ("angle", frame):
+                return bend.braking(self.kinematics.spin(frame))
+            if column.body == body and column.kind in bend.kinds:
+                mode = 1 + bend.kinds.index(column.kind)
+                return bend.restoring(mode, self.kinematics.spin(frame))
+        return ZERO
 
     def along(self, held: Held, force: Vector) -> Term:
         """A force along a vector held in a frame; the signs go into the difference, as one would write it."""
@@ -164,6 +216,9 @@ class Balance:
                 frame, (ax, ay) = columns[column]
                 mass = self.mass_of(body)
                 held[frame] = plus(held.get(frame, NOWHERE), (mass * ax, mass * ay))
+            if body.name in self.kinematics.bends:
+                frame, moved = self.moved_by(body.name).get(column, (GROUND, NOWHERE))
+                held[frame] = plus(held.get(frame, NOWHERE), moved)
         for frame, moment in held.items():
             whole = whole + self.kinematics.projected((frame, moment), 1)
         return -(whole * self.writer.parameter("gravity"))
@@ -177,16 +232,18 @@ class Balance:
                 continue
             point = self.kinematics.center(body.name)
             columns = self.kinematics.columns(point)
-            if column not in columns:
-                continue
-            mine, mass = columns[column], self.mass_of(body)
-            for frame, arm in point.arms.items():
-                if frame == GROUND or column == ("angle", frame):
-                    continue
-                spin = self.kinematics.spin(frame)
-                pairs.setdefault((spin, spin), []).append((mass, mine, (frame, arm)))
-            for rates, held in self.coriolis(point.moves):
-                pairs.setdefault(rates, []).append((-mass, mine, held))
+            if column in columns:
+                mine, mass = columns[column], self.mass_of(body)
+                for frame, arm in point.arms.items():
+                    if frame == GROUND or column == ("angle", frame):
+                        continue
+                    spin = self.kinematics.spin(frame)
+                    pairs.setdefault((spin, spin), []).append((mass, mine, (frame, arm)))
+                for rates, held in self.coriolis(point.moves):
+                    pairs.setdefault(rates, []).append((-mass, mine, held))
+            if body.name in self.kinematics.bends:
+                for rates, both in self._thrown(body.name, point, columns, column):
+                    pairs.setdefault(rates, []).append(both)
         for frame in self.forest.prescribed:
             if turn := self.kinematics.turn(frame):
                 known = known + self.mass(column, Column("angle", frame)) * turn
@@ -195,16 +252,38 @@ class Balance:
             total = total + self.inner(found, rates)
         return total - known
 
+    def _thrown(
+        self, body: str, point: Point, columns: dict[Column, Held], column: Column
+    ) -> Iterator[tuple[tuple[Term, ...], tuple[Term, Held, Held]]]:
+        """The same of a bent bar's first moment: its own acceleration along the mass centre's column, and the mass centre's
+        along its own."""
+        kin = self.kinematics
+        bend, frame = kin.bends[body], self.forest.frames[body]
+        spin, own = kin.spin(frame), self.moved_by(body)
+        if column in columns:
+            mine = columns[column]
+            yield (spin, spin), (ONE, mine, (frame, bend.moved()))
+            yield (named("2.0"), spin), (-ONE, mine, (frame, bend.moving()))
+            yield (), (-ONE, mine, (frame, (bend.gathering(), ZERO)))
+        if column in own:
+            for other, arm in point.arms.items():
+                if other != GROUND:
+                    rate = kin.spin(other)
+                    yield (rate, rate), (ONE, own[column], (other, arm))
+            for rates, held in self.coriolis(point.moves):
+                yield rates, (-ONE, own[column], held)
+
     def coriolis(self, moves: Iterable[Move]) -> list[tuple[tuple[Term, ...], Held]]:
-        """Rates and vectors of 2 v w of guides in turning frames."""
-        return [
-            (
-                (named("2.0"), named(f"vslide_{move.body}"), self.kinematics.spin(move.frame)),
-                (move.frame, (-move.direction[1], move.direction[0])),
-            )
-            for move in moves
-            if move.kind == "slide" and move.frame != GROUND
-        ]
+        """Rates and vectors of 2 v w of what moves in turning frames, and of v^2 where its direction changes."""
+        found: list[tuple[tuple[Term, ...], Held]] = []
+        for move in moves:
+            if move.turns_along:
+                speed = named(self.kinematics.speed_name((move.kind, move.body, "")))
+                rates = (named("2.0"), speed, self.kinematics.spin(move.frame))
+                found.append((rates, (move.frame, across(move.direction))))
+                if any(move.changing):
+                    found.append(((speed, speed), (move.frame, move.changing)))
+        return found
 
 
 def _times(term: Term, rates: tuple[Term, ...]) -> Term:

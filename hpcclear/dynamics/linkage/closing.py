@@ -117,10 +117,13 @@ class Closing:
             spin = kin.spin(frame)
             found = minus(found, kin.rotated(frame, (x * spin * spin, y * spin * spin)))
         for move in point.moves:
-            if move.kind == "slide" and move.frame != GROUND:
-                rate = named("2.0") * named(f"vslide_{move.body}") * kin.spin(move.frame)
+            if move.turns_along:
+                speed = named(kin.speed_name((move.kind, move.body, "")))
+                rate = named("2.0") * speed * kin.spin(move.frame)
                 x, y = move.direction
                 found = plus(found, kin.rotated(move.frame, (-(y * rate), x * rate)))
+                x, y = move.changing
+                found = plus(found, kin.rotated(move.frame, (x * speed * speed, y * speed * speed)))
         return found
 
     def _guide(self, joint: Slide) -> list[Row]:

@@ -176,8 +176,7 @@ class _Generator:
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
         (x, y), (bx, by) = kin.position(journal), kin.position(bearing)
         (vx, vy), (ux, uy) = kin.velocity(journal), kin.velocity(bearing)
-        bodies = [split(place)[0] for place in joint.places]
-        spins = [kin.spin(self.forest.frames[body]) for body in bodies]
+        spins = [kin.end_spin(place) for place in joint.places]
         relative = ", ".join(
             write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)
         )
@@ -189,8 +188,9 @@ class _Generator:
         self.balance.pulls += [Pull(joint.journal, (-fx, -fy)), Pull(joint.bearing, (fx, fy))]
         if self.on.friction or self.on.waves:
             for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
-                if split(place)[0] != GROUND:
-                    self.balance.twists.append(Twist(split(place)[0], moment))
+                body, point = split(place)
+                if body != GROUND:
+                    self.balance.twists.append(Twist(body, moment, point))
         self.losses.append(loss)
 
     def _turns(self, joint: Clearance) -> str:
@@ -371,6 +371,8 @@ class _Generator:
                 loss = loss + one
             for guide in self.guides:
                 loss = loss + guide.force * guide.speed
+            for bend in self.kinematics.bends.values():
+                loss = loss + bend.loss()
             self._rate(at.DISSIPATION, loss)
             self._rate(at.LOAD_POWER, self.load_power)
         if "." in on.follow:

@@ -27,8 +27,9 @@ class Motion:
 
 
 def motion(
-    open_joints: tuple[bool, bool], par: Array, phi: Array, omega: Array, q: Array, v: Array
-) -> Motion:
+    open_joints: tuple[bool, bool], par: Array, phi: Array, omega: Array, q: Array, v: Array,
+    shorter: tuple[Array, Array] | None = None,
+) -> Motion:  # fmt: skip
     """All bodies from minimal coordinates.
 
     Parameters
@@ -40,14 +41,19 @@ def motion(
         Crank angle in this revolution (rad) and speed (rad/s).
     q, v : ndarray, shape (n, t)
         Coordinates and velocities, the crank's left out.
+    shorter : tuple of ndarray, shape (t,), optional
+        By how much a rod that bends is shorter, m, and how fast it gets so, m/s; its angle and the slider are coordinates
+        then, without play too.
     """
     crank, length, near = par[at.CRANK_LENGTH], par[at.ROD_LENGTH], par[at.ROD_NEAR]
     pin = np.array([crank * np.cos(phi), crank * np.sin(phi)])
     pin_v = omega * np.array([-pin[1], pin[0]])
     first, second = open_joints
+    less, rate = (0.0, 0.0) if shorter is None else shorter
+    far = length - near - less
     if first and second:
         theta, spin, slider, slider_v = q[2], v[2], q[3], v[3]
-    elif first or second:
+    elif first or second or shorter is not None:
         theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
     else:
         theta = np.arcsin(-pin[1] / length)
@@ -57,15 +63,15 @@ def motion(
     if first and second:
         centre, centre_v = q[:2], v[:2]
     elif first:
-        back = length - near
+        back = far
         centre = np.array([slider, np.zeros_like(slider)]) - back * along
-        centre_v = np.array([slider_v, np.zeros_like(slider)]) - back * across
+        centre_v = np.array([slider_v, np.zeros_like(slider)]) - back * across + rate * along
     else:
         centre, centre_v = pin + near * along, pin_v + near * across
-    if not (first or second):
+    if not (first or second or shorter is not None):
         slider = (pin + length * along)[0]
         slider_v = (pin_v + length * across)[0]
-    near_end, far_end = centre - near * along, centre + (length - near) * along
+    near_end, far_end = centre - near * along, centre + far * along
     gap_1 = pin - near_end if first else np.zeros_like(pin)
     gap_2 = np.array([slider, np.zeros_like(slider)]) - far_end if second else np.zeros_like(pin)
     return Motion(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from hpcclear.dynamics.linkage.bending import Bend
 from hpcclear.dynamics.linkage.expression import (
     NOWHERE,
     ONE,
@@ -34,12 +35,19 @@ CENTER = "center"
 
 
 class Move(NamedTuple):
-    """A point moves along a direction in a frame as a coordinate changes; `kind`: "x", "y", "slide" or "across" a guide."""
+    """A point moves along a direction in a frame as a coordinate changes; `kind`: "x", "y", "slide", "across" a guide, or of a
+    mode of bending, whose direction changes with it."""
 
     kind: str
     body: str  # which the coordinate belongs to
     frame: str
     direction: Vector
+    changing: Vector = NOWHERE
+
+    @property
+    def turns_along(self) -> bool:
+        """Whether the direction turns with a frame while the coordinate changes."""
+        return self.frame != GROUND and self.kind != "across"
 
 
 class Point(NamedTuple):
@@ -77,6 +85,8 @@ class Kinematics:
         for frame in dict.fromkeys(forest.frames.values()):
             if frame != GROUND:
                 self._turn(frame)
+        bending = [body for body in forest.mechanism.bodies if body.bending is not None]
+        self.bends = {body.name: Bend(body, writer) for body in bending}
 
     @staticmethod
     def speed_name(coordinate: tuple[str, str, str]) -> str:
@@ -186,8 +196,33 @@ class Kinematics:
             else -self._number(f"{body}_{end}_{start}_{axis}", a[k] - b[k])
             for k, axis in enumerate(("x", "y"))
         )
+        if ends := self._shortened(body, start, end):
+            shorter = self.bends[body].shortening()
+            x = x - shorter if ends > 0 else x + shorter
         cosine, sine = self.offset(body)
         return cosine * x - sine * y, sine * x + cosine * y
+
+    def _shortened(self, body: str, start: str, end: str) -> int:
+        """Whether bending takes away from an arm (1) or adds to it (-1): a bar's end b comes nearer."""
+        return (end == "b") - (start == "b") if body in self.bends else 0
+
+    def _reached(self, start: Point, frame: str, body: str, ends: tuple[str, str]) -> Point:
+        """A body's point from another one, and what bending between them moves."""
+        point = _extended(start, frame, self.arm(body, *ends))
+        sign = self._shortened(body, *ends)
+        if not sign:
+            return point
+        bend, moves = self.bends[body], list(point.moves)
+        for mode, kind in zip(bend.modes, bend.kinds, strict=True):
+            first, second = (-term if sign > 0 else term for term in bend.nearer(mode))
+            moves.append(Move(kind, body, frame, (first, ZERO), (second, ZERO)))
+        return Point(point.arms, tuple(moves))
+
+    def end_spin(self, place: str) -> Term:
+        """Angular velocity of a body, of a bar that bends that of its end."""
+        body, point = split(place)
+        spin = self.spin(self.forest.frames[body])
+        return self.bends[body].end_spin(spin, point) if body in self.bends else spin
 
     def offset(self, body: str) -> Vector:
         """Cosine and sine of the angle by which a body is turned against its frame."""
@@ -223,7 +258,7 @@ class Kinematics:
                 for kind, direction in (("x", (ONE, ZERO)), ("y", (ZERO, ONE)))
             )
             root = Point({GROUND: (named(f"x_{body}"), named(f"y_{body}"))}, moves)
-            return _extended(root, frame, self.arm(body, CENTER, point))
+            return self._reached(root, frame, body, (CENTER, point))
         parent = self.point(hang.parent)
         if isinstance(hang.joint, Slide):
             along = self.offset(split(hang.joint.point)[0])
@@ -233,7 +268,7 @@ class Kinematics:
             moved = _extended(parent, frame, (along[0] * s, along[1] * s))
             guide = (Move("slide", body, frame, along), Move("across", body, frame, across(along)))
             parent = Point(moved.arms, (*moved.moves, *guide))
-        return _extended(parent, frame, self.arm(body, split(hang.own)[1], point))
+        return self._reached(parent, frame, body, (split(hang.own)[1], point))
 
     def rotated(self, frame: str, vector: Vector) -> Vector:
         """A vector of a frame along the ground's axes."""
@@ -276,6 +311,8 @@ class Kinematics:
                     x, y = move.direction
                     twice = spin * speed + spin * speed  # Coriolis
                     moved = (x * rate - y * twice, y * rate + x * twice)
+                    x, y = move.changing
+                    moved = plus(moved, (x * speed * speed, y * speed * speed))
                     found = plus(found, self.rotated(frame, moved))
             x, y = point.arms.get(frame, NOWHERE)
             turned = (-(y * turn) - x * spin * spin, x * turn - y * spin * spin)

@@ -10,12 +10,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
-from hpcclear.dynamics.linkage.poses import Poses
+from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
@@ -63,6 +64,12 @@ class Linkage:
         self._take(self.poses.rows)
         masses = [
             f"{body.name}_{part}" for body in mechanism.bodies for part in ("mass", "inertia")
+        ]
+        masses += [
+            f"{body.name}_bend_{entry}"
+            for body in mechanism.bodies
+            if body.bending is not None
+            for entry in entries(body.bending.modes)
         ]
         for name in masses:
             if name not in self._given:
@@ -140,7 +147,10 @@ class Linkage:
     def energies(
         self, par: Array, q: Array, v: Array, time: Array | float, gravity: Array | float
     ) -> tuple[Array, Array, Array]:
-        """Kinetic and potential energy (m,), J, and eccentricities (joints, 2, m); arguments as of `Poses.at`."""
+        """Kinetic energy and that of gravity and of bending (m,), J, and eccentricities (joints, 2, m).
+
+        Arguments as of `Poses.at`.
+        """
         pose, eccentricity = self.poses.at(par, q, v, time)
         bodies = self.mechanism.bodies
         mass, inertia = (
@@ -153,7 +163,29 @@ class Linkage:
             for part in ("mass", "inertia")
         )
         kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
-        return kinetic, gravity * (mass * pose.y).sum(axis=0), eccentricity
+        potential = gravity * (mass * pose.y).sum(axis=0)
+        for k, found in self.bent(par, q, v, pose).items():
+            kinetic = kinetic + found.kinetic
+            potential = potential + found.strain + gravity * found.raised(pose.angle[k])
+        return kinetic, potential, eccentricity
+
+    def bent(self, par: Array, q: Array, v: Array, pose: Pose) -> dict[int, Bent]:
+        """What bending adds, by the numbers of the bodies that bend; arguments as of `Poses.at`."""
+        result = {}
+        for k, body in enumerate(self.mechanism.bodies):
+            if body.bending is None:
+                continue
+            modes = body.bending.modes
+            first = self.forest.index(kind_of(1), body.name) or 0
+            found = {
+                name: par.T[self._given[f"{body.name}_bend_{name}"]] for name in entries(modes)
+            }
+            cosine, sine = np.cos(pose.angle[k]), np.sin(pose.angle[k])
+            along = cosine * pose.vx[k] + sine * pose.vy[k]
+            across = cosine * pose.vy[k] - sine * pose.vx[k]
+            rows = slice(first, first + modes)
+            result[k] = bent(found, q[rows], v[rows], (along, across, pose.spin[k]))
+        return result
 
     @property
     def turning(self) -> bool:

@@ -14,7 +14,7 @@ from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.closing import Closing
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
-from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import forest
@@ -62,7 +62,7 @@ class Loops:
     """
 
     def __init__(self, mechanism: Mechanism, closed: bool = False) -> None:
-        self.mechanism = mechanism
+        self.mechanism = mechanism = straight(mechanism)  # what bends starts straight
         self.forest = forest(mechanism, cartesian=True, closed=closed)
         columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
         self.size = n = len(columns)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hpcclear.base.errors import InputError
@@ -74,6 +74,19 @@ class Mechanism:
     def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
         return next((drive for drive in self.drives if drive.body == body), None)
+
+
+def straight(mechanism: Mechanism) -> Mechanism:
+    """The same of rigid bodies alone."""
+    if all(body.bending is None for body in mechanism.bodies):
+        return mechanism
+    bodies = tuple(replace(body, bending=None) for body in mechanism.bodies)
+    return replace(mechanism, bodies=bodies)
+
+
+def modes_of(mechanism: Mechanism) -> int:
+    """How many modes of bending there are."""
+    return sum(body.bending.modes for body in mechanism.bodies if body.bending is not None)
 
 
 def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
@@ -280,6 +293,7 @@ def _sizes(m: Mechanism) -> None:
             f"{-free} too many degrees of freedom",
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip
+    free += modes_of(m)
     if free > MOST_COORDINATES:
         raise InputError(
             "bodies", free, f"more than {MOST_COORDINATES} degrees of freedom", "Use ideal joints"

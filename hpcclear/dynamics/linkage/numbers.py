@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.dynamics.linkage import bending
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -63,6 +64,9 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             f"{body.name}_offset_cos": np.cos(angle),
             f"{body.name}_offset_sin": np.sin(angle),
         }
+        if body.bending is not None:
+            bent = bending.numbers(bending.bar_of(body), body.bending.modes)
+            found |= {f"{body.name}_bend_{entry}": value for entry, value in bent.items()}
         if trees.on_ground(body.name):
             own = body.points[split(trees.hangs[body.name].own)[1]]
             x, y = body.center[0] - own[0], body.center[1] - own[1]

@@ -14,10 +14,20 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Body:
-    """A rigid body: mass in kg, inertia about its mass centre in kg m2, centre and points in its own axes in m.
+class Bending:
+    """Of a bar from its point a to b: how many modes, stiffness EI in N m2, damping ratio of each mode."""
 
-    `start_angle` (rad) is a rough one: the assembly starts from it. A body that cannot turn needs no inertia.
+    modes: int
+    stiffness: float
+    damping: float = 0.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body: mass in kg, inertia about its mass centre in kg m2, centre and points in its own axes in m.
+
+    `start_angle` (rad) is a rough one: the assembly starts from it. A body that cannot turn needs no inertia. It is rigid
+    unless it is a bar that bends.
     """
 
     name: str
@@ -26,6 +36,7 @@ class Body:
     center: Pair = (0.0, 0.0)
     points: Mapping[str, Pair] = field(default_factory=dict)
     start_angle: float = 0.0
+    bending: Bending | None = None
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ def written_by(effects: at.Effects) -> ModuleType:
     It is generated, but for multipliers, and for both joints ideal, which have a closed form: these stand here.
     """
     joints = slider_crank.joints_of(effects)
-    if effects.baumgarte or not joints:
+    if effects.baumgarte or not (joints or effects.bending):
         return sys.modules[__name__]
     return module_with(slider_crank.motion_of(effects), joints)
 

@@ -6,9 +6,11 @@ Its text keeps what holds parameters alone in place: the numbers are then those 
 from typing import Any
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.bending import entries
 from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
+    Bending,
     Body,
     Clearance,
     ConstantSpeed,
@@ -53,9 +55,10 @@ PARAMETERS = {
 def mechanism_of(effects: at.Effects) -> Mechanism:
     """The slider-crank with the loads and open joints of `effects`; its numbers are of no consequence."""
     points = {"a": (0.0, 0.0), "b": (2.0, 0.0)}
+    bending = Bending(effects.bending, 1.0) if effects.bending else None
     bodies = (
         Body("crank", 1.0, 1.0, (1.0, 0.0), points),
-        Body("rod", 1.0, 1.0, (1.0, 0.0), points),
+        Body("rod", 1.0, 1.0, (1.0, 0.0), points, bending=bending),
         Body("slider", 1.0, 1.0, points={"pin": (0.0, 0.0)}),
     )
     drive: Drive = ConstantSpeed("drive", "crank", 1.0)
@@ -97,5 +100,10 @@ def motion_of(effects: at.Effects) -> Motion:
         follow="slider",
         waves=bool(effects.waves),
     )
-    rows = Rows(parameters=PARAMETERS, free=at.OWN).behind(at.bristles_of(effects))
+    known = {
+        f"rod_bend_{entry}": row
+        for row, entry in enumerate(entries(effects.bending or 0), at.BENDING)
+    }
+    parameters = PARAMETERS | known if effects.bending else PARAMETERS
+    rows = Rows(parameters=parameters, free=at.OWN).behind(at.bristles_of(effects))
     return generate(mechanism_of(effects), on, rows, cartesian=bool(effects.baumgarte), hoist=False)

@@ -9,12 +9,14 @@ coordinates every body is free, and every ideal joint and prescribed angle is a 
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from hpcclear.dynamics.linkage.bending import kind_of
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Drive, Fixed, Joint, Revolute, Slide, split
 
 
 class Coordinate(NamedTuple):
-    """One coordinate: "x" or "y" of a free body's mass centre, "angle" of a frame, "slide" along a guide."""
+    """One coordinate: "x" or "y" of a free body's mass centre, "angle" of a frame, "slide" along a guide, "bend1" and so on
+    of a bar's modes."""
 
     kind: str
     body: str
@@ -47,7 +49,7 @@ class Forest:
     offsets : dict
         By how much each body is turned against its frame, rad.
     coordinates : tuple of Coordinate
-        In the bodies' order; the angle of the body that the period's drive turns comes last.
+        Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last.
     prescribed : dict
         Drives by frame, where the angle is given.
     closures : tuple of Joint or Drive
@@ -74,8 +76,10 @@ class Forest:
         return frame in self.prescribed or self.index("angle", frame) is not None
 
     def on_ground(self, body: str) -> bool:
-        """Whether a body hangs on a pin of the ground."""
+        """Whether a body hangs on a pin of the ground, and is rigid."""
         hang = self.hangs[body]
+        if self.mechanism.body(body).bending is not None:
+            return False
         return isinstance(hang.joint, Revolute) and split(hang.parent)[0] == GROUND
 
 
@@ -152,7 +156,12 @@ def _frames(m: Mechanism, hangs: dict[str, Hang]) -> tuple[dict[str, str], dict[
 def _coordinates(
     m: Mechanism, hangs: dict[str, Hang], frames: dict[str, str], prescribed: dict[str, Drive]
 ) -> tuple[Coordinate, ...]:
-    found: list[Coordinate] = []
+    found = [
+        Coordinate(kind_of(mode), body.name)
+        for body in m.bodies
+        if body.bending is not None
+        for mode in range(1, body.bending.modes + 1)
+    ]
     for body in m.bodies:
         joint = hangs[body.name].joint
         if joint is None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import bristles
+from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
@@ -25,7 +25,7 @@ from hpcclear.scene.points import Points
 PLACEHOLDER = 1e-3
 """Stands in the structure for a number that is nought in the scene and varied by its study: what is nought is not in a text."""
 
-NOT_GEOMETRY = ("mass", "inertia", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
+NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
                 "torque", "flywheel_inertia", "stiffness", "damping", "size", "direction",
                 "coefficient", "ramp_speed")  # fmt: skip
 """Entries that no sample's start depends on."""
@@ -116,7 +116,7 @@ def _varied(scene: Scene) -> set[str]:
 def is_prescribed(scene: Scene) -> bool:
     """Whether nothing is left to integrate: no clearance, and the drives hold all that moves."""
     mechanism = linkage_of(scene).mechanism
-    return not mechanism.clearances and freedom(mechanism) == 0
+    return not (mechanism.clearances or scene.modes) and freedom(mechanism) == 0
 
 
 def check_columns(scene: Scene, points: Points | None) -> None:
@@ -183,14 +183,17 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
         return ()
     linkage = linkage_of(scene)
     a = scene.numerics.absolute_tolerance
-    angles = [one.kind == "angle" for one in linkage.forest.coordinates]
+    angles = [one.kind == "angle" for one in linkage.forest.coordinates[scene.modes :]]
     speed = at.TURN / float(period_of(linkage.mechanism)) * driven_length(linkage.mechanism)
     rate = 1e3 * min(1.0, speed / 25.0)
     first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
+    bent = bending.tolerances(linkage.mechanism, a, rate * a)
     return (
         *first,
+        *bent,
         *(10.0 * a if angle else a for angle in angles),
         *second,
+        *(rate * a for _ in bent),
         *((50.0 if angle else 1.0) * rate * a for angle in angles),
     )
 

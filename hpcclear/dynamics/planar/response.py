@@ -1,5 +1,7 @@
 """Time series of a linkage: drive, bodies, points, joints and energies, from the coordinates that were integrated."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,9 +43,12 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     gaps = seen.rates.gap[:, :count]
     elastic = elastic_energy(Parameters(par).stiffness[:count], gaps, active)
     driving, _, dissipated, load = seen.works.T
-    total = kinetic + elastic + potential
+    bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
+    strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
+    potential = potential - strain
+    total = kinetic + elastic + potential + strain
     angle, speed = _turned(scene, linkage, par, seen)
-    places = bodies_and_points(mechanism, pose)
+    places = bodies_and_points(mechanism, pose, {k: one.shorter for k, one in bent.items()})
     acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
     return {
         "crank_angle": angle,
@@ -59,10 +64,22 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         "kinetic_energy": kinetic,
         "elastic_energy": elastic,
         "potential_energy": potential,
+        **mode_series(scene.modes, seen.q, seen.v, strain),
         "driving_work": driving,
         "load_work": load,
         "dissipated_energy": dissipated,
         "energy_residual": total - total[0] - driving - load + dissipated,
+    }
+
+
+def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Array]:
+    """Series of the modes of bending, of coordinates (t, n) that begin with theirs; none without."""
+    if not modes:
+        return {}
+    return {
+        "mode_amplitude": q[:, :modes],
+        "mode_velocity": v[:, :modes],
+        "strain_energy": strain,
     }
 
 
@@ -88,8 +105,13 @@ def _turned(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> tuple[Arr
     return angle, np.full(len(angle), named.speed)
 
 
-def bodies_and_points(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
-    """Mass centres and angles of the bodies (t, body), and all their points (t, point)."""
+def bodies_and_points(
+    mechanism: Mechanism, pose: Pose, shorter: Mapping[int, Array] = MappingProxyType({})
+) -> dict[str, Array]:
+    """Mass centres and angles of the bodies (t, body), and all their points (t, point).
+
+    `shorter`: by how much the ends b of bars that bend come nearer, m, (t,), by the bodies' numbers.
+    """
     found: dict[str, Any] = {
         "body_x": pose.x.T,
         "body_y": pose.y.T,
@@ -101,8 +123,9 @@ def bodies_and_points(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     arms = []
     for k, body in enumerate(mechanism.bodies):
         cosine, sine = np.cos(pose.angle[k]), np.sin(pose.angle[k])
-        for x, y in body.points.values():
-            dx, dy = x - body.center[0], y - body.center[1]
+        for point, (x, y) in body.points.items():
+            less = shorter[k] if k in shorter and point == "b" else 0.0
+            dx, dy = x - less - body.center[0], y - body.center[1]
             arms.append((pose.x[k] + cosine * dx - sine * dy, pose.y[k] + sine * dx + cosine * dy))
     found["point_x"], found["point_y"] = (np.array(part).T for part in zip(*arms, strict=True))
     return found

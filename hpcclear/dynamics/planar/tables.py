@@ -88,7 +88,19 @@ def _body(body: PlanarBody) -> parts.Body:
     if body.length is not None:
         points = {"a": (0.0, 0.0), "b": (body.length, 0.0), **points}
         center = (0.5 * body.length if body.mass_center is None else body.mass_center, 0.0)
-    return parts.Body(body.name, body.mass, body.inertia, center, points, body.start_angle)
+    return parts.Body(
+        body.name,
+        body.mass,
+        body.own_inertia,
+        center,
+        points,
+        body.start_angle,
+        _bending(body.bending),
+    )
+
+
+def _bending(table: Any) -> parts.Bending | None:
+    return None if table is None else parts.Bending(table.modes, table.stiffness, table.damping)
 
 
 def _stiffness(bearing: Material, journal: Material, radius: float, clearance: float) -> float:
@@ -173,7 +185,7 @@ def slider_crank_mechanism(scene: Scene) -> Mechanism:
     bodies = [
         parts.Body(
             name, link.mass, link.inertia, (link.mass_center, 0.0),
-            {"a": (0.0, 0.0), "b": (link.length, 0.0)},
+            {"a": (0.0, 0.0), "b": (link.length, 0.0)}, bending=_bending(link.bending),
         )
         for name, link in (("crank", m.crank), ("rod", m.rod))
     ]  # fmt: skip

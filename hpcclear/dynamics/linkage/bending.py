@@ -1,0 +1,334 @@
+"""Bars that bend between their ends: terms of the motion's text, their numbers, and the energy.
+
+The axis of a bar of length L, seen from the line between its ends a (s = 0) and b, is displaced across by
+w = sum of q_i sin(i pi s/L), and along by u(s) = -1/2 of the integral of w'^2 from a to s: bending does not stretch it, so b
+comes nearer to a by delta = sum of kappa_i q_i^2/2. Kinetic energy is kept to second order in w, as of which u counts,
+strain energy is that of Euler and Bernoulli's beam. With P the place of the straight bar's mass centre, (e, n) the axes
+along and across,
+
+    T = T_rigid + P'.D' + theta' sum X_i q_i' + M/4 sum q_i'^2 + theta'^2 q.B q/2,    D = U e + W n,
+    W = sum S_i q_i,    U = -q.G q/2,    V = sum k_i q_i^2/2.
+
+The axial force is in it: of inertia by G and B, of what pulls at b by delta. Whatever the stated mass, mass centre and
+inertia leave beside the uniform bar (`uniform_share`) is rigid: big ends, bosses.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics.linkage.expression import ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.parts import Body
+
+SHORTEST = 0.005
+"""By how much of its length a bar may get shorter: 4.5 % of deflection in the first mode.
+
+Beyond that deflections are not small. The kinetic energy that is kept is none any more, for some velocities, from 12 % on with
+one mode, and from 6 or 7 % with four: steps end before."""
+_HALF, _TWO = named("0.5"), named("2.0")
+
+
+def kind_of(mode: int) -> str:
+    """The kind of a mode's coordinate; modes count from 1."""
+    return f"bend{mode}"
+
+
+class Bend:
+    """Terms of one bar; vectors are held in its frame. What several places need is written down once.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+        Of its coordinates.
+    q, v : tuple of Term
+        Amplitudes, m, and their velocities.
+    """
+
+    def __init__(self, body: Body, writer: Writer) -> None:
+        assert body.bending is not None
+        self.name, self.writer = body.name, writer
+        self.modes = range(1, body.bending.modes + 1)
+        self.kinds = tuple(kind_of(mode) for mode in self.modes)
+        self.q = tuple(named(f"{kind}_{body.name}") for kind in self.kinds)
+        self.v = tuple(named(f"v{kind}_{body.name}") for kind in self.kinds)
+        self._bound: Term | None = None
+
+    def _number(self, entry: str) -> Term:
+        return self.writer.parameter(f"{self.name}_bend_{entry}")
+
+    def _let(self, name: str, term: Term) -> Term:
+        return self.writer.let(f"{name}_{self.name}", term)
+
+    @property
+    def modal_mass(self) -> Term:
+        """M/2, of every mode."""
+        return self._number("mass")
+
+    def lateral(self, mode: int) -> Term:
+        """S of a mode: first moment across; even ones have none."""
+        return self._number(f"lateral_{mode}") if mode % 2 else ZERO
+
+    def turned(self, mode: int) -> Term:
+        """X of a mode: by how much its rate is a turning."""
+        return self._number(f"turned_{mode}")
+
+    def _pair(self, entry: str, i: int, j: int) -> Term:
+        if entry == "axial" and i != j and (i - j) % 2 == 0:
+            return ZERO
+        return self._number(f"{entry}_{min(i, j)}{max(i, j)}")
+
+    def _times(self, entry: str, mode: int) -> Term:
+        """Row of G ("axial") or B ("spun") times the amplitudes."""
+        total = ZERO
+        for other, amplitude in zip(self.modes, self.q, strict=True):
+            total = total + self._pair(entry, mode, other) * amplitude
+        return self._let(f"{entry}{mode}", total)
+
+    def _dotted(self, entry: str, others: tuple[Term, ...]) -> Term:
+        total = ZERO
+        for mode, other in zip(self.modes, others, strict=True):
+            total = total + self._times(entry, mode) * other
+        return total
+
+    # ---- places -------------------------------------------------------------------------------------
+    def shortening(self) -> Term:
+        """delta, m."""
+        total = ZERO
+        for mode, amplitude in zip(self.modes, self.q, strict=True):
+            total = total + self._number(f"nearer_{mode}") * amplitude * amplitude
+        return self._let("shorter", _HALF * total)
+
+    def nearer(self, mode: int) -> tuple[Term, Term]:
+        """Derivatives of delta by an amplitude: first and second."""
+        second = self._number(f"nearer_{mode}")
+        return self._let(f"nearer{mode}", second * self.q[mode - 1]), second
+
+    def slope(self, mode: int, point: str) -> Term:
+        """By how much the end at a point turns with an amplitude, rad/m."""
+        slope = self._number(f"slope_{mode}")
+        return -slope if point == "b" and mode % 2 else slope
+
+    def end_spin(self, spin: Term, point: str) -> Term:
+        """Angular velocity of the end at a point."""
+        for mode, speed in zip(self.modes, self.v, strict=True):
+            spin = spin + self.slope(mode, point) * speed
+        return self._let(f"spin_{point}", spin)
+
+    # ---- inertia ------------------------------------------------------------------------------------
+    def moved(self) -> Vector:
+        """D, kg m."""
+        across = ZERO
+        for mode, amplitude in zip(self.modes, self.q, strict=True):
+            across = across + self.lateral(mode) * amplitude
+        along = -(_HALF * self._dotted("axial", self.q))
+        return self._let("along", along), self._let("across", across)
+
+    def moved_by(self, mode: int) -> Vector:
+        """Derivative of D by an amplitude."""
+        return -self._times("axial", mode), self.lateral(mode)
+
+    def moving(self) -> Vector:
+        """Rate of D while the bar does not turn."""
+        across = ZERO
+        for mode, speed in zip(self.modes, self.v, strict=True):
+            across = across + self.lateral(mode) * speed
+        return self._let("vacross", -across), self._let("valong", -self._dotted("axial", self.v))
+
+    def gathering(self) -> Term:
+        """Second derivative of D along the bar while no amplitude accelerates."""
+        total = ZERO
+        for i, one in zip(self.modes, self.v, strict=True):
+            row = ZERO
+            for j, two in zip(self.modes, self.v, strict=True):
+                row = row + self._pair("axial", i, j) * two
+            total = total + row * one
+        return self._let("gathering", -total)
+
+    def spun(self) -> Term:
+        """q.B q, by how much its inertia has grown."""
+        return self._let("spun", self._dotted("spun", self.q))
+
+    # ---- forces -------------------------------------------------------------------------------------
+    def braking(self, spin: Term) -> Term:
+        """Moment that turning needs since the inertia grows."""
+        return -(_TWO * spin * self._dotted("spun", self.v))
+
+    def _beyond(self) -> Term:
+        """Nought as long as deflections are small, else what no step gets through."""
+        if self._bound is None:
+            shorter, most = (self.writer.text(t) for t in (self.shortening(), self._number("most")))
+            self._bound = named(self.writer.fresh(f"beyond_{self.name}"))
+            self.writer.line(f"{self._bound.name} = 0.0 if {shorter} < {most} else 1e300")
+        return self._bound
+
+    def restoring(self, mode: int, spin: Term) -> Term:
+        """Force on an amplitude: what turning throws outwards, less spring and damper."""
+        thrown = self._times("spun", mode) * spin * spin
+        return (
+            thrown
+            - self._beyond()
+            - self._number(f"stiffness_{mode}") * self.q[mode - 1]
+            - self._number(f"damping_{mode}") * self.v[mode - 1]
+        )
+
+    def loss(self) -> Term:
+        """Power that damping takes, W."""
+        total = ZERO
+        for mode, speed in zip(self.modes, self.v, strict=True):
+            total = total + self._number(f"damping_{mode}") * speed * speed
+        return total
+
+
+# ---- numbers --------------------------------------------------------------------------------------------
+
+
+def entries(modes: int) -> tuple[str, ...]:
+    """Names of a bar's numbers, without ``NAME_bend_``."""
+    rows = range(1, modes + 1)
+    single = ("lateral", "turned", "nearer", "slope", "stiffness", "damping")
+    pairs = [f"{i}{j}" for i in rows for j in rows if i <= j]
+    return (
+        "mass",
+        "inverse_mass",
+        "most",
+        *(f"{entry}_{i}" for entry in single for i in rows),
+        *(f"{entry}_{pair}" for entry in ("axial", "spun") for pair in pairs),
+    )
+
+
+def uniform_share(mass: Any, inertia: Any, length: Any, center: Any) -> Any:
+    """Mass of the largest uniform bar that leaves a rigid body, kg: of a uniform bar, all of it.
+
+    What it leaves of mass, first moment and inertia is that of a body as long as no mass is negative:
+    (m - M)(J - M L^2/3) >= (m c - M L/2)^2, with J about a. `center`: from a, m.
+    """
+    own = mass * length * length / 12.0
+    shifted = mass * (center - 0.5 * length) ** 2
+    root = np.sqrt((inertia - own) ** 2 + shifted * (2.0 * (inertia + own) + shifted))
+    return 2.0 * mass * inertia / (inertia + own + shifted + root)
+
+
+class Bar(NamedTuple):
+    """A bar's numbers, single ones or of samples (m,): kg, kg m2, m, mass centre from a in m, N m2, 1."""
+
+    mass: Any
+    inertia: Any
+    length: Any
+    center: Any
+    stiffness: Any
+    damping: Any
+
+
+def bar_of(body: Body) -> Bar:
+    """The bar that a body with bending is."""
+    assert body.bending is not None
+    length, center = body.points["b"][0], body.center[0]
+    return Bar(
+        body.mass, body.inertia, length, center, body.bending.stiffness, body.bending.damping
+    )
+
+
+def numbers(bar: Bar, modes: int) -> dict[str, Any]:
+    """Values of `entries`, SI."""
+    share = uniform_share(bar.mass, bar.inertia, bar.length, bar.center)
+    length, c = bar.length, bar.center
+    density = share / length
+    found: dict[str, Any] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
+    found["most"] = SHORTEST * length
+    wave = {i: i * np.pi / length for i in range(1, modes + 1)}
+    for i, a in wave.items():
+        sign = -1.0 if i % 2 else 1.0
+        lateral = density * (1.0 - sign) / a
+        rate = a * a * np.sqrt(bar.stiffness / density)  # rad/s, of the bar held at its ends
+        found |= {
+            f"lateral_{i}": lateral,
+            f"turned_{i}": -sign * density * length / a - c * lateral,
+            f"nearer_{i}": 0.5 * a * a * length,
+            f"slope_{i}": a,
+            f"stiffness_{i}": 0.5 * bar.stiffness * a**4 * length,
+            f"damping_{i}": bar.damping * rate * share,
+        }
+        for j in range(i, modes + 1):
+            scale = density * a * wave[j]
+            zeroth = 0.5 * length if i == j else 0.0 * length
+            first = _moment(i, j, length, 1)
+            second = _moment(i, j, length, 2)
+            # tension of what lies beyond s, per acceleration and per squared turning
+            found[f"axial_{i}{j}"] = scale * (length * zeroth - first)
+            pulled = scale * (0.5 * length * (length - 2.0 * c) * zeroth - 0.5 * second + c * first)
+            found[f"spun_{i}{j}"] = (0.5 * share if i == j else 0.0) - pulled
+    return found
+
+
+def _moment(i: int, j: int, length: Any, power: int) -> Any:
+    """Integral of s^power cos(i pi s/L) cos(j pi s/L) over the bar; power 1 or 2."""
+
+    def one(k: int) -> Any:
+        if k == 0:
+            return length ** (power + 1) / (power + 1)
+        sign = -1.0 if k % 2 else 1.0
+        wave = k * np.pi / length
+        return (sign - 1.0) / wave**2 if power == 1 else 2.0 * length * sign / wave**2
+
+    return 0.5 * (one(i - j) + one(i + j))
+
+
+class Bent(NamedTuple):
+    """What bending adds: kinetic and strain energy, J, first moments along and across, kg m, and delta, m."""
+
+    kinetic: Array
+    strain: Array
+    moved: tuple[Array, Array]
+    shorter: Array
+
+    def raised(self, angle: Array) -> Array:
+        """First moment against y = 0 that bending adds, kg m, with the bar at angles (m,)."""
+        found: Array = np.sin(angle) * self.moved[0] + np.cos(angle) * self.moved[1]
+        return found
+
+
+def bent(found: dict[str, Any], q: Array, v: Array, turning: tuple[Any, Any, Any]) -> Bent:
+    """Of amplitudes and velocities (modes, m).
+
+    Parameters
+    ----------
+    found : dict
+        Of `numbers`.
+    q, v : ndarray, shape (modes, m)
+    turning : tuple
+        Velocities along and across of the straight bar's mass centre, m/s, and the angular velocity, rad/s; (m,).
+    """
+    rows = range(1, len(q) + 1)
+    along, across, spin = turning
+
+    def quadratic(entry: str, a: Array, b: Array) -> Any:
+        return sum(
+            found[f"{entry}_{min(i, j)}{max(i, j)}"] * a[i - 1] * b[j - 1]
+            for i in rows
+            for j in rows
+        )
+
+    def linear(entry: str, a: Any) -> Any:
+        return sum(found[f"{entry}_{i}"] * a[i - 1] for i in rows)
+
+    sideways, inwards = linear("lateral", q), -0.5 * quadratic("axial", q, q)
+    rate_across = linear("lateral", v) + spin * inwards
+    rate_along = -quadratic("axial", q, v) - spin * sideways
+    kinetic = (
+        along * rate_along + across * rate_across + spin * linear("turned", v)
+        + 0.5 * found["mass"] * (v * v).sum(axis=0) + 0.5 * spin * spin * quadratic("spun", q, q)
+    )  # fmt: skip
+    return Bent(
+        kinetic, 0.5 * linear("stiffness", q * q), (inwards, sideways),
+        shortened(found, q, v)[0],
+    )  # fmt: skip
+
+
+def shortened(found: dict[str, Any], q: Array, v: Array) -> tuple[Array, Array]:
+    """delta (m) and its rate (m/s), shape (m,), of amplitudes and velocities (modes, m); `found`: of `numbers`."""
+    by = [found[f"nearer_{mode}"] for mode in range(1, len(q) + 1)]
+    return (
+        0.5 * sum(k * a * a for k, a in zip(by, q, strict=True)),
+        sum(k * a * b for k, a, b in zip(by, q, v, strict=True)),
+    )  # type: ignore[return-value]

@@ -1,0 +1,100 @@
+"""A bar that bends, as in the scene file."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from hpcclear.scene.fields import Count, Quantity, Table, invalid
+
+
+class Bending(Table):
+    """Bending of a bar between two pins, in modes of a beam that is held at both ends."""
+
+    stiffness: Annotated[float, Quantity("N*m**2", above=0)]
+    """Bending stiffness E I in the plane, N m2: Young's modulus times second moment of the section."""
+    modes: Annotated[int, Count(least=1, most=4)] = 2
+    """How many: half waves along the bar."""
+    damping: Annotated[float, Quantity("", least=0, below=1)] = 0.0
+    """Structural damping of each mode, over critical."""
+
+
+def check_bars(planar: Any) -> None:
+    """An error for validators unless every body of a linkage that bends is a bar that pins alone hold, at both its ends."""
+    for body in planar.bodies:
+        if body.bending is not None:
+            _check_bar(planar, body)
+
+
+def _check_bar(planar: Any, body: Any) -> None:
+    key = f"bodies.{body.name}.bending"
+    if body.length is None:
+        raise invalid(
+            "what bends is a bar, and this body has no length",
+            "Give its length, or leave bending out", key=key, value=None,
+        )  # fmt: skip
+    if body.points:
+        raise invalid(
+            f"the bar has a further point, {body.points[0].name}, and bending moves its ends alone",
+            "Leave out its points, or bending", key=key, value=None,
+        )  # fmt: skip
+    for row in planar.drives:
+        if row.body == body.name:
+            raise invalid(
+                f"{row.name} turns the bar, which would clamp it, and modes are those of pinned ends",
+                "Leave bending out, or drive another body", key=key, value=None,
+            )  # fmt: skip
+    for row in planar.loads:
+        if getattr(row, "body", None) == body.name:
+            raise invalid(
+                f"the torque {row.name} acts at no place of the bar",
+                "Leave bending out, or replace it by two forces", key=key, value=None,
+            )  # fmt: skip
+    held = set()
+    for joint in planar.joints:
+        places = [
+            getattr(joint, name, "") or "" for name in ("journal", "bearing", "point", "line")
+        ]
+        ends = [point for own, _, point in (p.partition(".") for p in places) if own == body.name]
+        held.update(ends)
+        if ends and joint.kind in ("slide", "fixed"):
+            raise invalid(
+                f"{joint.name} guides the bar, and modes are those of pinned ends",
+                "Leave bending out", key=key, value=None,
+            )  # fmt: skip
+        if ends and getattr(joint, "out_of_round", None) is not None:
+            raise out_of_round(joint.name, key)
+    for end in ("a", "b"):
+        if end not in held:
+            raise invalid(
+                f"nothing holds its end {end}, and modes are those of pinned ends",
+                "Leave bending out, or join both ends", key=key, value=None,
+            )  # fmt: skip
+
+
+def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
+    """An error for validators where a scene has what does not go with bending; `bending`: tables by their bodies' paths."""
+    if not bending:
+        return
+    key = f"{next(iter(bending))}.bending"
+    if not scene.is_planar and scene.numerics.formulation == "baumgarte":
+        raise invalid(
+            "the nine coordinates of Baumgarte's slider-crank have no place for modes",
+            'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
+            key=key, value=None,
+        )  # fmt: skip
+    for name in () if scene.is_planar else scene.clearance_joints():
+        if scene.clearance_joint(name).out_of_round is not None:
+            raise out_of_round(name, key)
+    if scene.wear is not None and scene.wear.waves and scene.worn_joints():
+        raise invalid(
+            "a profile of wear goes by the angles of rigid bodies, and a body bends",
+            'Set it to "uniform", or leave bending out',
+            key="wear.profile", value=scene.wear.profile,
+        )  # fmt: skip
+
+
+def out_of_round(joint: str, key: str) -> Exception:
+    """An error for validators: what of a joint at a bar that bends is refused."""
+    return invalid(
+        f"surfaces of {joint} are out of round, and their angles are those of rigid bodies",
+        "Leave out bending, or out_of_round", key=key, value=None,
+    )  # fmt: skip
