@@ -23,6 +23,8 @@ _ROOT_ALONE = (
     scenes.simulate,
     ensembles.merge,
     scenes.report,
+    scenes.reproduce,
+    scenes.crate,
     scenes.schema,
 )
 """Commands for which no rank goes into MPI: the others have left when root begins."""

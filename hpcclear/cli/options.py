@@ -140,6 +140,6 @@ def on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None 
 
 
 def say(text: str) -> None:
-    """An error message, from root only."""
+    """A line on standard error, from root only."""
     if is_root():
         click.echo(text, err=True)

@@ -116,6 +116,53 @@ def report(directory: Path) -> int:
     return Exit.DONE
 
 
+@click.command(short_help="Simulate again, and compare bit by bit.")
+@click.argument("place", type=click.Path(path_type=Path))
+@click.option(
+    "--samples",
+    type=click.IntRange(1),
+    default=16,
+    show_default=True,
+    help="Samples of each file, spread over it.",
+)
+def reproduce(place: Path, samples: int) -> int:
+    """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
+
+    PLACE is a file or a directory of results. Versions and processors that differ from those that made them are named. Exit
+    code 1 if anything is different.
+
+    Example: hpcclear reproduce results/quickstart
+    """
+    if not is_root():
+        return Exit.DONE
+    from hpcclear.ensemble.repeating import repeated
+
+    found = list(repeated(place, samples))
+    for one in found:
+        said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
+        click.echo(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))
+    for text in dict.fromkeys(text for one in found for text in one.changed):
+        click.echo(f"made by another {text}")
+    if not found:
+        click.echo("no samples and no responses: nothing was simulated again")
+    return Exit.FAILED if any(one.differing for one in found) else Exit.DONE
+
+
+@click.command(short_help="Describe results for an archive.")
+@click.argument("directory", type=click.Path(path_type=Path))
+def crate(directory: Path) -> int:
+    """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
+
+    Example: hpcclear crate results/quickstart
+    """
+    if not is_root():
+        return Exit.DONE
+    from hpcclear.results.crate import write_crate
+
+    click.echo(f"crate  {write_crate(directory)}")
+    return Exit.DONE
+
+
 @click.command()
 def schema() -> int:
     """Print the JSON schema of scene files, for editors.

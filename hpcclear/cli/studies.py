@@ -14,6 +14,7 @@ from hpcclear.cli.options import (
     on_ranks,
     output_option,
     place_of,
+    say,
     scene_of,
 )
 
@@ -126,7 +127,7 @@ def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: i
 
         planned = ranks.size if workers is None else workers
         scene = scene_of(file, overrides)
-        made = measure(scene, ranks, ladder(scene, error), planned)
+        made = measure(scene, ranks, ladder(scene, error), planned, say)
         describe(made, str(file), error, planned)
 
     return on_ranks(program)

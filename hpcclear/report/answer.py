@@ -27,6 +27,9 @@ SOME = 0.05
 LARGE = 0.1
 """Share of the variance from which chaos is worth more revolutions."""
 
+SAME = 0.01
+"""Relative difference up to which a variable of two designs is called the same."""
+
 NAMED = 3
 """Designs named before the rest is counted."""
 
@@ -117,7 +120,7 @@ def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
         return text if ends[0] == ends[1] else f"{text} ({ends[0]:.2g} to {ends[1]:.2g})"
     if f"{stem}_upper" in one and value:
         half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
-        text += f" ±{abs(half / value):.2%}"
+        text += f" ±{abs(half / value):.2%}" if np.isfinite(half) else ", limits not known"
     if one["design"].item() == original["design"].item():
         return text
     before = float(original[name])
@@ -282,7 +285,21 @@ def _alike(ours: xr.Dataset, best: xr.Dataset) -> str:
     shown = ", ".join(twins[:NAMED])
     more = len(twins) - NAMED
     shown += f" and {more} more" if more > 0 else ""
-    return f"{shown}: within the limits they cannot be told apart, choose by cost"
+    shown += ": within the limits they cannot be told apart, choose by cost"
+    spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
+    return f"{shown} ({spans} among them)" if spans else shown
+
+
+def _spans(alike: xr.Dataset) -> str:
+    """From where to where the variables of these designs reach, of those that differ."""
+    texts = []
+    for variable in labels.design_variables(alike):
+        low, high = float(variable.min()), float(variable.max())
+        if high - low > SAME * abs(high):
+            unit = str(variable.attrs["units"])
+            ends = (labels.quantity(end, unit) for end in (low, high))
+            texts.append(f"{labels.words(variable)} from {' to '.join(ends)}")
+    return ", ".join(texts)
 
 
 def _bounds(best: xr.Dataset) -> str:

@@ -35,8 +35,8 @@ from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kin
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
 LINKAGE_DIMS = {"body", "point", "pin"}
-FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle"}
-"""Coordinates that only a linkage's files have."""
+FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle", "mode"}
+"""Coordinates that only some files have."""
 
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
 _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
@@ -282,7 +282,7 @@ def response_dataset(
 ) -> xr.Dataset:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
-    `linkage`: labels along the dimensions ``body`` and ``point``, of series that have these.
+    `linkage`: labels along the dimensions ``body``, ``point`` and ``mode``, of series that have these.
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
     coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
@@ -393,6 +393,24 @@ def read(
         reason = f"it was made from another scene (hash {str(found)[:12]}, not {scene_hash[:12]})"
         raise InputError("file", str(place), reason, "Use the results of this scene")
     return content
+
+
+def files_in(directory: Path) -> list[Path]:
+    """Result files of a directory and of its folder ``responses``, in order; not those of runs under way.
+
+    Raises
+    ------
+    InputError
+        There is no such directory, or no result in it.
+    """
+    if not directory.is_dir():
+        reason = "this is a file" if directory.exists() else "there is no such directory"
+        raise InputError("directory", str(directory), reason, "Name the directory a run wrote to")
+    found = [*sorted(directory.glob("*.nc")), *sorted((directory / "responses").glob("*.nc"))]
+    if not found:
+        reason = "there is no result file in it"
+        raise InputError("directory", str(directory), reason, "Name the directory a run wrote to")
+    return found
 
 
 def _path(path: str | os.PathLike[str]) -> Path:

@@ -210,7 +210,7 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     for body in mechanism.bodies:
         size = "" if body.length is None else f"{q(body.length, 'm')}, "
         lines.append(
-            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.inertia, 'kg m^2')}, "
+            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.own_inertia, 'kg m^2')}, "
             f"starts at {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
         )
     for joint in mechanism.joints:

@@ -56,15 +56,11 @@ def read(directory: str | Path) -> Content:
         There is no such directory, or no result in it.
     """
     place = Path(directory)
-    if not place.is_dir():
-        reason = "this is a file" if place.exists() else "there is no such directory"
-        raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
-    paths = [*sorted(place.glob("*.nc")), *sorted((place / "responses").glob("*.nc"))]
     files: dict[str, xr.Dataset] = {}
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
     troubles = []
-    for path in paths:
+    for path in dataset.files_in(place):
         try:
             one = dataset.read(path)
         except InputError as error:

@@ -69,7 +69,7 @@ def reproduce(content: Content) -> list[object]:
         steps += [preformatted(str(found["command"].item()))]
     words = (
         "The same scene, seed and versions on the same type of processor give the same numbers to the last bit, on "
-        "any number of ranks."
+        "any number of ranks; `hpcclear reproduce` with this directory simulates some of them again and compares."
     )
     rows = [
         [label, content.attribute(name)]

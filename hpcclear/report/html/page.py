@@ -21,7 +21,7 @@ _MARK = b'<meta name="generator" content="hpcclear">'  # also stands in the temp
 
 _MISSING = {
     "samples": "samples.nc: no design was sampled (`hpcclear sample` or `run`)",
-    "sensitivity": "sensitivity.nc: no sensitivities (`hpcclear run`)",
+    "sensitivity": "sensitivity.nc: no sensitivities (`hpcclear run` of a study with `study.sensitivity.groups`)",
     "kriging": "kriging.nc: no surrogate (`hpcclear run`)",
     "front": "front.nc: nothing was optimised (`hpcclear run`)",
     "verification": "verification.nc: no design was verified (`hpcclear run`)",

@@ -188,12 +188,33 @@ def designs(content: Content) -> dict[str, object] | None:
     remarks = str(verified.attrs.get("remarks", "none"))
     return {
         "words": words,
+        "names": [
+            (name, text) for name, text in _MEANINGS if any(_is_called(one, name) for one in names)
+        ],
         "remarks": "" if remarks == "none" else remarks,
         "table": _designs_table(verified.isel(design=main), caption),
         "spread": _designs_table(verified.isel(design=spread), "Designs along the fronts")
         if spread
         else None,
     }
+
+
+_MEANINGS = (
+    ("original", "the scene as it is written"),
+    ("alpha", "least mean (or of the first that the case makes small) of all designs simulated"),
+    ("beta", "least deviation (or of the second) of these"),
+    ("front", "between these two, not beaten in both by any other"),
+    ("best", "alpha or beta by the surrogate alone, in the best run of the swarm"),
+    ("averaged", "the average of what all runs of the swarm found so"),
+    ("candidate", "met by the search on the way, and simulated anew beside the others"),
+)
+"""Kinds of designs, by a word of their names, and what they are."""
+
+
+def _is_called(name: str, kind: str) -> bool:
+    """Whether the kind is what a design is called; alpha and beta are also what others come near to."""
+    words = name.split()
+    return words[-1] == kind if kind in ("original", "alpha", "beta") else kind in words[-2:]
 
 
 def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:

@@ -1,0 +1,145 @@
+"""The `reproduce` command: whether what result files hold is what their scenes come to here, bit by bit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.api import as_points
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.loading import scene_of_text
+
+REPEATED = ("samples", "response")
+"""Kinds of files of which something is simulated again; all others follow from these, or take as long again."""
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """What came of one file.
+
+    Attributes
+    ----------
+    file : str
+    told : str
+        How much of it was simulated again, or why nothing was.
+    differing : tuple of str
+        Variables that are other ones here, with the largest relative difference.
+    changed : tuple of str
+        Versions and processor of the file that are not those here.
+    """
+
+    file: str
+    told: str
+    differing: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+
+
+def repeated(place: Path, count: int) -> Iterator[Repeated]:
+    """Simulate some of what files hold again, and compare.
+
+    Parameters
+    ----------
+    place : Path
+        A result file, or a directory of them.
+    count : int
+        Samples of each file, at most; spread over it.
+
+    Yields
+    ------
+    Repeated
+        Of each file that was read, in order.
+
+    Raises
+    ------
+    InputError
+        There is no result file, or one is damaged or was made from no valid scene.
+    """
+    paths = dataset.files_in(place) if place.is_dir() else [place]
+    for path in paths:
+        content = dataset.read(path)
+        kind, name = (
+            str(content.attrs["hpcclear_kind"]),
+            str(path.relative_to(place) if path != place else path),
+        )
+        if kind in REPEATED:
+            yield _compared(name, content, kind, count)
+
+
+def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated:
+    scene = scene_of_text(str(content.attrs.get("scene", "")), name)
+    changed = tuple(_changed(content, scene))
+    if content.attrs.get("scene_hash") != scene.hash:
+        return Repeated(
+            name, "not simulated: its scene reads otherwise in this version", (), changed
+        )
+    if kind == "response":
+        told, (ours, theirs) = "its series", _series(content, scene)
+    elif scene.study is not None and scene.study.accuracy is not None:
+        return Repeated(
+            name, "not simulated: its study chose the tolerances of its samples", (), changed
+        )
+    else:
+        chosen = np.unique(np.linspace(0, content.sizes["sample"] - 1, count).round().astype(int))
+        theirs = content.isel(sample=chosen)
+        told, ours = f"{len(chosen)} of {content.sizes['sample']} samples", _samples(theirs, scene)
+    return Repeated(name, told, tuple(_differing(ours, theirs)), changed)
+
+
+def _samples(content: xr.Dataset, scene: Scene) -> xr.Dataset:
+    """The same designs, simulated here."""
+    rows = {
+        str(name): one
+        for name, one in content.data_vars.items()
+        if one.attrs.get("role") == "design_variable"
+    }
+    points = as_points(
+        scene,
+        {str(one.attrs.get("scene_path", name)): one.to_numpy() for name, one in rows.items()},
+    )
+    records = evaluate_records(scene, points)
+    units = dict(zip(rows, points.units, strict=True))
+    return dataset.samples_dataset(
+        tuple(rows), points.values, units, records, {}, scene.objective, joints=scene.joint_labels
+    )
+
+
+def _series(content: xr.Dataset, scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
+    """Series over time here and there; a study keeps those after the transient."""
+    names = [name for name, one in content.data_vars.items() if "time" in one.dims]
+    ours = simulate(scene)
+    return ours.isel(time=slice(ours.sizes["time"] - content.sizes["time"], None))[names], content[
+        names
+    ]
+
+
+def _differing(ours: xr.Dataset, theirs: xr.Dataset) -> Iterator[str]:
+    """Variables that are not the same to the last bit, and how far off."""
+    for name, there in theirs.data_vars.items():
+        if name not in ours:
+            yield f"{name} (not here)"
+            continue
+        here, was = ours[name].to_numpy(), there.to_numpy()
+        if here.shape != was.shape:
+            yield f"{name} (another length)"
+        elif not np.array_equal(here, was, equal_nan=was.dtype.kind == "f"):
+            first, second = here.astype(float), was.astype(float)
+            off = np.nanmax(np.abs(first - second), initial=0.0)
+            yield f"{name} ({off / max(np.nanmax(np.abs(second), initial=0.0), 1e-300):.1e})"
+
+
+def _changed(content: xr.Dataset, scene: Scene) -> Iterator[str]:
+    """What the file says of programs and processor, where that is not what is here."""
+    now = dataset.provenance("", scene.hash)
+    for name in ("hpcclear_version", "processor"):
+        if content.attrs.get(name) != now[name]:
+            yield f"{name}: {content.attrs.get(name)}, here {now[name]}"
+    here = dict(one.rsplit(" ", 1) for one in now["versions"].split(", "))
+    for one in str(content.attrs.get("versions", "")).split(", "):
+        package, _, version = one.rpartition(" ")
+        if package and here.get(package) != version:
+            yield f"{package}: {version}, here {here.get(package, 'not installed')}"

@@ -1,0 +1,96 @@
+"""What a directory of results is, for catalogues and archives: a Process Run Crate (RO-Crate 1.1).
+
+Source: https://w3id.org/ro/crate/1.1 (S. Soiland-Reyes et al., Data Science 5, 2022, doi:10.3233/DS-210053) and the profile
+https://w3id.org/ro/wfrun/process/0.5 (S. Leo et al., PLoS ONE 19, 2024, doi:10.1371/journal.pone.0309210).
+"""
+
+import hashlib
+import json
+from collections import defaultdict
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from hpcclear.results import dataset, files
+
+NAME = "ro-crate-metadata.json"
+CRATE = "https://w3id.org/ro/crate/1.1"
+PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
+
+
+def write_crate(directory: Path) -> Path:
+    """Write DIRECTORY/ro-crate-metadata.json from what the result files below it say of themselves.
+
+    Equal files of equal ages give equal bytes.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        There is no result file, one is damaged, or a file of that name says something else: its user may have added to it.
+    """
+    found = {path: dataset.read(path) for path in dataset.files_in(directory)}
+    place = directory / NAME
+    graph = {"@context": f"{CRATE}/context", "@graph": _graph(directory, found)}
+    content = (json.dumps(graph, indent=2) + "\n").encode()
+    if not (place.is_file() and place.read_bytes() == content):
+        files.write_bytes(place, content)
+    return place
+
+
+def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, Any]]:
+    described = [_file(directory, path, content) for path, content in found.items()]
+    parts = [{"@id": one["@id"]} for one in described]
+    attributes: defaultdict[str, str] = defaultdict(lambda: "not stated")
+    for one in found.values():
+        attributes |= {name: str(value) for name, value in one.attrs.items()}
+    ended = datetime.fromtimestamp(max(path.stat().st_mtime for path in found), UTC).isoformat(
+        timespec="seconds"
+    )
+    command = next((str(one["command"].item()) for one in found.values() if "command" in one), "")
+    descriptor = {
+        "@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": CRATE},
+    }  # fmt: skip
+    root = {
+        "@id": "./", "@type": "Dataset", "conformsTo": {"@id": PROFILE},
+        "name": f"Results in {directory.resolve().name}",
+        "description": f"Simulations of a mechanism with clearance joints, by {attributes['source']}",
+        "datePublished": ended, "license": attributes["license"], "hasPart": parts, "mentions": {"@id": "#run"},
+    }  # fmt: skip
+    profile = {
+        "@id": PROFILE,
+        "@type": "CreativeWork",
+        "name": "Process Run Crate",
+        "version": "0.5",
+    }
+    program = {
+        "@id": "#hpcclear", "@type": "SoftwareApplication", "name": "hpcclear",
+        "softwareVersion": attributes["hpcclear_version"], "softwareRequirements": attributes["versions"],
+        "processorRequirements": attributes["processor"],
+    }  # fmt: skip
+    scene = {
+        "@id": "#scene", "@type": "CreativeWork", "name": "scene file", "encodingFormat": "application/toml",
+        "text": attributes["scene"], "identifier": attributes["scene_hash"],
+    }  # fmt: skip
+    run = {
+        "@id": "#run", "@type": "CreateAction", "name": "Simulation", "instrument": {"@id": "#hpcclear"},
+        "object": {"@id": "#scene"}, "result": parts, "endTime": ended,
+        **({"description": command} if command else {}),
+    }  # fmt: skip
+    return [descriptor, root, profile, program, scene, run, *described]
+
+
+def _file(directory: Path, path: Path, content: xr.Dataset) -> dict[str, Any]:
+    data = path.read_bytes()
+    return {
+        "@id": path.relative_to(directory).as_posix(), "@type": "File", "name": path.name,
+        "description": str(content.attrs.get("title", "not stated")), "encodingFormat": "application/x-netcdf",
+        "contentSize": str(len(data)), "sha256": hashlib.sha256(data).hexdigest(),
+    }  # fmt: skip

@@ -1,0 +1,107 @@
+"""The `reproduce` command: results that are what their scenes come to here, and such that are not."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from commands import CHEAP, SCENE
+
+from hpcclear import evaluate, load_scene, simulate
+from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.ensemble.repeating import repeated
+from hpcclear.results import dataset
+from hpcclear.results.crate import write_crate
+
+
+def strip(content) -> None:
+    """What only a forged file lacks."""
+    content.attrs = {"hpcclear_kind": content.attrs["hpcclear_kind"]}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A directory with some samples and a response."""
+    place = tmp_path_factory.mktemp("made")
+    scene = load_scene(SCENE, CHEAP)
+    clearances = np.linspace(1e-4, 9e-4, 12)
+    dataset.write(evaluate(scene, {"C": clearances, "m2": clearances * 500}), place / "samples.nc")
+    dataset.write(simulate(scene), place / "response.nc")
+    return place
+
+
+def said(*words: str):
+    return CliRunner().invoke(cli, words, standalone_mode=False)
+
+
+def changed(made, tmp_path, name: str, change) -> dict[str, object]:
+    """What is found in a copy of one file that `change` was let at."""
+    content = dataset.read(made / name)
+    change(content)
+    dataset.write(content, tmp_path / name)
+    (found,) = repeated(tmp_path, 5)
+    return vars(found)
+
+
+def test_what_was_made_here_is_the_same(made):
+    result = said("reproduce", str(made), "--samples", "5")
+    assert result.return_value == 0
+    assert result.output.splitlines() == [
+        "response.nc: its series: the same",
+        "samples.nc: 5 of 12 samples: the same",
+    ]
+    (alone,) = repeated(made / "samples.nc", 100)
+    assert alone.told == "12 of 12 samples"
+
+
+def test_a_last_bit_tells(made, tmp_path):
+    def nudge(content):
+        content["objective"][-1] = np.nextafter(content["objective"][-1], 1.0)
+
+    (differing,) = changed(made, tmp_path, "samples.nc", nudge)["differing"]
+    assert differing.startswith("objective (")
+    result = said("reproduce", str(tmp_path))
+    assert result.return_value == 1
+    assert "not the same: objective" in result.output
+
+
+def test_a_series_that_was_changed_tells(made, tmp_path):
+    def shift(content):
+        content["crank_moment"][7] += 1.0
+
+    (differing,) = changed(made, tmp_path, "response.nc", shift)["differing"]
+    assert differing.startswith("crank_moment (")
+
+
+def test_other_versions_are_named(made, tmp_path):
+    def age(content):
+        content.attrs["versions"] = content.attrs["versions"].replace("numpy ", "numpy 1.")
+        content.attrs["processor"] = "an abacus"
+
+    found = changed(made, tmp_path, "samples.nc", age)
+    assert found["differing"] == ()
+    texts = " / ".join(found["changed"])
+    assert "processor: an abacus, here " in texts
+    assert "numpy: 1." in texts
+    assert "scipy" not in texts
+
+
+def test_a_scene_that_reads_otherwise_is_not_simulated(made, tmp_path):
+    def rehash(content):
+        content.attrs["scene_hash"] = "0" * 64
+
+    assert "reads otherwise" in changed(made, tmp_path, "samples.nc", rehash)["told"]
+
+
+def test_a_scene_that_is_none_is_refused(made, tmp_path):
+    def forge(content):
+        content.attrs["scene"] = "mechanism = 3"
+
+    for change in (forge, strip):
+        with pytest.raises(InputError):
+            changed(made, tmp_path, "samples.nc", change)
+    assert write_crate(tmp_path).exists()
+
+
+def test_a_place_without_results_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no result file"):
+        list(repeated(tmp_path, 5))
