@@ -1,6 +1,8 @@
 """One thread for BLAS and Numba before numpy loads, and other seeds for the statistical tests."""
 
 import os
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +23,15 @@ def pytest_addoption(parser):
 def shift() -> int:
     """What a statistical test adds to its seeds: 0, or 100, 200, ... with ``--other-seeds``."""
     return 0
+
+
+@pytest.fixture
+def place_of_all():
+    """A folder that other users may enter; pytest's own are closed whenever a session of it begins."""
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        place.chmod(0o755)
+        yield place
 
 
 def pytest_generate_tests(metafunc):

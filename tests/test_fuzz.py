@@ -273,30 +273,27 @@ def test_no_string_of_a_scene_leads_out_of_the_output_directory(hpcclear, tmp_pa
     assert not Path("/tmp/outside").exists()
 
 
-def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, tmp_path):
-    open_to_all = (tmp_path, *list(tmp_path.parents)[:3])
-    locked, file, full = (tmp_path / name for name in ("locked", "file", "directory.nc"))
+def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, place_of_all):
+    locked, file, full = (place_of_all / name for name in ("locked", "file", "directory.nc"))
     locked.mkdir(mode=0o555)
     file.write_text("mine")
     full.mkdir()
-    scene = tmp_path / "scene.toml"
+    scene = place_of_all / "scene.toml"
     scene.write_text(TEXT)
-    (tmp_path / "dangling.nc").symlink_to(tmp_path / "no" / "where.nc")
-    before = tree(tmp_path)
+    (place_of_all / "dangling.nc").symlink_to(place_of_all / "no" / "where.nc")
+    before = tree(place_of_all)
     words = ("sample", scene, *overrides(*CHEAP, "study.samples=40"), "-o")
     for place in (
         locked / "x.nc",
         file / "x.nc",
         full,
-        tmp_path / "no" / "x.nc",
+        place_of_all / "no" / "x.nc",
         Path("/proc/x.nc"),
     ):
-        for parent in open_to_all:  # another session of tests closes the outermost
-            parent.chmod(0o755)
         answer = hpcclear(*words, place, user=NOBODY)
         assert refused(answer), (place, answer)
         assert str(place.parent) in answer[1] or str(place) in answer[1]
-    assert tree(tmp_path) == before
+    assert tree(place_of_all) == before
 
 
 def test_a_link_in_place_of_the_result_is_replaced_not_followed(hpcclear, tmp_path):
@@ -364,7 +361,7 @@ def damaged(content: bytes, other: bytes, dice: random.Random) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=FULL)])
+@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=FULL)])
 @pytest.mark.timeout(1800)
 def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     _, output = result
@@ -383,8 +380,15 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     for _ in range(count):
         path.write_bytes(damaged(content, timing, dice))
         with pytest.raises(InputError):
-            dataset.read(path)
-        first.write_bytes(damaged(part, content, dice))
+            dataset.read(path, "samples")
+        spoilt = damaged(part, content, dice)
+        first.write_bytes(spoilt)
+        if (
+            spoilt == content
+        ):  # all but the first bytes, which are the same: a whole file of another run
+            with pytest.raises(InputError, match="another run"):
+                Checkpoint(parts, key, names=names)
+            continue
         again = Checkpoint(parts, key, names=names)
         assert again.completed().tobytes() == records[20:].tobytes()
         assert len(again.problems) == 1

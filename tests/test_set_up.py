@@ -6,7 +6,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import tomllib
 from pathlib import Path
 
@@ -137,17 +136,16 @@ def test_an_error_of_another_kind_is_shown_as_pip_says_it(prepared):
     assert "not a requirement at all" in done.stderr
 
 
-def test_an_unwritable_checkout(checkout, tmp_path):
-    with tempfile.TemporaryDirectory() as name:  # pytest's own folder is closed to others
-        place = Path(name)
-        shutil.copytree(checkout, place / "checkout")
-        python = fake_python(place / "bin", HERE)
-        for path in (place, place / "checkout"):
-            path.chmod(0o555)
-        nobody = 65534 if os.getuid() == 0 else None  # root may write anywhere
-        done = set_up(place / "checkout", user=nobody, PYTHON=python)
-        for path in (place, place / "checkout"):
-            path.chmod(0o755)
+def test_an_unwritable_checkout(checkout, place_of_all):
+    place = place_of_all
+    shutil.copytree(checkout, place / "checkout")
+    python = fake_python(place / "bin", HERE)
+    for path in (place, place / "checkout"):
+        path.chmod(0o555)
+    nobody = 65534 if os.getuid() == 0 else None  # root may write anywhere
+    done = set_up(place / "checkout", user=nobody, PYTHON=python)
+    for path in (place, place / "checkout"):
+        path.chmod(0o755)
     assert_one_line(done, f"{place / 'checkout'} is not writable")
 
 
