@@ -65,6 +65,13 @@ PAIRS = [
         "effects.friction={law='lugre', coefficient=0.01, static_coefficient=0.015, stribeck_speed=0.01, "
         "bristle_stiffness=1e5}",
     ),
+    *(
+        added(
+            f"bending of the rod, {modes} modes, {stiffness} N m2",
+            f"mechanism.rod.bending={{modes={modes}, stiffness={stiffness}.0, damping=0.01}}",
+        )
+        for modes, stiffness in ((1, 800), (2, 800), (4, 800), (2, 20000))
+    ),
     added("torque drive", FREE % "5.0"),
     Pair("tabulated torque", [*BARE, FREE % "5.0"], [*BARE, FREE % CURVE]),
     added("gravity", "effects.gravity=9.81"),

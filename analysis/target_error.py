@@ -259,12 +259,14 @@ def main() -> None:
                 file.write(json.dumps(known[number]) + "\n")
         scenes.append(known[number])
         print(told(known[number]), flush=True)
-    rows = [row for found in scenes for row in found.get("targets", [])]
+    rows = [
+        row | {"truth_error": found["truth_error"], "kind": found["kind"]}
+        for found in scenes
+        for row in found.get("targets", [])
+    ]
     summary(rows, "all")
     for kind in LINKAGES if options.linkages else KINDS:
-        summary(
-            [row for found in scenes if found.get("kind") == kind for row in found["targets"]], kind
-        )
+        summary([row for row in rows if row["kind"] == kind], kind)
     for regime in sorted({row["regime"] for row in rows}):
         summary([row for row in rows if row["regime"] == regime], regime)
 
@@ -277,6 +279,13 @@ def summary(rows: list[dict[str, Any]], what: str) -> None:
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.most_common())
     print(
         f"{what}: {len(rows)} answers: {said}; limits hold in {held} of {stated}: {held / max(stated, 1):.3f}"
+    )
+    met = [row for row in rows if row["verdict"].startswith("met, ")]
+    kept = [
+        row for row in met if abs(row["off"]) <= np.hypot(row["target"], 2.0 * row["truth_error"])
+    ]
+    print(
+        f"    called met and within the target: {len(kept)} of {len(met)}: {len(kept) / max(len(met), 1):.3f}"
     )
 
 

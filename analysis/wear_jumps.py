@@ -1,11 +1,12 @@
 """Jumps against runs without any: clearances of random lives after many revolutions, what jumps cost, whether errors are held.
 
-    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40] [--chunk 10] [--truth FILE.npz] [-o FIGURE]
+    python analysis/wear_jumps.py [--revolutions 100000] [--lives 40] [--chunk 10] [--profile angular] [--truth FILE] [-o FIG]
 
 Without jumps every life runs on from where it is, and after every chunk of revolutions its clearances grow by what these wore.
 Wear coefficients are larger than those of jobs/wear.toml by as much as lives are shorter, so that clearances grow alike.
-The run without jumps is kept in FILE, if one is named, and taken from there another time. FIGURE shows what errors of jumps
-cost: processor time against the error of the clearance, by the tolerance of a jump.
+With profiles these grow alike, and what is compared is the clearance where it is largest around the bearing.
+The run without jumps is kept in FILE (.npz), if one is named, and taken from there another time. FIG shows what errors of
+jumps cost: processor time against the error of the clearance, by the tolerance of a jump.
 """
 
 import argparse
@@ -18,8 +19,8 @@ from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Start
-from hpcclear.dynamics.wear.law import joints_of
+from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
 from hpcclear.ensemble.wear import States, inputs_of, waiting_longer
 from hpcclear.report.figures import style
@@ -32,11 +33,11 @@ WHOLE = 1e6
 """Revolutions of the starter's lives."""
 
 
-def scene_of(lives: int, revolutions: int) -> Scene:
+def scene_of(lives: int, revolutions: int, profile: str) -> Scene:
     """The starter's lives, worn faster."""
     scene = load_scene(SCENE)
     faster = WHOLE / revolutions
-    changes = {"wear.lives": lives, "wear.cycles": float(revolutions)}
+    changes = {"wear.lives": lives, "wear.cycles": float(revolutions), "wear.profile": profile}
     for row in scene.required_study.random:
         if row.name in ("k12", "k23"):
             changes[row.paths[0]] = faster * scene.number(row.paths[0])
@@ -52,6 +53,7 @@ def unjumped(scene: Scene, revolutions: int, chunk: int) -> tuple[np.ndarray, fl
     states = States(scene, inputs, joints)
     lives = range(len(joints.clearance))
     work = np.zeros(joints.clearance.shape)
+    moments = np.zeros((*work.shape, states.relief.size))
     lanes = Lanes(
         problem_of(
             scene.with_(
@@ -62,7 +64,7 @@ def unjumped(scene: Scene, revolutions: int, chunk: int) -> tuple[np.ndarray, fl
     )
 
     def par_of() -> np.ndarray:
-        rows = [states.rows(k, Asked(work[k], range(1))) for k in lives]
+        rows = [states.rows(k, Asked(work[k], range(1), moments[k])) for k in lives]
         return parameters(scene, states.points(np.concatenate(rows)))
 
     par = par_of()
@@ -73,9 +75,25 @@ def unjumped(scene: Scene, revolutions: int, chunk: int) -> tuple[np.ndarray, fl
         outcome = lanes.run(par_of(), start)
         if (outcome.status != 0).any():
             raise RuntimeError("a simulation failed")
-        work += outcome.sliding_work[:, : work.shape[1]]
+        done = outcome.sliding_work[:, : work.shape[1]]
+        if moments.size:
+            share = waves_of(outcome, moments.shape) / np.maximum(
+                outcome.sliding_power[:, : work.shape[1], None], 1e-300
+            )
+            moments += share * (joints.counted(work + done) - joints.counted(work))[..., None]
+        work += done
         start = outcome.end()
-    return joints.worn(work)[0], time.process_time() - began
+    return deepest(joints, states, work, moments), time.process_time() - began
+
+
+def waves_of(outcome: Outcome, shape: tuple[int, ...]) -> np.ndarray:
+    """Waves of the sliding power of worn joints, W, as of `Relief`."""
+    return outcome.profile[:, : shape[1] * shape[2]].reshape(shape)
+
+
+def deepest(joints: Joints, states: States, work: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Clearances (lives, joints), m, where they are largest around the surfaces."""
+    return joints.worn(work)[0] + states.relief.deepest(states.relief.waves(joints, moments))
 
 
 def truth_of(
@@ -107,7 +125,8 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
         table.most_copies,
     )
     kinds = [Lanes(problem_of(one), 32) for one in (scene, waiting_longer(scene))]
-    lives = [life(joints[k], plan) for k in range(len(joints.clearance))]
+    relief = states.relief
+    lives = [life(joints[k], plan, relief) for k in range(len(joints.clearance))]
     going = {k: next(one) for k, one in enumerate(lives)}
     ended = {}
     began = time.process_time()
@@ -121,6 +140,7 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
             np.empty(len(par)),
             np.empty((len(par), 2)),
             np.empty(len(par), int),
+            np.empty((len(par), 2, relief.size)),
         ]
         for kind, lanes in enumerate(kinds):
             chosen = late == kind
@@ -128,6 +148,7 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
             period = outcome.time / outcome.revolutions
             parts = (
                 outcome.sliding_power[:, :2] * period[:, None], outcome.objective, outcome.peak_force[:, :2], outcome.status,
+                waves_of(outcome, (len(period), 2, relief.size)) * period[:, None, None],
             )  # fmt: skip
             for whole, part in zip(answer, parts, strict=True):
                 whole[chosen] = part
@@ -141,7 +162,10 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
                 ended[k] = end.value
     seconds = time.process_time() - began
     done = [ended[k] for k in range(len(lives))]
-    ends = np.stack([joints[k].worn(one.nodes[-1].work)[0] for k, one in enumerate(done)])
+    last = [one.nodes[-1] for one in done]
+    ends = deepest(
+        joints, states, np.stack([n.work for n in last]), np.stack([n.moments for n in last])
+    )
     stated = np.stack([one.error + one.limit for one in done])
     return ends, stated, seconds, sum(one.simulations for one in done)
 
@@ -177,8 +201,9 @@ def main() -> None:
     parser.add_argument("--chunk", type=int, default=10)
     parser.add_argument("--truth", type=Path)
     parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--profile", choices=("uniform", "angular"), default="uniform")
     asked = parser.parse_args()
-    scene = scene_of(asked.lives, asked.revolutions)
+    scene = scene_of(asked.lives, asked.revolutions, asked.profile)
     ends, stated, fast, simulations = jumped(scene)
     ends, stated, fast, simulations = jumped(scene)  # once more, compiled
     truth, slow = truth_of(scene, asked.revolutions, asked.chunk, asked.truth)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 
 from hpcclear.dynamics import layout as at
@@ -86,6 +87,26 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
     )  # fmt: skip
 
 
+def rod_of(scene: Scene, par) -> Rod:
+    """A slider-crank's rod that bends, as its points."""
+    table = scene.slider_crank.rod.bending
+    rows = (at.ROD_MASS, at.ROD_INERTIA, at.ROD_LENGTH, at.ROD_NEAR)
+    return Rod(*(par[row] for row in rows), table.stiffness, table.damping, table.modes)
+
+
+def bent(scene: Scene, par, q, v, nine, rates) -> tuple[float, float]:
+    """Energy and first moment against y = 0 that bending adds to the rigid bodies, J and kg m."""
+    k, rod = scene.modes, rod_of(scene, par)
+    near = par[at.ROD_NEAR] * np.exp(1j * nine[THETA2])
+    end = nine[X2] + 1j * nine[Y2] - near
+    speed = rates[X2] + 1j * rates[Y2] - 1j * rates[THETA2] * near
+    y = np.array([end.real, end.imag, nine[THETA2], *q[:k]])
+    w = np.array([speed.real, speed.imag, rates[THETA2], *v[:k]])
+    rigid = par[at.ROD_MASS] * (rates[X2] ** 2 + rates[Y2] ** 2)
+    rigid += par[at.ROD_INERTIA] * rates[THETA2] ** 2
+    return sum(rod.energy(y, w)) - 0.5 * rigid, rod.raised(y)
+
+
 def bodies(scene: Scene, par, q, v):
     """Nine coordinates and velocities from those of any topology, by the vectors between the joints.
 
@@ -98,6 +119,12 @@ def bodies(scene: Scene, par, q, v):
     free = scene.drive.kind == "torque"
     phi, omega = (q[-1], v[-1]) if free else (0.0, par[at.SPEED])
     crank, length = par[at.CRANK_LENGTH], par[at.ROD_LENGTH]
+    far, k, rate = par[at.ROD_FAR], scene.modes, 0.0
+    if k:
+        y, w = np.array([0, 0, 0, *q[:k]]), np.array([0, 0, 0, *v[:k]])
+        rod = rod_of(scene, par)
+        drawn, rate = rod.place_of_end(y)[0] - length, (rod.end(y).real @ w)[0]
+        length, far, q, v = length + drawn, far + drawn, q[k:], v[k:]
     pin = crank * np.exp(1j * phi)
     pin_v = 1j * omega * pin
     first, second = (name in scene.clearance_joints() for name in ("crank_rod", "rod_slider"))
@@ -105,20 +132,20 @@ def bodies(scene: Scene, par, q, v):
         theta, spin, slider, slider_v = q[2], v[2], q[3], v[3]
         centre, centre_v = q[0] + 1j * q[1], v[0] + 1j * v[1]
     else:
-        if first or second:
+        if first or second or k:
             theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
         else:
             theta = np.arcsin(-pin.imag / length)
             spin = -pin_v.imag / (length * np.cos(theta))
         along = np.exp(1j * theta)
-        if not (first or second):
+        if not (first or second or k):
             slider, slider_v = (
                 (pin + length * along).real,
                 (pin_v + 1j * spin * length * along).real,
             )
         if first:
-            centre = slider - par[at.ROD_FAR] * along
-            centre_v = slider_v - 1j * spin * par[at.ROD_FAR] * along
+            centre = slider - far * along
+            centre_v = slider_v - (1j * spin * far + rate) * along
         else:
             centre = pin + par[at.ROD_NEAR] * along
             centre_v = pin_v + 1j * spin * par[at.ROD_NEAR] * along
@@ -139,7 +166,13 @@ def energy(scene: Scene, par, q, v, active) -> float:
     total = 0.5 * (masses * rates**2).sum()
     total += scene.effects.gravity * (m1 * nine[Y1] + m2 * nine[Y2] + m3 * nine[Y3])
     near_end = nine[X2] + 1j * nine[Y2] - par[at.ROD_NEAR] * np.exp(1j * nine[THETA2])
-    far_end = nine[X2] + 1j * nine[Y2] + par[at.ROD_FAR] * np.exp(1j * nine[THETA2])
+    far = par[at.ROD_FAR]
+    if scene.modes:
+        more, moment = bent(scene, par, q, v, nine, rates)
+        total += more + scene.effects.gravity * moment
+        y = np.array([0, 0, 0, *q[: scene.modes]])
+        far += rod_of(scene, par).place_of_end(y)[0] - par[at.ROD_LENGTH]
+    far_end = nine[X2] + 1j * nine[Y2] + far * np.exp(1j * nine[THETA2])
     pin = (nine[X1] + 1j * nine[Y1]) + (par[at.CRANK_LENGTH] - par[at.CRANK_NEAR]) * np.exp(
         1j * nine[PHI]
     )

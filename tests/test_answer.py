@@ -78,6 +78,15 @@ def test_designs_within_each_others_limits_are_named_and_others_are_not():
     assert "study.verification.samples" not in told(verified(MEAN, DEVIATION, 1e-8))["next"]
 
 
+def test_what_is_as_good_says_from_where_to_where():
+    assert told(verified(MEAN, DEVIATION))["as good as it"].endswith(
+        "(m2 from 0.2 kg to 0.4 kg among them)"
+    )
+    content = verified(MEAN, DEVIATION)
+    content["m2"][3] = content["m2"][1] * 1.001
+    assert told(content)["as good as it"].endswith("choose by cost")
+
+
 def test_the_ends_of_a_front_stand_beside_the_original():
     content = verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN))
     ((case, rows),) = beside_original(content)  # "calm" has no original
@@ -86,6 +95,14 @@ def test_the_ends_of_a_front_stand_beside_the_original():
     assert rows[1][2] == "40 µm ±2.50% -33%"
     assert rows[2] == ("95 % below", "0.8 mm", "0.4 mm -50%", "0.6 mm -25%")
     assert rows[3] == ("held at", "", "m2 lower", "none of its variables")
+
+
+def test_limits_that_are_not_known_are_no_numbers():
+    half = np.array(MEAN)
+    limits = {"percentile_lower": 1.9 * half, "percentile_upper": np.full(len(half), np.nan)}
+    content = verified(MEAN, DEVIATION, percentile=2.0 * half, **limits)
+    ((_, rows),) = beside_original(content)
+    assert rows[2][1:3] == ("0.8 mm, limits not known", "0.4 mm, limits not known -50%")
 
 
 def test_an_original_that_is_best_is_kept():

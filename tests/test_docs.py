@@ -211,10 +211,10 @@ def test_no_code_of_ours_is_left_in_the_pages(site):
 
 
 def test_a_newcomers_questions_are_answered_in_a_command_or_a_click():
-    """docs/questions.md, a click from the start: twenty rows, each with a command, an entry or a link."""
+    """docs/questions.md, a click from the start: twenty rows and more, each with a command, an entry or a link."""
     page = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
     rows = re.findall(r"(?m)^\| ([^|]+\?) \| (.+) \|$", page)
-    assert len(rows) == 20
+    assert len(rows) >= 20
     assert all("`" in answer or "](" in answer for _, answer in rows)
     for word in ("lubrication", "four-stroke", "LuGre", "latched", "restart", "Hertz"):
         assert word in page

@@ -33,6 +33,7 @@ FRICTIONS = {
 }
 IDEAL = {"kind": "ideal"}
 OIL = {"viscosity": 1e-3, "length": "20 mm"}
+BENDING = {"stiffness": 300.0}
 FACTORS = {
     "open": ["both", "crank_rod", "rod_slider", "none"],
     "contact": list(CONTACTS),
@@ -43,6 +44,7 @@ FACTORS = {
     "guide": [False, True],
     "film": [None, "short", "long"],
     "formulation": ["minimal", "baumgarte"],
+    "bending": [None, 2],
     "energy": [True, False],
 }
 
@@ -56,10 +58,15 @@ def allowed(row):
         if row.get("film") is not None:
             return False
         # closed-form, not integrated: tests/test_ideal.py
-        if row.get("drive") == "speed" and row.get("formulation") == "minimal":
+        if (
+            row.get("drive") == "speed"
+            and row.get("formulation") == "minimal"
+            and row.get("bending", 2) is None
+        ):
             return False
-    # bristles have no place among the nine coordinates
-    return row.get("friction") != "lugre" or row.get("formulation") != "baumgarte"
+    # neither bristles nor modes have a place among the nine coordinates
+    further = row.get("friction") == "lugre" or row.get("bending") is not None
+    return not further or row.get("formulation") != "baumgarte"
 
 
 TABLE = pairwise_table(FACTORS, allowed)
@@ -94,6 +101,9 @@ def scene_of(row, **more):
         changes["drive"] = {**FREE, "torque": 5.0 if row["drive"] == "torque" else TORQUE_CURVE}
     if row["load"] is not None:
         changes["effects.slider_load"] = row["load"]
+    if row["bending"] is not None:
+        changes["mechanism.rod.bending"] = {"stiffness": 300.0, "modes": row["bending"]}
+        changes["mechanism.rod.bending"]["damping"] = 0.02
     if row["guide"]:
         changes["effects.guide_friction"] = {"coefficient": 0.1}
     return scene_with(changes | more, rtol=1e-7)
@@ -103,7 +113,7 @@ def test_the_table_holds_every_pair():
     met = {pair for row in TABLE for pair in pairs_of(FACTORS, row)}
     assert met == set(all_pairs(FACTORS, allowed))
     assert all(allowed(row) for row in TABLE)
-    assert len(TABLE) <= 20
+    assert len(TABLE) <= 22
 
 
 @pytest.mark.parametrize("row", ROWS)
@@ -224,6 +234,20 @@ CONTRADICTIONS = [
         {"effects.friction": FRICTIONS["lugre"], "numerics.formulation": "baumgarte"},
         "effects.friction.law",
         "no place for bristles",
+    ),
+    (
+        {"mechanism.rod.bending": BENDING, "numerics.formulation": "baumgarte"},
+        "mechanism.rod.bending",
+        "no place for modes",
+    ),
+    ({"mechanism.crank.bending": BENDING}, "mechanism.crank.bending", "clamps it"),
+    (
+        {
+            "mechanism.rod.bending": BENDING,
+            "joints.crank_rod.out_of_round": {"journal": {"cosine_2": 1e-5}},
+        },
+        "mechanism.rod.bending",
+        "out of round",
     ),
 ]
 

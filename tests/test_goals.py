@@ -143,6 +143,21 @@ def test_a_probability_that_never_came_has_the_limits_of_as_many_draws() -> None
     assert np.isnan([few.value, few.lower, few.upper, *few.shifts]).all()
 
 
+@pytest.mark.parametrize("order", [0.9, 0.95])
+def test_few_draws_have_limits_of_a_quantile_and_these_hold(order: float, shift: int) -> None:
+    """100 draws, as a short study has: the upper limit was beyond the largest of them, so not known."""
+    true = SPREAD * stats.norm.ppf(order)
+    held = 0
+    for seed in range(400):
+        draws = smooth(np.random.default_rng(seed + 1000 * shift).random((100, 1, 2)))
+        found = quantile(draws, order, 0.95)
+        assert np.isfinite([found.lower, found.upper]).all()
+        held += found.lower <= true <= found.upper
+    assert held >= fewest(400, 0.95), held
+    thirty = quantile(draws[:30], order, 0.95)
+    assert np.isnan(thirty.upper)
+
+
 @pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
 @pytest.mark.parametrize("order", [0.5, 0.95])
 def test_shifts_of_a_quantile_are_as_large_as_it_scatters(method: str, order: float, shift: int) -> None:  # fmt: skip

@@ -13,12 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import report_data as data
+from click.testing import CliRunner, Result
 from commands import CHEAP, MPIEXEC, ROOT, SCENE, finish, overrides, run, sample, start
 
 from hpcclear.base.errors import InputError, LimitError, mendable
+from hpcclear.cli import cli
 from hpcclear.report.html import guard
 from hpcclear.report.html.page import write_report
-from hpcclear.results import files, netcdf
+from hpcclear.results import dataset, files, netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.table import read_points
 
@@ -84,24 +86,24 @@ def test_devices_and_pipes_are_refused(tmp_path):
 
 
 def test_figures_and_pages_replace_only_figures_and_pages_of_ours(tmp_path):
-    sketch = tmp_path / "sketch.png"
-    words = ["check", str(SCENE), "--no-cost", "--sketch", str(sketch)]
+    def drawn(place: Path) -> Result:
+        return CliRunner().invoke(cli, ["check", str(SCENE), "--no-cost", "--sketch", str(place)])
+
     for ending in ("png", "svg", "pdf"):
-        sketch = sketch.with_suffix(f".{ending}")
-        words[-1] = str(sketch)
-        assert run(words, 0)[0] == 0
+        sketch = tmp_path / f"sketch.{ending}"
+        assert drawn(sketch).exit_code == 0
         first = sketch.read_bytes()
-        assert run(words, 0)[0] == 0
+        assert drawn(sketch).exit_code == 0
         assert sketch.read_bytes() == first
         sketch.write_bytes(b"a photograph")
-        assert refused(run(words, 0))
+        assert isinstance(drawn(sketch).exception, InputError)
         assert sketch.read_bytes() == b"a photograph"
-    study = data.write_study(tmp_path)
-    write_report(study)
-    write_report(study)
-    (study / "report.html").write_text("<p>my own words</p>")
+    dataset.write(data.response(3), tmp_path / "mine.nc")
+    write_report(tmp_path)
+    write_report(tmp_path)
+    (tmp_path / "report.html").write_text("<p>my own words</p>")
     with pytest.raises(InputError):
-        write_report(study)
+        write_report(tmp_path)
 
 
 LONG = "x" * 300

@@ -17,9 +17,10 @@ from hpcclear.cli.printing import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start
 from hpcclear.dynamics.start import start_states
 from hpcclear.ensemble.api import as_points, evaluate
+from hpcclear.report.figures.linkage_sketch import key
 
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
@@ -292,6 +293,28 @@ def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():
         evaluate(scene, {"mechanism.bodies.coupler.center.y": [1e-3]})
 
 
+def test_an_inertia_may_follow_mass_and_length():
+    """As the scene states it, and where columns move both."""
+    mass, length = (
+        rocker().number(f"mechanism.bodies.coupler.{name}") for name in ("mass", "length")
+    )
+    slender = mass * length**2 / 12.0
+    stated = rocker(f"mechanism.bodies.coupler.inertia={1.5 * slender!r}")
+    followed = rocker(
+        "mechanism.bodies.coupler.inertia=0", "mechanism.bodies.coupler.inertia_ratio=1.5"
+    )
+    assert simulate(followed).equals(simulate(stated))
+    assert key(followed, poses_at_start(followed)) == key(stated, poses_at_start(stated))
+
+    lengths, masses = np.array([0.118, 0.12, 0.123]), np.array([0.25, 0.3, 0.4])
+    moved = {"mechanism.bodies.coupler.length": lengths, "mechanism.bodies.coupler.mass": masses}
+    with_inertia = moved | {"mechanism.bodies.coupler.inertia": 1.5 * (masses * lengths**2 / 12.0)}
+    found = evaluate_records(followed, as_points(followed, moved))
+    wanted = evaluate_records(stated, as_points(stated, with_inertia))
+    assert (found["status"] == Status.OK).all()
+    np.testing.assert_array_equal(found["objective"], wanted["objective"])
+
+
 # ---- what is refused ---------------------------------------------------------------------------------
 
 BROKEN = {
@@ -308,6 +331,7 @@ BROKEN = {
     "bodies.coupler.inertia=0": ("mechanism.bodies.coupler.inertia", "inertia"),
     "bodies.coupler.length=2 m": ("mechanism.joints", "does not close"),
     "bodies.coupler.center=[0.1, 0.0]": ("mechanism.bodies.coupler.center", "mass_center"),
+    "bodies.coupler.inertia_ratio=1": ("mechanism.bodies.coupler.inertia_ratio", "Remove one"),
     "drives.motor.body=shaft": ("mechanism.drives.motor.body", "no such body"),
     "drives.motor.speed=0": ("mechanism.drives.motor.speed", "nothing would turn"),
     "drives.motor.turns=0": ("mechanism.drives.motor.turns", "from 1"),

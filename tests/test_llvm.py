@@ -108,6 +108,7 @@ MARKERS = {
         set(),
         {par(row) for row in range(at.BRISTLE_STIFFNESS, at.BRISTLE_INVERSE_SPEED + 1)},
     ),
+    "bending": (set(), {par(at.BENDING), par(at.BENDING + 3)}),
     "long_film": ({"film"}, {par(at.JOINT_12 + at.FILM_LONG), par(at.JOINT_23 + at.FILM_LONG)}),
 }
 # rows that an effect shares with another: not its own marker

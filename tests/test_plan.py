@@ -85,7 +85,16 @@ def test_simulations_of_a_study_are_counted():
 
 
 def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
-    found = measure(SCENE, alone(), (1e-2, 1e-5))
+    told: list[str] = []
+    found = measure(SCENE, alone(), (1e-2, 1e-5), tell=told.append)
+    assert told == [
+        f"measuring {k} of 3: {what}"
+        for k, what in (
+            (1, "the settings of the file"),
+            (2, "a target error of 0.01"),
+            (3, "a target error of 1e-05"),
+        )
+    ]
     assert [row.error for row in found.rows] == [None, 1e-2, 1e-5]
     file, loose, strict = found.rows
     assert file.scene == SCENE

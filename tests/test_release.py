@@ -67,6 +67,7 @@ def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "-m",
         "pip",
         "install",
+        "--no-compile",  # few modules of all these packages are loaded
         "--quiet",
         "--disable-pip-version-check",
     )

@@ -128,9 +128,11 @@ def test_the_page_says_what_was_found(tree: Tree) -> None:
         "accuracy.nc: what accuracy costs was not measured",
         "mpiexec -n 2 hpcclear run",
         "effects.<u>contact",
+        "alpha: least mean",
+        "best: alpha or beta by the surrogate alone",
     ):
         assert words in tree.text, words
-    for words in ("samples.nc: no design", "front.nc"):
+    for words in ("samples.nc: no design", "front.nc", "candidate:"):
         assert words not in tree.text, words
     assert [t for t, _ in tree.elements].count("img") == 16
 

@@ -613,6 +613,39 @@ def test_a_study_that_leaves_out_the_scene_itself_is_worth_a_warning() -> None:
     assert any("0.105 to 0.42 kg" in text and "0.55" in text for text in heavy.warnings)
 
 
+def test_a_study_whose_sensitivity_nothing_reads_is_worth_a_warning() -> None:
+    linkage = load_scene(ROOT / "jobs" / "linkages" / "crank_rocker.toml")
+    assert not any("not used" in text for text in linkage.warnings)
+    gone = ("variables.coupler", "variables.mass", "surrogate.optimisation")
+    speed = {"study.variables.speed": {"path": "mechanism.drives.motor.speed", "range": [80, 95]}}
+    unknown = linkage.with_({f"study.{key}": None for key in gone} | speed)
+    assert not unknown.required_study.groups
+    assert any("study.sensitivity is not used" in text for text in unknown.warnings)
+    left_out = unknown.with_({"study.sensitivity": {"groups": []}})
+    assert not any("not used" in text for text in left_out.warnings)
+
+
+FURTHER = ("rocker.mass", "crank.mass", "rocker.length")
+
+
+@pytest.mark.parametrize(
+    ("further", "groups"),
+    [
+        (0, [("coupler", "mass")]),
+        (1, [("coupler", "mass", "x0")]),
+        (2, [("coupler", "mass"), ("x0", "x1")]),
+        (3, [("coupler", "mass"), ("x0", "x1", "x2")]),
+    ],
+)
+def test_what_a_linkage_varies_is_fitted_two_by_two(further: int, groups: list) -> None:
+    linkage = load_scene(ROOT / "jobs" / "linkages" / "crank_rocker.toml")
+    more: dict[str, object] = {
+        f"study.variables.x{k}": {"path": f"mechanism.bodies.{FURTHER[k]}", "range": [0.05, 0.2]}
+        for k in range(further)
+    }
+    assert list(linkage.with_(more).required_study.groups) == groups
+
+
 def test_schema_knows_the_word_that_switches_off() -> None:
     validator = Draft202012Validator(scene_schema())
     content = tomllib.loads(JOBS[0].read_text())

@@ -12,7 +12,6 @@ from collections import Counter
 
 import numpy as np
 import pytest
-import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -685,12 +684,29 @@ def test_what_copies_disagree_on_cannot_be_told():
     assert re.search(r"told from 0 beyond \d+\.\d %", text)
 
 
-def test_a_response_that_fails_says_how_it_ended():
-    response = xr.Dataset({"status": int(Status.STEP_CAP)})
-    with pytest.raises(InputError, match="step_cap") as refused:
-        responses._steady(
-            load_scene(pathlib.Path(__file__).parent.parent / "jobs" / "slider_crank.toml"),
-            response,
-            "original",
-        )
-    assert Status.STEP_CAP.remedy in str(refused.value)
+def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch):
+    """All of the study but that one file is there, and no comparison is made up."""
+    design = None
+
+    def failing(scene, *others):
+        """The design that comes first, the original, ends amid its transient."""
+        nonlocal design
+        design = design or (scene.mechanism.rod.mass, scene.mechanism.slider.mass)
+        response = formula.respond(scene, *others)
+        if design != (scene.mechanism.rod.mass, scene.mechanism.slider.mass):
+            return response
+        return response.isel(time=slice(5)).assign(status=int(Status.STEP_CAP))
+
+    monkeypatch.setattr(responses, "simulate", failing)
+    told: list[str] = []
+    run_study(scene_of(), tmp_path, alone(), progress_style="quiet", tell=told.append)
+    (about,) = (text for text in told if "has no file" in text)
+    assert "response of original" in about
+    assert "step_cap" in about
+    assert Status.STEP_CAP.remedy in about
+    assert len(list((tmp_path / "responses").iterdir())) == 4
+    assert write_report(tmp_path).exists()
+    found = dataset.read(tmp_path / "claims.nc")
+    texts = " ".join(found["figure"].to_numpy().astype(str))
+    assert "first alpha against original: peak of contact force 1 unknown" in texts
+    assert not re.search(r"\bnan\b.*against|against[^;]*\bnan\b", texts)

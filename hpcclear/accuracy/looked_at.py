@@ -4,8 +4,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import views
+from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.layout import TURN
-from hpcclear.dynamics.linkage import geometry
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.parameters import topology
 from hpcclear.dynamics.planar.problem import linkage_of
@@ -64,10 +64,10 @@ def end_of(scene: Scene, par: Array, q: Array, v: Array, phi: float = TURN) -> t
         return float(position[0]), float((x * pose.vx[k] + y * pose.vy[k])[0])
     if scene.numerics.formulation == "baumgarte":
         return float(q[_SLIDER_9]), float(v[_SLIDER_9])
-    first, second, free = topology(scene)
+    free = topology(scene)[2]
     omega = v[-1] if free else float(views.Parameters(par).speed)
     if free:
         phi, q, v = q[-1], q[:-1], v[:-1]
     angle, speed = np.array([phi]), np.array([omega])
-    m = geometry.motion((first, second), par, angle, speed, q[:, None], v[:, None])
+    m, _ = bent_motion(scene, par, (angle, speed), q[:, None], v[:, None])
     return float(m.slider[0]), float(m.slider_speed[0])

@@ -3,7 +3,7 @@
 import multiprocessing
 import os
 import resource
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -133,7 +133,11 @@ class Plan:
 
 
 def measure(
-    scene: Scene, ranks: Ranks, errors: tuple[float, ...] = TARGETS, workers: int = 1
+    scene: Scene,
+    ranks: Ranks,
+    errors: tuple[float, ...] = TARGETS,
+    workers: int = 1,
+    tell: Callable[[str], object] = lambda text: None,
 ) -> Plan:
     """Measure what samples cost at the settings of the file and at those chosen for each error; on root.
 
@@ -147,6 +151,8 @@ def measure(
     workers : int
         Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
         clock are slower together.
+    tell : callable
+        Gets what is measured, line by line, as it begins.
 
     Raises
     ------
@@ -163,9 +169,11 @@ def measure(
     rows: list[Row] = []
     with _company(scene, points, workers if ranks.size == 1 else 1):
         if study.accuracy is not None:
-            rows, wanted = splits(scene, points, ranks), []
+            rows, wanted = splits(scene, points, ranks, tell), []
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
+            told = "the settings of the file" if error is None else f"a target error of {error:g}"
+            tell(f"measuring {k + 1} of {len(wanted)}: {told}")
             seconds, records = cost(one, points, ranks, limit, str(k))
             rows.append(Row(error, one, seconds, telling.in_short(one, records)))
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -180,7 +188,7 @@ FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Accuracies of the ladder of a study that asks for one, over that."""
 
 
-def splits(scene: Scene, points: Points, ranks: Ranks) -> list[Row]:
+def splits(scene: Scene, points: Points, ranks: Ranks, tell: Callable[[str], object]) -> list[Row]:
     """The ladder of a study of which an accuracy is asked: how each would be shared out, its pilot among its simulations."""
     known: dict[tuple[float, bytes], tuple[Array, float]] = {}
 
@@ -193,6 +201,10 @@ def splits(scene: Scene, points: Points, ranks: Ranks) -> list[Row]:
     wanted, rows = budget.asked(scene), []
     for k, factor in enumerate(FACTORS):
         mean, deviation = np.minimum(factor * wanted, 0.99).tolist()
+        asked_for = _percent(mean, deviation)
+        tell(
+            f"measuring {k + 1} of {len(FACTORS)}: an accuracy of {asked_for}, with a pilot of its own"
+        )
         asked = {"study.accuracy.mean": mean, "study.accuracy.deviation": deviation}
         one = scene if factor == 1.0 else scene.with_(asked)
         made = budget.spread(one, simulate)
@@ -201,7 +213,7 @@ def splits(scene: Scene, points: Points, ranks: Ranks) -> list[Row]:
         pilot = made.pilot / made.found.evaluations[split.rung]
         count = sum(extent.samples_of(final, round(split.points)).values()) + round(pilot)
         seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}")
-        label = _percent(mean, deviation) + ("" if split.sure else " ?")
+        label = asked_for + ("" if split.sure else " ?")
         rows.append(Row(None if factor == 1.0 else factor, final, seconds, "", count, label))
     return rows
 

@@ -24,7 +24,7 @@ class Sensitivity(Table):
 
     groups: tuple[Names, ...] | None = None
     """Inputs fitted together; default the masses, mass centres and inertias of each two links that are
-    joined, as far as they are study variables."""
+    joined, as far as they are study variables; of a linkage, what its bodies vary, two by two."""
     parameter: str | None = None
     """The study variable held fixed for each surface; default the one that drives clearances, if
     there is just one."""

@@ -331,7 +331,20 @@ class Study(Table):
             for number in _LINK_NUMBERS
             for one, other in itertools.pairwise(_LINKS)
         )
-        return tuple((one, other) for one, other in pairs if one is not None and other is not None)
+        found = ((one, other) for one, other in pairs if one is not None and other is not None)
+        return tuple(found) or self._two_by_two()
+
+    def _two_by_two(self) -> tuple[Names, ...]:
+        """Variables of a linkage's bodies in file order; the last of an odd number goes with the two before it."""
+        of_bodies = [
+            row.name
+            for row in self.variables
+            if row.name != self.sensitivity.parameter
+            and all(path.startswith("mechanism.bodies.") for path in row.paths)
+        ]
+        last = max(len(of_bodies) - len(of_bodies) % 2 - 2, 0)
+        pairs = [tuple(of_bodies[k : k + 2]) for k in range(0, last, 2)]
+        return tuple(group for group in (*pairs, tuple(of_bodies[last:])) if group)
 
     @property
     def models(self) -> tuple[Names, ...]:

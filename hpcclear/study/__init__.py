@@ -34,6 +34,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
+from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points
 from hpcclear.study import (
     budget,
@@ -98,6 +99,8 @@ def run_study(
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
     lives.check(scene)
+    for text in unused(scene):
+        tell(f"Warning: {text}")
     place = Place.of_directory(Path(directory), fresh, ("responses",))
     if place.output != Path(directory):
         tell(f"Results go to {place.output}.")

@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.results.dataset import provenance, variable_name
@@ -60,56 +59,60 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     Returns
     -------
     dict of arrays
-        ``names`` (designs,) and ``statistics`` (designs, copies, windows, `STATISTICS`, `QUANTITIES`), SI.
-
-    Raises
-    ------
-    InputError
-        A response failed.
+        ``names`` (designs,) and ``statistics`` (designs, copies, windows, `STATISTICS`, `QUANTITIES`), SI; NaN where a
+        simulation failed.
     """
     settings = run.study.verification
     chosen = compared(run, designs)
     table = []
-    for name, choice in chosen:
+    for _, choice in chosen:
         scene = scene_of(run, choice, settings.response_revolutions * settings.response_windows)
         copies = []
         for copy in range(settings.response_copies):
             run.ranks.raise_if_stopped()
-            series = _steady(scene, simulate(scene, run.scene.objective, copy), name)
-            copies.append(_statistics(series, settings.response_windows))
+            response = simulate(scene, run.scene.objective, copy)
+            copies.append(_statistics(scene, response, settings.response_windows))
         table.append(copies)
     return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
 
 
 def write(run: StudyRun, designs: Sequence[Choice]) -> None:
-    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10."""
+    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. One that failed is told instead."""
     folder = run.directory / "responses"
     folder.mkdir(exist_ok=True)
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
-            content = _steady(scene, simulate(scene, run.scene.objective), name)
+            response = simulate(scene, run.scene.objective)
+        status = Status(int(response["status"]))
+        if status is not Status.OK:
+            run.tell(
+                f"The response of {name} has no file: its simulation ended as {status.name.lower()}: {status.message}. "
+                f"{status.remedy}"
+            )
+            continue
+        content = _steady(scene, response)
         made_by = provenance(scene.to_toml(), scene.hash, scene.references)
         file = f"responses/{variable_name(name.replace(' ', '_'), 'response')}.nc"
         run.write(content, file, {**made_by, "design": name})
 
 
-def _steady(scene: Scene, response: xr.Dataset, name: str) -> xr.Dataset:
+def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
     """The response after its transient."""
-    status = Status(int(response["status"]))
-    if status is not Status.OK:
-        reason = f"its simulation ended as {status.name.lower()}: {status.message}"
-        raise InputError("responses", name, reason, status.remedy)
     turn = 2.0 * np.pi * scene.numerics.transient_revolutions
     return response.isel(time=np.flatnonzero(response["crank_angle"].to_numpy() >= turn - 1e-9))
 
 
-def _statistics(response: xr.Dataset, windows: int) -> Array:
-    """Statistics of each stretch of a response, (windows, statistics, quantities)."""
+def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
+    """Statistics of each stretch of a steady response, (windows, statistics, quantities); NaN if it failed."""
     # a linkage may have other joints, and no slider
     told = ("contact_force", "crank_moment", "slider_acceleration")
-    series = np.column_stack([response[name].to_numpy() for name in told if name in response])
-    parts = np.array_split(series, windows)
+    names = [name for name in told if name in response]
+    if response["status"] != Status.OK:
+        quantities = np.column_stack([response[name].to_numpy() for name in names]).shape[1]
+        return np.full((windows, len(STATISTICS), quantities), np.nan)
+    steady = _steady(scene, response)
+    parts = np.array_split(np.column_stack([steady[name].to_numpy() for name in names]), windows)
     return np.array(
         [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
     )

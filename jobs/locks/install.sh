@@ -96,7 +96,8 @@ if [ -z "$made" ]; then
     printf '%s\n' "$root" >"$venv/.place"
 fi
 pip() {
-    said=$("$venv/bin/python" -m pip --quiet --disable-pip-version-check install "$@" 2>&1) ||
+    # pip would compile every module of every package, which takes longer than all else; few of them are ever loaded
+    said=$("$venv/bin/python" -m pip --quiet --disable-pip-version-check install --no-compile "$@" 2>&1) ||
         explain "installing hpcclear[$extras]" "$said"
 }
 echo "installing hpcclear[$extras] ($versions versions, Python $found); the first time takes a minute or two"
@@ -106,4 +107,6 @@ if [ -n "$lock" ]; then
 else
     pip --upgrade --upgrade-strategy eager -e "$root[$extras]"
 fi
+# Loading what commands load compiles it, once and for all ranks, and for those who may only read; what is wrong with it they say.
+(cd "$root" && env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c "import hpcclear.study, hpcclear.report") >/dev/null 2>&1
 printf '%s\n' "$wanted" >"$stamp" || give_up "$stamp cannot be written: is the disk full?"

@@ -85,7 +85,7 @@ class Watched:
         self._worker.submit(index, points)
 
     def advance(self, seconds: float) -> object:
-        if FAIL == "simulation" and HERE and self._finished > 100:
+        if FAIL == "simulation" and HERE and self._finished > 0:  # a starved rank may not get many
             fail()
         records = self._worker.advance(seconds)
         self._finished += records.size

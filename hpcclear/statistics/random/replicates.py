@@ -116,7 +116,7 @@ class Limited(Estimate):
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:
-    """A quantile and its limits: those of its order, turned back into values (Woodruff).
+    """A quantile and its limits: those of its order, turned back into values (Woodruff 1952).
 
     Parameters
     ----------
@@ -142,10 +142,8 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     value = float(np.quantile(ranked, order, method="hazen"))
     below = (known & (values <= value)).sum(axis=1)
     shifts = _shifts(below - counts * (below.sum() / total), counts)
-    reach = student(confidence, int((counts > 0).sum()) - 1) * float(spread(shifts[None])[0])
-    reach += 0.5 / total  # between two values nothing is known
     places = np.arange(total) + 0.5
-    ends = np.array([order - reach, order + reach]) * total
+    ends = np.array(_limits_of_share(order, shifts, counts, confidence)) * total
     lower, upper = np.interp(ends, places, ranked, left=np.nan, right=np.nan)
     low, high = np.clip(ends, places[0], places[-1])
     slope = float(np.diff(np.interp([low, high], places, ranked))[0] / (high - low)) * total
@@ -176,6 +174,15 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     total = int(counts.sum())
     share = float(above.sum() / total)
     shifts = _shifts(above - counts * share, counts)
+    lower, upper = _limits_of_share(share, shifts, counts, confidence)
+    return Limited(share, shifts, lower, upper)
+
+
+def _limits_of_share(
+    share: float, shifts: Array, counts: Array, confidence: float
+) -> tuple[float, float]:
+    """Limits of a probability: those of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
+    total = int(counts.sum())
     error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
     # as many independent draws, fewer for an error of few degrees of freedom
     worth = (
@@ -185,7 +192,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     hits, tail = share * draws, (1.0 - confidence) / 2.0
     lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if share < 1.0 else 1.0
-    return Limited(share, shifts, lower, upper)
+    return lower, upper
 
 
 def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:

@@ -221,7 +221,11 @@ class ResponseEvidence:
             change, sure = self.change(a, b, statistic, quantity)
             supported.append(sign * change > sure)
             refuted.append(sign * change < -sure)
-            if not supported[-1]:
+            if np.isnan(change):
+                texts.append(
+                    f"{a} against {b}: {statistic} of {quantity} unknown, for a simulation failed"
+                )
+            elif not supported[-1]:
                 texts.append(
                     f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} % "
                     f"(told from 0 beyond {100 * sure:.1f} %)"
