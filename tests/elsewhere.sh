@@ -3,8 +3,9 @@
 #   bash tests/elsewhere.sh [--with TEXT] SETTING...    TEXT: options of tests/run.sh, such as --quick
 #   bash tests/elsewhere.sh --table                     results so far, into CONTRIBUTING.md
 # Settings: debian12 debian13 lowest latest bits256 bits512 no-fma load8 user umlaut home-read-only. All but debian12 and
-# lowest (Python 3.11) are on Debian 13. Roots are kept in ELSEWHERE (/var/tmp/hpcclear-elsewhere), results in
-# results/elsewhere. The system underneath is this machine's; so are PIP_* and *SSL*, *CERT* variables and certificates.
+# lowest (Python 3.11) are on Debian 13. Several at once are joined: debian12+lowest+umlaut.
+# Roots are kept in ELSEWHERE (/var/tmp/hpcclear-elsewhere), results in results/elsewhere. The system underneath is this
+# machine's; so are PIP_* and *SSL*, *CERT* variables and certificates.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 checkout=$PWD
@@ -17,12 +18,18 @@ refuse() {
     exit 2
 }
 
+# Rows of settings that were not run here stay as they are; each names the commit that it was found with.
 table() {
+    local row
     mkdir -p "$results"
+    sed -n '/^<!-- elsewhere: begin/,/^<!-- elsewhere: end/{/^| [a-z0-9+-]* |/p}' CONTRIBUTING.md |
+        sed -e '/^| setting |/d' -e '/^| --- |/d' | while IFS= read -r row; do
+        [ -f "$results/$(cut -d' ' -f2 <<<"$row").row" ] || echo "$row"
+    done >"$results/kept"
     {
         echo "| setting | Python | processor | first command | second command | commit |"
         echo "| --- | --- | --- | --- | --- | --- |"
-        cat "$results"/*.row 2>/dev/null || true
+        cat "$results"/kept "$results"/*.row 2>/dev/null | sort || true
     } >"$results/table.md"
     sed -i -e "/^<!-- elsewhere: begin/,/^<!-- elsewhere: end/{/^<!--/!d}" \
         -e "/^<!-- elsewhere: begin/r $results/table.md" CONTRIBUTING.md
@@ -63,26 +70,30 @@ PYTHON
 }
 
 run_setting() {
-    local setting=$1 release=trixie user=root folder=/root/hpcclear home=/root option="" load=0 settings=() words="$run_words"
-    case $setting in
-    debian13 | latest) ;;
-    debian12 | lowest) release=bookworm ;;
-    bits256) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'avx512')") ;;
-    bits512)
-        grep -qw avx512f /proc/cpuinfo || {
-            echo "| $setting | - | - | not on this processor | not on this processor | - |" >"$results/$setting.row"
-            echo "$setting: not on this processor (it has no AVX-512)"
-            return
-        }
-        settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'none'),-prefer-256-bit")
-        ;;
-    no-fma) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'fma|avx512')") ;;
-    load8) load=8 ;;
-    user) user=somebody folder=/home/somebody/hpcclear home=/home/somebody ;;
-    umlaut) folder="/root/eigene Prüfung/hpcclear" ;;
-    home-read-only) user=somebody folder=/srv/hpcclear home=/home/read-only ;;
-    esac
-    case $setting in lowest | latest) option=--$setting ;; esac
+    local setting=$1 release=trixie user=root home=/root above=/root inner="" option="" load=0 settings=() words="$run_words" part
+    for part in ${setting//+/ }; do
+        case $part in
+        debian13) ;;
+        latest) option=--latest ;;
+        debian12) release=bookworm ;;
+        lowest) release=bookworm option=--lowest ;;
+        bits256) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'avx512')") ;;
+        bits512)
+            grep -qw avx512f /proc/cpuinfo || {
+                echo "| $setting | - | - | not on this processor | not on this processor | - |" >"$results/$setting.row"
+                echo "$setting: not on this processor (it has no AVX-512)"
+                return
+            }
+            settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'none'),-prefer-256-bit")
+            ;;
+        no-fma) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'fma|avx512')") ;;
+        load8) load=8 ;;
+        user) user=somebody above=/home/somebody home=/home/somebody ;;
+        umlaut) inner="/eigene Prüfung" ;;
+        home-read-only) user=somebody above=/srv home=/home/read-only ;;
+        esac
+    done
+    local folder=$above$inner/hpcclear
     root_of "$release"
     local root=$place/$release log=$results/$setting.log
     chroot "$root" sh -c "id somebody >/dev/null 2>&1 || useradd -m somebody; mkdir -p /home/read-only"
@@ -147,8 +158,15 @@ while [ $# -gt 0 ]; do
         run_words=${2:-}
         shift
         ;;
-    debian12 | debian13 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) settings+=("$1") ;;
-    *) refuse "there is no setting $1" ;;
+    *)
+        for part in ${1//+/ }; do
+            case $part in
+            debian12 | debian13 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) ;;
+            *) refuse "there is no setting $part" ;;
+            esac
+        done
+        settings+=("$1")
+        ;;
     esac
     shift
 done
