@@ -1,16 +1,21 @@
 """The real commands under mpiexec, for tests of what ends them: started, killed, resumed, read meanwhile."""
 
+import atexit
 import contextlib
-import json
+import functools
 import os
+import shlex
 import signal
+import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from mpi_programs import client
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -36,12 +41,22 @@ def sample(output: Path, samples: int, *options: str) -> list[str]:
 
 
 def start(
-    words: Sequence[str], ranks: int = 2, program: Sequence[str] = (str(PROGRAM),), **settings: str
+    words: Sequence[str],
+    ranks: int = 2,
+    program: Sequence[str] = (str(PROGRAM),),
+    *,
+    begin_warm: bool = False,
+    **settings: str,
 ) -> subprocess.Popen:
-    """Start a command on so many ranks (0: without mpiexec), in a process group of its own."""
+    """Start a command on so many ranks (0: without mpiexec), in a process group of its own.
+
+    With `begin_warm`, ranks are forks of a process that has loaded everything: for all but a kill, and an import
+    that is to fail.
+    """
     launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    python = warm().words(program) if begin_warm else [sys.executable, *program]
     return subprocess.Popen(
-        [*launch, sys.executable, *program, *words],
+        [*launch, *python, *words],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -67,7 +82,9 @@ def finish(job: subprocess.Popen, seconds: float = 400.0) -> tuple[int, str]:
 
 def run(words: Sequence[str], ranks: int = 2, **settings: str) -> tuple[int, str]:
     """Exit code and output of a whole command."""
-    return finish(start(words, ranks, **settings))
+    plain = all(name.startswith("TEST_") for name in settings)
+    loads = settings.get("TEST_FAIL", "").startswith("import ")
+    return finish(start(words, ranks, begin_warm=plain and not loads, **settings))
 
 
 def kill(process: int, number: int = signal.SIGKILL) -> None:
@@ -145,33 +162,70 @@ def wait_until(
             return
 
 
-class Commands:
-    """Runs many commands one after the other, each in a fork of one warm process."""
+class Warm:
+    """A process that has loaded everything and becomes any program in a fork, in a tenth of a start's time.
+
+    `programs` holds a `hpcclear` that does so: the same behind mpiexec and in a shell.
+    """
 
     def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="warm-"
+        )  # a socket's name has to be short
+        self.socket = Path(self._folder.name) / "socket"
+        self.programs = Path(self._folder.name) / "bin"
+        self.programs.mkdir()
         self._process = subprocess.Popen(
-            [sys.executable, str(PROGRAM.with_name("many_commands.py"))],
+            [sys.executable, str(PROGRAM.with_name("warm.py")), str(self.socket)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
             env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
         )
-
-    def __call__(self, *words: object, user: int | None = None) -> tuple[int, str]:
-        """Exit code (negative: killed by a signal, which is how one that hangs ends) and output."""
-        assert self._process.stdin is not None
         assert self._process.stdout is not None
-        asked = {"words": [str(word) for word in words], "user": user}
-        self._process.stdin.write(json.dumps(asked) + "\n")
-        self._process.stdin.flush()
-        answer = json.loads(self._process.stdout.readline())
-        return answer["code"], answer["output"]
+        assert self._process.stdout.readline() == b"ready\n"
+        shell = self.programs / "hpcclear"
+        shell.write_text(f'#!/bin/sh\nexec {shlex.join(self.words(["-m", "hpcclear"]))} "$@"\n')
+        shell.chmod(0o755)
+
+    def words(self, program: Sequence[str]) -> list[str]:
+        """What stands for `[sys.executable, *program]`, behind mpiexec too."""
+        client = PROGRAM.with_name("client.py")
+        return [sys.executable, "-I", "-S", str(client), str(self.socket), *program]
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, and all that it became."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait(crowded(60.0))
+        self._folder.cleanup()
+
+
+@functools.cache
+def warm() -> Warm:
+    """The one of this session of tests."""
+    made = Warm()
+    atexit.register(made.close)
+    return made
+
+
+def warm_command(*words: object, user: int | None = None) -> tuple[int, str]:
+    """Exit code (negative: killed by a signal, which is how one that hangs ends) and output of a command.
+
+    It is a process that began warm, without mpiexec, in a session of its own.
+    """
+    with tempfile.TemporaryFile() as output, open(os.devnull) as nothing:
+        ours = {0: nothing.fileno(), 1: output.fileno(), 2: output.fileno()}
+        asked = ["-m", "hpcclear", *(str(word) for word in words)]
+        with client.request(str(warm().socket), asked, ours, user=user) as answer:
+            answer.settimeout(crowded(120.0))
+            try:
+                code = int(answer.recv(16))
+            except TimeoutError:
+                answer.shutdown(socket.SHUT_WR)
+                answer.settimeout(None)
+                code = int(answer.recv(16))
+        output.seek(0)
+        return code, output.read().decode(errors="replace")
 
 
 def kill_once_it_saved(words: list[str], ranks: int, folder: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
+from commands import warm
 from markdown_it import MarkdownIt
 from patience import crowded
 
@@ -92,8 +93,8 @@ class Reader:
                 (self.place / block.title).write_text(block.text, encoding="utf-8")
 
     def _shell(self, block: Block) -> None:
-        binaries = str(Path(sys.executable).parent)
-        here = {"PATH": binaries + os.pathsep + os.environ["PATH"], "MPLBACKEND": "Agg"}
+        programs = (warm().programs, Path(sys.executable).parent, os.environ["PATH"])
+        here = {"PATH": os.pathsep.join(map(str, programs)), "MPLBACKEND": "Agg"}
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", block.text],
             cwd=self.place,

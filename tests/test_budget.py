@@ -1,6 +1,5 @@
 """One accuracy for a whole study: what a pilot makes of values, how it is shared out, what a study makes of it."""
 
-import os
 import pathlib
 import subprocess
 import sys
@@ -8,6 +7,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from commands import warm
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -218,10 +218,9 @@ def test_a_study_that_is_stopped_after_each_stage_ends_with_the_same_bytes(done,
 def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(scene_of().text)
-    program = [sys.executable, str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")]
+    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
     made = subprocess.run(
         [str(MPIEXEC), "-n", "2", *program, str(BIAS)],
-        env=os.environ | {"PYTHONPATH": str(PROGRAMS.parent.parent)},
         capture_output=True,
         text=True,
         timeout=crowded(120),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import CHEAP, SCENE, Commands, overrides, run, sample
+from commands import CHEAP, SCENE, overrides, run, sample, warm_command
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
@@ -25,13 +25,11 @@ FULL = pytest.mark.full
 
 
 @pytest.fixture(scope="module")
-def hpcclear(tmp_path_factory) -> Iterator[Commands]:
+def hpcclear(tmp_path_factory) -> Callable[..., tuple[int, str]]:
     # A command that hangs is killed after a while, but one that compiles the kernel first may take its time.
     code, output = run(sample(tmp_path_factory.mktemp("compiling") / "samples.nc", 40), 0)
     assert code == 0, output
-    commands = Commands()
-    yield commands
-    commands.close()
+    return warm_command
 
 
 def refused(answer: tuple[int, str]) -> bool:

@@ -1,7 +1,6 @@
 """The study as a whole, on a mechanism that is a formula: every answer is known beforehand."""
 
 import json
-import os
 import pathlib
 import re
 import shutil
@@ -12,6 +11,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from commands import warm
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -356,11 +356,9 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
 def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
     scene = tmp_path / "scene.toml"
     scene.write_text(scene_of().text)
-    program = [sys.executable, str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")]
-    environment = os.environ | {"PYTHONPATH": str(PROGRAMS.parent.parent)}
+    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
     done = subprocess.run(
         [str(MPIEXEC), "-n", str(ranks), *program],
-        env=environment,
         capture_output=True,
         text=True,
         timeout=crowded(120),

@@ -175,7 +175,7 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
             code, output = run([*words, "--time-limit", str(delay)], **settings)
             told = began[0].stat().st_mtime + delay
         else:
-            job = start(words, **settings)
+            job = start(words, begin_warm=True, **settings)
             while job.poll() is None and not all(mark.exists() for mark in began):
                 time.sleep(0.02)  # a signal before that ends it as it would any program
             wait_until(job, time.time() + delay, folder)
