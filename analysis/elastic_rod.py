@@ -4,8 +4,6 @@ python analysis/elastic_rod.py                    # writes docs/images/elastic_r
 """
 
 import argparse
-import re
-import tomllib
 from pathlib import Path
 
 import matplotlib
@@ -13,18 +11,17 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from scenes import of_page
 
-from hpcclear import Scene, load_scene, simulate
+from hpcclear import Scene, simulate
 
-DOCS = Path(__file__).parent.parent / "docs"
-IMAGE = DOCS / "images" / "elastic_rod.png"
+IMAGE = Path(__file__).parent.parent / "docs" / "images" / "elastic_rod.png"
 
 
 def slider_crank() -> Scene:
     """The scene on the page, every step of a revolution in steady motion shown."""
-    page = (DOCS / "how-to" / "elastic-rod.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r'```toml title="flexible.toml"\n(.*?)```', page, re.DOTALL)
-    return load_scene(tomllib.loads(text)).with_({"output.instants_per_revolution": 2000})
+    scene = of_page("how-to/elastic-rod.md", "flexible.toml")
+    return scene.with_({"output.instants_per_revolution": 2000})
 
 
 def draw(scene: Scene, path: Path) -> None:

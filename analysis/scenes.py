@@ -1,5 +1,7 @@
 """The scenes that the benchmarks share: the paper's mechanism, its contact laws, and designs from Table 3's box."""
 
+import re
+import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +13,8 @@ from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
-JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
+ROOT = Path(__file__).parent.parent
+JOB = ROOT / "jobs" / "quickstart.toml"
 
 LAWS = {
     "hunt-crossley": [
@@ -35,6 +38,13 @@ class Setup(NamedTuple):
     problem: Problem
     par: Array  # (m, PARAMETERS)
     start: Start
+
+
+def of_page(page: str, title: str) -> Scene:
+    """The scene that a page of docs/ has readers write to a file of this title."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    (block,) = re.findall(rf'```toml title="{re.escape(title)}"\n(.*?)```', text, re.DOTALL)
+    return load_scene(tomllib.loads(block))
 
 
 def scene(

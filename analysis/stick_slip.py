@@ -4,8 +4,6 @@ python analysis/stick_slip.py                    # writes docs/images/stick_slip
 """
 
 import argparse
-import re
-import tomllib
 from pathlib import Path
 
 import matplotlib
@@ -13,18 +11,17 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from scenes import of_page
 
-from hpcclear import Scene, load_scene, simulate
+from hpcclear import Scene, simulate
 
-DOCS = Path(__file__).parent.parent / "docs"
-IMAGE = DOCS / "images" / "stick_slip.png"
+IMAGE = Path(__file__).parent.parent / "docs" / "images" / "stick_slip.png"
 
 
 def pendulum() -> Scene:
     """The scene on the page."""
-    page = (DOCS / "how-to" / "stick-slip.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r'```toml title="pendulum.toml"\n(.*?)```', page, re.DOTALL)
-    return load_scene(tomllib.loads(text)).with_({"output.instants_per_revolution": 1000})
+    scene = of_page("how-to/stick-slip.md", "pendulum.toml")
+    return scene.with_({"output.instants_per_revolution": 1000})
 
 
 def draw(scene: Scene, path: Path) -> None:
