@@ -24,7 +24,7 @@ from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.planar.response import Seen, mode_series
+from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.problem import (
@@ -371,8 +371,6 @@ def _series(
     if bar is not None:
         kinetic, strain = kinetic + bar.kinetic, bar.strain
         potential = potential + scene.effects.gravity * bar.raised(m.rod_angle)
-    driving, _, dissipated, load = works.T
-    total = kinetic + elastic + potential + strain
     return {
         "slider_position": m.slider,
         "slider_velocity": m.slider_speed,
@@ -385,11 +383,5 @@ def _series(
         "contact_force": rates.force[:, :2],
         "friction_force": rates.friction[:, :2],
         "crank_moment": rates.drive_moment,
-        "kinetic_energy": kinetic,
-        "elastic_energy": elastic,
-        "potential_energy": potential,
-        "driving_work": driving,
-        "load_work": load,
-        "dissipated_energy": dissipated,
-        "energy_residual": total - total[0] - driving - load + dissipated,
+        **balance_series((kinetic, elastic, potential, strain), works),
     }

@@ -42,11 +42,9 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     active = contacts_on(scene, seen.contacts, count)
     gaps = seen.rates.gap[:, :count]
     elastic = elastic_energy(Parameters(par).stiffness[:count], gaps, active)
-    driving, _, dissipated, load = seen.works.T
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
     strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
-    potential = potential - strain
-    total = kinetic + elastic + potential + strain
+    stored = (kinetic, elastic, potential - strain, strain)
     angle, speed = _turned(scene, linkage, par, seen)
     places = bodies_and_points(mechanism, pose, {k: one.shorter for k, one in bent.items()})
     acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
@@ -61,10 +59,26 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         "contact_force": seen.rates.force[:, :count],
         "friction_force": seen.rates.friction[:, :count],
         "crank_moment": seen.rates.drive_moment,
+        **balance_series(stored, seen.works),
+        **mode_series(scene.modes, seen.q, seen.v, strain),
+    }
+
+
+def balance_series(
+    stored: tuple[Array, Array, Array, Array | float], works: Array
+) -> dict[str, Array]:
+    """Series of the energy balance, J, and what it does not close by.
+
+    `stored`: kinetic energy, that of contacts, that of gravity and springs, and that of bent bars. `works` (t, 4): done
+    by drives, its absolute value, dissipated, and done by loads.
+    """
+    kinetic, elastic, potential, strain = stored
+    driving, _, dissipated, load = works.T
+    total = kinetic + elastic + potential + strain
+    return {
         "kinetic_energy": kinetic,
         "elastic_energy": elastic,
         "potential_energy": potential,
-        **mode_series(scene.modes, seen.q, seen.v, strain),
         "driving_work": driving,
         "load_work": load,
         "dissipated_energy": dissipated,
