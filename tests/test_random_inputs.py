@@ -24,7 +24,7 @@ JOBS = Path(__file__).parent.parent / "jobs"
 ROBUST = load_scene(JOBS / "robust_slider_crank.toml")
 DESIGN = {"m2": 0.2, "m3": 0.1, "u2": 0.05, "I2": 3e-4}
 MILLION = 1_000_000
-THREE = 3.0
+FOUR = 4.0  # deviations: one such number in 16 000 is beyond
 """Standard errors within which what is drawn has to agree; 3.3 is passed wrongly once in a thousand."""
 
 VALUES = (0.00031, 0.00036, 0.00036, 0.00044, 0.0008)
@@ -101,15 +101,15 @@ def test_a_million_draws_have_the_closed_moments(name: str, shift: int) -> None:
     entry, (mean, deviation, exact) = CLOSED[name]
     scene = _with("C", **entry).with_({"study.seed": 1 + shift})
     drawn = monte_carlo(scene, MILLION, random=("C",), design=DESIGN).column("C")
-    at_most(abs(drawn.mean() - mean) * 1e3 / deviation, THREE)  # error: deviation / sqrt(1e6)
+    at_most(abs(drawn.mean() - mean) * 1e3 / deviation, FOUR)  # error: deviation / sqrt(1e6)
     fourth = np.mean((drawn - mean) ** 4)
     error = np.sqrt((fourth - deviation**4) / MILLION) / (2 * deviation)
-    at_most(abs(drawn.std() - deviation) / error, THREE)
+    at_most(abs(drawn.std() - deviation) / error, FOUR)
     level = float(exact(np.array([0.95]))[0])
     share, below = 0.95, np.mean(drawn <= level)
     if name == "samples":
         share = 1.0
-    at_most(abs(below - share), THREE * np.sqrt(0.95 * 0.05 / MILLION))
+    at_most(abs(below - share), FOUR * np.sqrt(0.95 * 0.05 / MILLION))
 
 
 @EACH
@@ -242,9 +242,9 @@ def test_correlation_of_a_million_draws_is_the_closed_one(shift: int) -> None:
     points = monte_carlo(ROBUST.with_(changes), MILLION, random=("C", "m2", "m3"), design=DESIGN)
     wanted = np.expm1(r * s * t) / np.sqrt(np.expm1(s**2) * np.expm1(t**2))
     found = _correlation(points.column("m3"), points.column("C"))
-    at_most(abs(found - wanted), THREE * (1 - wanted**2) / 1e3)
+    at_most(abs(found - wanted), FOUR * (1 - wanted**2) / 1e3)
     ranks = stats.spearmanr(points.column("m2"), points.column("m3")).statistic
-    at_most(abs(ranks - 6 / np.pi * np.arcsin(0.4)), THREE / 1e3)
+    at_most(abs(ranks - 6 / np.pi * np.arcsin(0.4)), FOUR / 1e3)
     ends = stats.uniform(0.195, 0.01).cdf
     at_most(stats.kstest(points.column("m2"), ends).statistic, stats.kstwo.isf(1e-4, MILLION))
 
@@ -253,7 +253,7 @@ def test_rank_correlation_is_what_was_asked_for(shift: int) -> None:
     changes = {"study.seed": 1 + shift, "study.correlation": {**MOULD, "measure": "rank"}}
     points = monte_carlo(ROBUST.with_(changes), MILLION, random=("C", "m2", "m3"), design=DESIGN)
     found = _correlation(points.column("m2"), points.column("m3"))  # both uniform: ranks themselves
-    at_most(abs(found - 0.8), THREE / 1e3)
+    at_most(abs(found - 0.8), FOUR / 1e3)
 
 
 @pytest.mark.parametrize("method", ["monte-carlo", "random-lhs", "qmc"])

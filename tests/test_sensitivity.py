@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from margins import at_least, at_most, fewest
+from margins import FALSE_RED, at_least, at_most, fewest
 from SALib.test_functions import Ishigami, Sobol_G
+from scipy import stats
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.sensitivity import (
@@ -141,9 +142,11 @@ def test_loop_finds_the_interval_and_the_derivative(sigma: float, shift: int) ->
     within = np.abs(np.array(score)[np.array(found)])
     at_least(np.count_nonzero(found), fewest(np.size(found), 0.95))
     at_least(np.count_nonzero(within <= 2), fewest(within.size, 0.95))
-    at_most(within.max(), 4.5)
-    # short enough for sin(3 u) where f is clean, and no shorter than the noise leaves sense in
-    wanted = {0.0: 2.0, 1e-6: 2.0, 1e-5: 1.5, 5e-5: 1.0}[sigma]
+    # Choosing an interval makes tails heavier than a fit's 35 degrees of freedom: 8 of 18 000 lay beyond 4.5.
+    at_most(within.max(), stats.t.isf(FALSE_RED / (2 * within.size), 10))
+    # short enough for sin(3 u) where f is clean, and no shorter than the noise leaves sense in: 2.0 and more, in
+    # fifty repeats no less than 0.02 below
+    wanted = {0.0: 1.9, 1e-6: 1.9, 1e-5: 1.4, 5e-5: 0.9}[sigma]
     at_least(np.concatenate(steps).mean(), wanted)
 
 

@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
 # Renews the tested versions: the newest that pyproject.toml allows, with the hashes of their files, for each Python;
 # and the oldest that it allows, for the oldest Python. Then run the tests with them, and commit.
-#   bash jobs/locks/renew.sh
+#   bash jobs/locks/renew.sh              all
+#   bash jobs/locks/renew.sh --lowest     only the oldest: after a change of a lower bound
 # Needs Python and pip; nothing but the lists is changed. Names no registry: pip's own settings say where from.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 pythons=(3.11 3.12 3.13 3.14)
+lowest=${pythons[0]}
+if [ "${1:-}" = --lowest ]; then pythons=(); fi
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 "${PYTHON:-python3}" -m venv "$place/venv"
@@ -42,9 +45,9 @@ both() {
 for python in "${pythons[@]}"; do
     both "$python" "$python"
 done
-both "${pythons[0]}" "lowest-${pythons[0]}" --resolution lowest-direct
+both "$lowest" "lowest-$lowest" --resolution lowest-direct
 
-for folder in "${pythons[@]}" "lowest-${pythons[0]}"; do
+for folder in "${pythons[@]}" "lowest-$lowest"; do
     rm -rf "jobs/locks/$folder"
     mv "$place/$folder" jobs/locks/
 done
