@@ -275,7 +275,10 @@ def test_recursion_cuts_where_the_kink_is(shift):
     assert not single.accepted.any()
     assert single.leaves[0].names == ("x1", "x2")
     worse = accuracy(kinked(places), single.predict(places)).rmse
-    at_most(accuracy(kinked(places), pieces.predict(places)).rmse, 0.5 * worse)
+    better = accuracy(kinked(places), pieces.predict(places)).rmse
+    at_most(
+        np.log(better / worse), np.log(0.8)
+    )  # a quarter at most in fifty repeats; a cut elsewhere gains nothing
 
 
 def test_a_smooth_function_stays_in_one_piece():
