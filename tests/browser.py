@@ -24,6 +24,7 @@ _ARGUMENTS = (
 KEYS = {
     "Tab": "\ue004",
     "Enter": "\ue007",
+    "Escape": "\ue00c",
     "ArrowRight": "\ue014",
     "ArrowLeft": "\ue012",
     "ArrowDown": "\ue015",

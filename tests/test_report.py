@@ -114,6 +114,15 @@ def test_structure_can_be_walked_without_eyes(tree: Tree) -> None:
     assert [a for t, a in tree.elements if t == "html"] == [{"lang": "en"}]
 
 
+def test_every_figure_leads_to_itself_enlarged_and_back(tree: Tree) -> None:
+    figures = [a["id"] for tag, a in tree.elements if tag == "figure"]
+    assert len(figures) == len(set(figures)) > 5
+    links = [a for tag, a in tree.elements if tag == "a"]
+    for figure in figures:
+        (larger,) = [a for a in links if a["href"] == f"#{figure}"]
+        assert [a["class"] for a in links if a["href"] == f"#{larger['id']}"] == ["close"]
+
+
 def test_the_page_says_what_was_found(tree: Tree) -> None:
     for words in (
         "60 designs",
@@ -381,6 +390,24 @@ def test_the_front_is_walked_by_keyboard(browser: Browser, page: Path) -> None:
     assert browser.run("return Boolean(document.activeElement.getAttribute('aria-label'));")
     browser.press("Tab")
     assert not browser.run("return document.activeElement.classList.contains('point');")
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("width", [1280, 400])
+def test_every_figure_fills_the_screen_when_asked(browser: Browser, page: Path, width: int) -> None:
+    browser.open(page, width)
+    size = "return document.querySelectorAll('figure')[{}].querySelector('img').getBoundingClientRect().width;"
+    for k in range(browser.run("return document.querySelectorAll('figure').length;")):
+        small = browser.run(size.format(k))
+        browser.run(f"document.getElementById('small-{k + 1}').click();")
+        box = browser.run(
+            f"const b = document.getElementById('figure-{k + 1}').getBoundingClientRect();"
+            " return [b.left, b.top, innerWidth - b.width, innerHeight - b.height];"
+        )
+        assert np.allclose(box, 0.0, atol=20.0)  # a scroll bar at most
+        assert browser.run(size.format(k)) > 1.5 * small
+        browser.press("Escape")
+        assert browser.run(size.format(k)) == small
 
 
 @pytest.mark.full

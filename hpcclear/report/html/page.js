@@ -325,6 +325,15 @@
     play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
   }
 
+  /* a figure that is its page's target fills the screen; the way back stands in it, Escape takes it */
+  const close = () => document.querySelector("figure:target .close")?.click();
+  document.addEventListener("keydown", (event) => { if (event.key === "Escape") close(); });
+  document.addEventListener("click", (event) => {
+    if (!event.target.closest("figure:target a:not(.close)")) return;
+    event.preventDefault();
+    close();
+  });
+
   front();
   mechanism();
 })();
