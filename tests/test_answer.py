@@ -181,6 +181,7 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
         assert STORY.findall(told) == []
         if objective != "mean-gap":
             assert "distance from the clearance" not in told
+    assert all(len(line) <= 80 for line in printed.replace(str(tmp_path), ".").splitlines())
     words = OBJECTIVES[objective].words
     assert words in page
     assert words in " ".join(printed.split())

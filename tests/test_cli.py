@@ -1,6 +1,7 @@
 """The commands as a person types them: output, exit codes, messages."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from commands import warm
+from commands import MPIEXEC, warm
 from patience import crowded
 
 from hpcclear.cli import cli
@@ -52,6 +53,40 @@ def test_check_says_what_would_be_simulated():
     assert "Warning" in done.stdout  # the paper's own rod
     assert "\x1b" not in done.stdout  # no colours in a pipe
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("sample", "--set", "study.samples=40"),
+        ("map", "--x", "C=0.1mm:1mm:4"),
+        ("wear", "--set", "wear.lives=2", "--set", "wear.cycles=1e4"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_what_a_pipe_gets_fits_80_columns_on_any_number_of_ranks(tmp_path, words, ranks):
+    """Output and log: no colour, no bar, no line that wraps, nothing said once a rank."""
+    scene = {"wear": "wear"}.get(words[0], "quickstart")
+    command, *options = words
+    asked = [command, f"jobs/{scene}.toml", "-o", "x.nc", *options, *SHORT]
+    launcher = [MPIEXEC, "-n", str(ranks)] if ranks else []
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    done = subprocess.run(
+        [*launcher, warm().programs / "hpcclear", *asked],
+        capture_output=True,
+        text=True,
+        timeout=crowded(300),
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    for told in (done.stdout, done.stderr):
+        assert not re.search(r"[\x1b\r━]", told)
+        lines = [line.strip() for line in told.splitlines() if line.strip()]
+        assert all(len(line) <= 80 for line in told.splitlines()), told
+        assert len(lines) == len(set(lines)), told
 
 
 def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
