@@ -44,11 +44,11 @@ def become(asked: dict, descriptors: list[int]) -> None:
         os.closerange(HIGH, HIGH + len(kept))
         os.environ.clear()
         os.environ.update(asked["environment"])
+        os.chdir(asked["folder"])  # another user may not be allowed to
         if asked["user"] is not None and os.geteuid() == 0:
             os.setgroups([])
             os.setgid(asked["user"])
             os.setuid(asked["user"])
-        os.chdir(asked["folder"])
         program, *words = asked["words"]
         if program == "-m":
             sys.argv = ["hpcclear", *words[1:]]
