@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from commands import overrides, run
 from dense_linkage import Contact, Dense
+from margins import energy_closes
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
@@ -164,11 +165,7 @@ def test_the_gallery_runs_and_closes_its_energy(name):
     )
     response = simulate(scene.with_({"study": None}))
     assert int(response["status"]) == 0
-    work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
-    kinetic = float(response["kinetic_energy"].max())
-    left = np.abs(response["energy_residual"].to_numpy()) / max(work, kinetic)
-    assert np.quantile(left, 0.99) < 1e-4
-    assert left.max() < 1e-2  # an instant amid an impact, between two steps: 9e-4 in one of ten kicked runs
+    energy_closes(response, 1e-4)
     assert float(response["objective"]) > 0.0
     points = [str(point) for point in response["point"].to_numpy()]
     assert len(points) == len(set(points))
