@@ -32,6 +32,7 @@ def place_of_all():
         place = Path(name)
         place.chmod(0o755)
         yield place
+        place.chmod(0o755)  # whatever a test made of it
 
 
 def pytest_generate_tests(metafunc):

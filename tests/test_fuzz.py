@@ -279,6 +279,7 @@ def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, pl
     scene = place_of_all / "scene.toml"
     scene.write_text(TEXT)
     (place_of_all / "dangling.nc").symlink_to(place_of_all / "no" / "where.nc")
+    place_of_all.chmod(0o555)  # if it is this user's own
     before = tree(place_of_all)
     words = ("sample", scene, *overrides(*CHEAP, "study.samples=40"), "-o")
     for place in (
@@ -292,6 +293,25 @@ def test_places_without_permission_or_of_the_wrong_kind_are_refused(hpcclear, pl
         assert refused(answer), (place, answer)
         assert str(place.parent) in answer[1] or str(place) in answer[1]
     assert tree(place_of_all) == before
+
+
+def test_what_may_not_be_read_is_named_by_every_command(hpcclear, place_of_all):
+    scene, folder = place_of_all / "scene.toml", place_of_all / "closed"
+    scene.write_text(TEXT)
+    folder.mkdir()
+    for path in (scene, folder):
+        path.chmod(0)
+    try:
+        for words in (("check", scene), ("simulate", scene, "-o", place_of_all / "x.nc")):
+            answer = hpcclear(*words, user=NOBODY)
+            assert refused(answer), answer
+            assert str(scene) in answer[1]
+        for command in ("report", "crate", "reproduce"):
+            answer = hpcclear(command, folder, user=NOBODY)
+            assert refused(answer), (command, answer)
+            assert str(folder) in answer[1]
+    finally:
+        folder.chmod(0o755)
 
 
 def test_a_link_in_place_of_the_result_is_replaced_not_followed(hpcclear, tmp_path):

@@ -8,6 +8,7 @@ import click
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import (
     FILE,
+    PATH,
     POINTS,
     SET,
     How,
@@ -52,7 +53,7 @@ def _check_kind(
 )
 @click.option(
     "--raw",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="With --statistics: directory for the samples themselves.",
 )
 @click.option(
@@ -182,7 +183,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="NetCDF file to write; by default NAME-effects.nc here.",
 )
 @click.option(
@@ -206,7 +207,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
 @click.option(
     "--scene",
     "reduced",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Write the cheapest scene there, whole.",
 )

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
-FILE = click.argument("file", type=click.Path(path_type=Path))
+PATH = click.Path(path_type=Path, readable=False)  # what cannot be read is told by who reads it
+FILE = click.argument("file", type=PATH)
 SET = click.option(
     "--set",
     "overrides",
@@ -30,9 +31,7 @@ SET = click.option(
 
 def output_option(words: str) -> Callable[[Any], Any]:
     """The option that names where results go."""
-    return click.option(
-        "-o", "--output", type=click.Path(path_type=Path), required=True, help=words
-    )
+    return click.option("-o", "--output", type=PATH, required=True, help=words)
 
 
 FRESH = click.option(
@@ -55,7 +54,7 @@ INTERVAL = click.option(
 )
 POINTS = click.option(
     "--points",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="CSV table of designs instead of the study's sampling.",
 )
 PROGRESS = click.option(

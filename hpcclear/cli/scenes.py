@@ -5,12 +5,21 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import FILE, SET, check_free, is_root, output_option, place_of, scene_of
+from hpcclear.cli.options import (
+    FILE,
+    PATH,
+    SET,
+    check_free,
+    is_root,
+    output_option,
+    place_of,
+    scene_of,
+)
 from hpcclear.ranks.stopping import Exit
 
 
 @click.command(short_help="Write a starter scene.")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 def init(file: Path) -> int:
     """Write an engine to start from: every table, each number with its unit, and a small study.
 
@@ -38,7 +47,7 @@ def init(file: Path) -> int:
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
 @click.option(
     "--sketch",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FIGURE",
     help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
 )
@@ -102,7 +111,7 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 
 
 @click.command(short_help="Write figures and an HTML page.")
-@click.argument("directory", type=click.Path(path_type=Path))
+@click.argument("directory", type=PATH)
 def report(directory: Path) -> int:
     """Write figures and a self-contained HTML page about a directory of results.
 
@@ -117,7 +126,7 @@ def report(directory: Path) -> int:
 
 
 @click.command(short_help="Simulate again, and compare bit by bit.")
-@click.argument("place", type=click.Path(path_type=Path))
+@click.argument("place", type=PATH)
 @click.option(
     "--samples",
     type=click.IntRange(1),
@@ -149,7 +158,7 @@ def reproduce(place: Path, samples: int) -> int:
 
 
 @click.command(short_help="Describe results for an archive.")
-@click.argument("directory", type=click.Path(path_type=Path))
+@click.argument("directory", type=PATH)
 def crate(directory: Path) -> int:
     """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from numba.core.registry import cpu_target
 
 import hpcclear
-from hpcclear import scene
+from hpcclear import cli, scene
 from hpcclear.ensemble import identity, samples
 from hpcclear.ranks import boundary
 from hpcclear.scene import units
@@ -51,8 +51,8 @@ def become(asked: dict, descriptors: list[int]) -> None:
             os.setuid(asked["user"])
         program, *words = asked["words"]
         if program == "-m":
-            sys.argv = ["hpcclear", *words[1:]]
-            runpy.run_module(words[0], run_name="__main__", alter_sys=True)
+            sys.argv = words  # hpcclear and what it is asked
+            cli.main()
         else:
             sys.argv, sys.path[0] = [program, *words], str(Path(program).parent)
             runpy.run_path(program, run_name="__main__")
