@@ -20,6 +20,7 @@ import socket
 import sys
 from pathlib import Path
 
+import threadpoolctl  # noqa: F401
 from numba.core.registry import cpu_target
 
 import hpcclear
