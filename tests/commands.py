@@ -169,9 +169,8 @@ class Warm:
     """
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(
-            prefix="warm-"
-        )  # a socket's name has to be short
+        # of its own, as a socket's name has to be short
+        self._folder = tempfile.TemporaryDirectory(prefix="warm-")
         self.socket = Path(self._folder.name) / "socket"
         self.programs = Path(self._folder.name) / "bin"
         self.programs.mkdir()

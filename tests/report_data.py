@@ -196,22 +196,57 @@ def claims() -> xr.Dataset:
 
 def accuracy() -> xr.Dataset:
     """What accuracy costs: errors that fall as powers of the work, with a floor."""
-    methods = [
-        "Dormand-Prince 5(4), minimal",
-        "adaptive order 4, Baumgarte",
-        "fixed steps, order 4",
-        "Radau IIA",
-    ]
-    rung, draws = np.arange(5), 10 ** np.arange(2, 6)
-    spent, price = 10 * 2 ** np.arange(7), 1e-4 * np.array([1.0, 1.2, 1.5, 2.0])
+    draws, spent = 10 ** np.arange(2, 6), 10 * 2 ** np.arange(7)
+    training = np.array([50, 100, 200])
+    data = _spent(spent) | _integration() | _surrogates(training) | _moments(draws)
+    data |= {
+        "strong_seconds": np.array([10.0, 5.2]),
+        "weak_seconds": np.array([10.0, 10.4]),
+        "lost_seconds": np.array([0.5, 2.0, 0.3, 0.1]),
+    }
+    coords = {
+        "tolerance": 10.0 ** -np.arange(3, 7),
+        "spent": spent,
+        "aim": np.array([0.1, 0.01, 0.001]),
+        "integrator": np.array(
+            [
+                "Dormand-Prince 5(4), minimal",
+                "adaptive order 4, Baumgarte",
+                "fixed steps, order 4",
+                "Radau IIA",
+            ]
+        ),
+        "rung": np.arange(5),
+        "quantity": np.array(
+            ["slider_position", "slider_velocity", "peak_contact_force", "objective"]
+        ),
+        "transient": np.array([0, 2, 8]),
+        "averaged": np.array([1, 4, 16, 64]),
+        "surrogate": np.array(["response surface", "kriging"]),
+        "training": training,
+        "estimate": np.array(["surrogate", "simulation"]),
+        "moment": np.array(["mean", "deviation"]),
+        "draws": draws,
+        "ranks": np.array([1, 2]),
+        "loss": np.array(["start-up", "compilation", "imbalance", "writing"]),
+    }
+    words = {
+        "designs": "16 designs over the box",
+        "repeats": "median of 5 repeats",
+        "motion": "3.36 +- 0.03 um (chaotic)",
+        "copies": "16 copies",
+        "study": "m2, m3, u2, I2, C",
+        "batch": "512 samples",
+    }
+    return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words)
+
+
+def _spent(spent: np.ndarray) -> dict[str, object]:
+    """Error of a mean against the revolutions spent on it, by tolerance."""
+    price = 1e-4 * np.array([1.0, 1.2, 1.5, 2.0])
     bias = np.array([-0.2, 1e-3, np.nan, np.nan])
     model = np.hypot(np.nan_to_num(bias)[:, None], 0.3 / np.sqrt(spent))
-    setting = np.tile(10.0 ** -(3.0 + rung), (4, 1))
-    evaluations = 600 * setting**-0.2 * np.arange(1, 5)[:, None]
-    error = setting[..., None] * np.array([1e-2, 0.1, 1.0, 0.3]) + 1e-9
-    moments = np.stack([1.0 / np.sqrt(draws), 0.7 / np.sqrt(draws)])
-    moment = np.stack([moments, np.where(draws > 10**4, np.nan, moments)])
-    data = {
+    return {
         "spent_error": 1.1 * model,
         "spent_model": model,
         "spent_seconds": price[:, None] * (spent + 640),
@@ -223,8 +258,16 @@ def accuracy() -> xr.Dataset:
         "cheapest_tolerance": np.array([1e-4, 1e-4, np.nan]),
         "cheapest_revolutions": np.array([9.0, 910.0, np.nan]),
         "cheapest_seconds": np.array([0.08, 0.2, np.nan]),
+    }
+
+
+def _integration() -> dict[str, object]:
+    """Errors of methods against their work, and of averages over revolutions."""
+    setting = np.tile(10.0 ** -(3.0 + np.arange(5)), (4, 1))
+    evaluations = 600 * setting**-0.2 * np.arange(1, 5)[:, None]
+    return {
         "setting": setting,
-        "error": error,
+        "error": setting[..., None] * np.array([1e-2, 0.1, 1.0, 0.3]) + 1e-9,
         "seconds": 1e-7 * evaluations,
         "evaluations": evaluations,
         "order": np.full((4, 4), 5.0),
@@ -232,11 +275,25 @@ def accuracy() -> xr.Dataset:
         "averaging_error": np.outer([0.3, 0.02, 0.001], 1 / np.sqrt([1, 4, 16, 64])) + 1e-3,
         "averaging_floor": 1e-3,
         "turn_seconds": 2e-4,
-        "r2": 1 - np.outer([1.0, 0.3], 10.0 / np.array([50, 100, 200])),
-        "rmae": np.outer([1.0, 0.3], 30.0 / np.array([50, 100, 200])),
-        "leave_one_out": np.outer([1.0, 0.3], 20.0 / np.array([50, 100, 200])),
+    }
+
+
+def _surrogates(training: np.ndarray) -> dict[str, object]:
+    """Errors of two surrogates against their training points."""
+    return {
+        "r2": 1 - np.outer([1.0, 0.3], 10.0 / training),
+        "rmae": np.outer([1.0, 0.3], 30.0 / training),
+        "leave_one_out": np.outer([1.0, 0.3], 20.0 / training),
         "fit_seconds": np.full((2, 3), 0.5),
         "sample_seconds": 1e-3,
+    }
+
+
+def _moments(draws: np.ndarray) -> dict[str, object]:
+    """Errors of mean and deviation against draws, on the surrogate and by simulation."""
+    moments = np.stack([1.0 / np.sqrt(draws), 0.7 / np.sqrt(draws)])
+    moment = np.stack([moments, np.where(draws > 10**4, np.nan, moments)])
+    return {
         "moment_error": moment,
         "moment_lower": 0.9 * moment,
         "moment_upper": 1.1 * moment,
@@ -245,37 +302,7 @@ def accuracy() -> xr.Dataset:
         "bias_error": np.array([1e-4, 1e-3]),
         "quadrature_seconds": 1e-5,
         "closed_form": np.array([1e-9, 1e-8]),
-        "strong_seconds": np.array([10.0, 5.2]),
-        "weak_seconds": np.array([10.0, 10.4]),
-        "lost_seconds": np.array([0.5, 2.0, 0.3, 0.1]),
     }
-    coords = {
-        "tolerance": 10.0 ** -np.arange(3, 7),
-        "spent": spent,
-        "aim": np.array([0.1, 0.01, 0.001]),
-        "integrator": np.array(methods),
-        "rung": rung,
-        "quantity": np.array(
-            ["slider_position", "slider_velocity", "peak_contact_force", "objective"]
-        ),
-        "transient": np.array([0, 2, 8]),
-        "averaged": np.array([1, 4, 16, 64]),
-        "surrogate": np.array(["response surface", "kriging"]),
-        "training": np.array([50, 100, 200]),
-        "estimate": np.array(["surrogate", "simulation"]),
-        "moment": np.array(["mean", "deviation"]),
-        "draws": draws,
-        "ranks": np.array([1, 2]),
-        "loss": np.array(["start-up", "compilation", "imbalance", "writing"]),
-    }
-    words = {"designs": "16 designs over the box", "repeats": "median of 5 repeats"}
-    words |= {
-        "motion": "3.36 +- 0.03 um (chaotic)",
-        "copies": "16 copies",
-        "study": "m2, m3, u2, I2, C",
-        "batch": "512 samples",
-    }
-    return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words)
 
 
 def timing(ranks: int = 2) -> xr.Dataset:

@@ -19,15 +19,16 @@ ROOT = Path(__file__).resolve().parent.parent
 SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.averaged_revolutions=1"]
 
 
-def hpcclear(*words, timeout=300, module=False, **more):
-    """Run a command in a process of its own."""
+def hpcclear(*words, timeout=300, module=False, ranks=0, cwd=ROOT, **more):
+    """Run a command in processes of its own; 0 ranks: without mpiexec."""
     program = [sys.executable, "-m", "hpcclear"] if module else [warm().programs / "hpcclear"]
+    launcher = [MPIEXEC, "-n", str(ranks)] if ranks else []
     return subprocess.run(
-        [*program, *map(str, words)],
+        [*launcher, *program, *map(str, words)],
         capture_output=True,
         text=True,
         timeout=crowded(timeout),
-        cwd=ROOT,
+        cwd=cwd,
         check=False,
         **more,
     )
@@ -70,17 +71,9 @@ def test_what_a_pipe_gets_fits_80_columns_on_any_number_of_ranks(tmp_path, words
     """Output and log: no colour, no bar, no line that wraps, nothing said once a rank."""
     scene = {"wear": "wear"}.get(words[0], "quickstart")
     command, *options = words
-    asked = [command, f"jobs/{scene}.toml", "-o", "x.nc", *options, *SHORT]
-    launcher = [MPIEXEC, "-n", str(ranks)] if ranks else []
     (tmp_path / "jobs").symlink_to(ROOT / "jobs")
-    done = subprocess.run(
-        [*launcher, warm().programs / "hpcclear", *asked],
-        capture_output=True,
-        text=True,
-        timeout=crowded(300),
-        cwd=tmp_path,
-        check=False,
-    )
+    asked = [command, f"jobs/{scene}.toml", "-o", "x.nc", *options, *SHORT]
+    done = hpcclear(*asked, ranks=ranks, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for told in (done.stdout, done.stderr):
         assert not re.search(r"[\x1b\r━]", told)
@@ -190,22 +183,12 @@ def test_a_table_of_designs(tmp_path):
 
 @pytest.mark.mpi
 def test_one_two_and_three_ranks_write_the_same_bytes(tmp_path):
-    mpiexec = Path(sys.executable).parent / "mpiexec"
-    program = warm().programs / "hpcclear"
     files = []
     for ranks in (0, 1, 2, 3):
         out = tmp_path / str(ranks) / "samples.nc"
         out.parent.mkdir()
-        launcher = [str(mpiexec), "-n", str(ranks)] if ranks else []
-        command = [*launcher, str(program), "sample", "jobs/quickstart.toml", "-o", str(out)]
-        done = subprocess.run(
-            [*command, "--set", "study.samples=150"],
-            capture_output=True,
-            text=True,
-            timeout=crowded(300),
-            cwd=ROOT,
-            check=False,
-        )
+        words = ("sample", "jobs/quickstart.toml", "-o", out, "--set", "study.samples=150")
+        done = hpcclear(*words, ranks=ranks)
         assert done.returncode == 0, done.stderr
         files.append(out.read_bytes())
     assert all(content == files[0] for content in files[1:])

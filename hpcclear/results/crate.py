@@ -6,8 +6,7 @@ https://w3id.org/ro/wfrun/process/0.5 (S. Leo et al., PLoS ONE 19, 2024, doi:10.
 
 import hashlib
 import json
-from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from hpcclear.results import dataset, files
 NAME = "ro-crate-metadata.json"
 CRATE = "https://w3id.org/ro/crate/1.1"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
+_STATED = ("source", "license", "hpcclear_version", "versions", "processor")
 
 
 def write_crate(directory: Path) -> Path:
@@ -48,9 +48,10 @@ def write_crate(directory: Path) -> Path:
 def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, Any]]:
     described = [_file(directory, path, content) for path, content in found.items()]
     parts = [{"@id": one["@id"]} for one in described]
-    attributes: defaultdict[str, str] = defaultdict(lambda: "not stated")
-    for one in found.values():
-        attributes |= {name: str(value) for name, value in one.attrs.items()}
+    # Scenes of responses are made from the study's; alone they are what was asked for.
+    above = [one for path, one in found.items() if path.parent == directory] or found.values()
+    scenes = {_stated([one], "scene_hash"): _stated([one], "scene") for one in above}
+    everywhere = {name: _stated(found.values(), name) for name in _STATED}
     ended = datetime.fromtimestamp(max(path.stat().st_mtime for path in found), UTC).isoformat(
         timespec="seconds"
     )
@@ -61,8 +62,8 @@ def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, 
     root = {
         "@id": "./", "@type": "Dataset", "conformsTo": {"@id": PROFILE},
         "name": f"Results in {directory.resolve().name}",
-        "description": f"Simulations of a mechanism with clearance joints, by {attributes['source']}",
-        "datePublished": ended, "license": attributes["license"], "hasPart": parts, "mentions": {"@id": "#run"},
+        "description": f"Simulations of a mechanism with clearance joints, by {everywhere['source']}",
+        "datePublished": ended, "license": everywhere["license"], "hasPart": parts, "mentions": {"@id": "#run"},
     }  # fmt: skip
     profile = {
         "@id": PROFILE,
@@ -72,19 +73,29 @@ def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, 
     }
     program = {
         "@id": "#hpcclear", "@type": "SoftwareApplication", "name": "hpcclear",
-        "softwareVersion": attributes["hpcclear_version"], "softwareRequirements": attributes["versions"],
-        "processorRequirements": attributes["processor"],
+        "softwareVersion": everywhere["hpcclear_version"], "softwareRequirements": everywhere["versions"],
+        "processorRequirements": everywhere["processor"],
     }  # fmt: skip
-    scene = {
-        "@id": "#scene", "@type": "CreativeWork", "name": "scene file", "encodingFormat": "application/toml",
-        "text": attributes["scene"], "identifier": attributes["scene_hash"],
-    }  # fmt: skip
+    inputs = [
+        {
+            "@id": "#scene" if len(scenes) == 1 else f"#scene-{number}", "@type": "CreativeWork", "name": "scene file",
+            "encodingFormat": "application/toml", "text": text, "identifier": known,
+        }
+        for number, (known, text) in enumerate(scenes.items(), 1)
+    ]  # fmt: skip
+    used = [{"@id": one["@id"]} for one in inputs]
     run = {
         "@id": "#run", "@type": "CreateAction", "name": "Simulation", "instrument": {"@id": "#hpcclear"},
-        "object": {"@id": "#scene"}, "result": parts, "endTime": ended,
+        "object": used[0] if len(used) == 1 else used, "result": parts, "endTime": ended,
         **({"description": command} if command else {}),
     }  # fmt: skip
-    return [descriptor, root, profile, program, scene, run, *described]
+    return [descriptor, root, profile, program, *inputs, run, *described]
+
+
+def _stated(contents: Iterable[xr.Dataset], name: str) -> str:
+    """What files say of themselves under a name; all of it where they differ."""
+    values = dict.fromkeys(str(one.attrs[name]) for one in contents if name in one.attrs)
+    return "; ".join(values) or "not stated"
 
 
 def _file(directory: Path, path: Path, content: xr.Dataset) -> dict[str, Any]:

@@ -20,7 +20,7 @@ import socket
 import sys
 from pathlib import Path
 
-import threadpoolctl  # noqa: F401
+import threadpoolctl
 from numba.core.registry import cpu_target
 
 import hpcclear
@@ -84,7 +84,7 @@ def serve(place: str) -> None:
         while True:
             key, _ = all_ends.select()[0]  # one at a time: what it does may settle the others
             if key.fileobj == 0:
-                return
+                break
             if key.fileobj is door:
                 begin(door.accept()[0], all_ends)
             elif isinstance(key.fileobj, socket.socket):
@@ -94,6 +94,9 @@ def serve(place: str) -> None:
                     all_ends.unregister(key.fileobj)
             else:
                 end(key, all_ends)
+        for key in list(all_ends.get_map().values()):  # what it still is ends with it
+            if isinstance(key.data, int):
+                os.kill(key.data, signal.SIGKILL)
 
 
 def begin(client: socket.socket, all_ends: selectors.BaseSelector) -> None:
@@ -131,6 +134,7 @@ def load() -> None:
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
     identity.sample_key(shipped, samples.design(shipped, None))
     units._registry()
+    threadpoolctl.threadpool_info()  # asks every library, and some of ours load more then
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
 
