@@ -20,7 +20,7 @@ import socket
 import sys
 from pathlib import Path
 
-import threadpoolctl
+import threadpoolctl  # noqa: F401
 from numba.core.registry import cpu_target
 
 import hpcclear
@@ -134,7 +134,9 @@ def load() -> None:
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
     identity.sample_key(shipped, samples.design(shipped, None))
     units._registry()
-    threadpoolctl.threadpool_info()  # asks every library, and some of ours load more then
+    for layer in ("tbbpool", "omppool", "workqueue"):  # which of them sets one thread is found later
+        with contextlib.suppress(ImportError):
+            importlib.import_module(f"numba.np.ufunc.{layer}")
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
 
