@@ -134,7 +134,8 @@ def load() -> None:
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
     identity.sample_key(shipped, samples.design(shipped, None))
     units._registry()
-    for layer in ("tbbpool", "omppool", "workqueue"):  # which of them sets one thread is found later
+    # which of them keeps Numba to one thread is found later
+    for layer in ("tbbpool", "omppool", "workqueue"):
         with contextlib.suppress(ImportError):
             importlib.import_module(f"numba.np.ufunc.{layer}")
     cpu_target.typing_context.refresh()
