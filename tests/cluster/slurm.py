@@ -14,36 +14,11 @@ from typing import Self
 
 from cluster.box import ROOT, Box, Node
 
-_CONF = """ClusterName=box
-# MPICH names its shared memory after job and step: never those of an earlier cluster on this machine.
-FirstJobId={first}
-MaxJobId=60000000
-SlurmctldHost={host}
-SlurmUser=root
-SlurmctldPort=16817
-SlurmdPort=16818
-AuthType=auth/munge
-AuthInfo=socket={folder}/munge.socket,cred_expire=5
-SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd-%n.pid
-SlurmctldLogFile={folder}/slurmctld.log
-SlurmdLogFile={folder}/slurmd-%n.log
-StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool-%n
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SelectType=select/cons_tres
-SelectTypeParameters=CR_Core
-MpiDefault=none
-ReturnToService=2
-InactiveLimit=0
-KillWait=5
+_CONF = ROOT / "tests" / "slurm" / "slurm.conf"
+_OWN = """KillWait=5
 # A node that does not answer is down after so long: shorter than the silence that ranks bear by default.
 SlurmdTimeout=20
 UnkillableStepTimeout=20
-SchedulerParameters=sched_interval=2,batch_sched_delay=1
-{nodes}
-PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """
 
 
@@ -75,8 +50,10 @@ class Slurm:
             )
         first = random.SystemRandom().randrange(1, 30_000) * 1000 + 1
         host = f"{self.box.nodes[0].name}({self.box.nodes[0].address})"
-        conf = _CONF.format(first=first, host=host, folder=self.folder, nodes="\n".join(rows))
-        Path(self.settings["SLURM_CONF"]).write_text(conf)
+        conf = _CONF.read_text()
+        for name, value in (("first", first), ("host", host), ("folder", self.folder)):
+            conf = conf.replace(f"@{name}@", str(value))
+        Path(self.settings["SLURM_CONF"]).write_text(conf + _OWN + "\n".join(rows) + "\n")
         files = (("key-file", "munge.key"), ("socket", "munge.socket"), ("pid-file", "munged.pid"))
         files = (*files, ("log-file", "munged.log"), ("seed-file", "munge.seed"))
         options = [f"--{option}={self.folder / name}" for option, name in files]

@@ -4,39 +4,15 @@
 
 start_cluster() {
     folder=$1
-    mkdir -p "$folder/spool" "$folder/state"
+    mkdir -p "$folder/spool-$(hostname -s)" "$folder/state"
     (umask 077 && head -c 1024 /dev/urandom >"$folder/munge.key")
     cores=$(env -u OMP_NUM_THREADS nproc) # which otherwise answers 1
-    cat >"$folder/slurm.conf" <<CONF
-ClusterName=test
-# MPICH names its shared memory after job and step: never those of an earlier cluster on this machine.
-FirstJobId=$((RANDOM * 1000 + 1))
-MaxJobId=60000000
-SlurmctldHost=$(hostname -s)
-SlurmUser=root
-SlurmctldPort=16817
-SlurmdPort=16818
-AuthType=auth/munge
-# Requeued jobs start again once their old credential has expired: two minutes by default.
-AuthInfo=socket=$folder/munge.socket,cred_expire=5
-SlurmctldPidFile=$folder/slurmctld.pid
-SlurmdPidFile=$folder/slurmd.pid
-SlurmctldLogFile=$folder/slurmctld.log
-SlurmdLogFile=$folder/slurmd.log
-StateSaveLocation=$folder/state
-SlurmdSpoolDir=$folder/spool
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SelectType=select/cons_tres
-SelectTypeParameters=CR_Core
-MpiDefault=none
-ReturnToService=2
-InactiveLimit=0
-KillWait=10
-SchedulerParameters=sched_interval=2,batch_sched_delay=1
-NodeName=$(hostname -s) CPUs=$cores State=UNKNOWN
-PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
-CONF
+    host=$(hostname -s)
+    {
+        sed "s|@first@|$((RANDOM * 1000 + 1))|; s|@host@|$host|; s|@folder@|$folder|" tests/slurm/slurm.conf
+        echo "KillWait=10"
+        echo "NodeName=$host CPUs=$cores State=UNKNOWN"
+    } >"$folder/slurm.conf"
     export SLURM_CONF=$folder/slurm.conf
     munged --force --key-file="$folder/munge.key" --socket="$folder/munge.socket" \
         --pid-file="$folder/munged.pid" --log-file="$folder/munged.log" --seed-file="$folder/munge.seed"
@@ -55,7 +31,7 @@ CONF
 
 stop_cluster() {
     scancel --quiet --user=root || true
-    for daemon in slurmd slurmctld munged; do
+    for daemon in "slurmd-$(hostname -s)" slurmctld munged; do
         if [ -s "$folder/$daemon.pid" ]; then
             process=$(cat "$folder/$daemon.pid")
             kill "$process" || true

@@ -58,6 +58,16 @@ def expect(what: str, holds: bool, log: str) -> None:
     print(f"ok: {what}", flush=True)
 
 
+def readable(log: str, what: str) -> None:
+    """What the program said stands in 80 columns, and once: places apart, and what Slurm and the scripts said."""
+    lines = (FOLDER / log).read_text(errors="replace").replace(str(FOLDER), ".").splitlines()
+    said = [line for line in lines if not line.startswith(("srun:", "slurmstepd:", "slurm"))]
+    wide = [line for line in said if len(line) > 80]
+    twice = sorted({line for line in said if line.strip() and said.count(line) > 1})
+    expect(f"{what}: {len(said)} lines fit 80 columns{wide or ''}", bool(said) and not wide, log)
+    expect(f"{what}: nothing is said twice{twice or ''}", not twice, log)
+
+
 def study(samples: int) -> tuple[str, ...]:
     return (*CHEAP, "--set", f"study.samples={samples}")
 
@@ -72,6 +82,7 @@ def finished() -> tuple[Path, float]:
     timing = dataset.read(output.parent / "timing.nc", "timing")
     ranks = timing.sizes["rank"]
     expect("srun --mpi=pmi2: its two ranks are one run", ranks == 2, "finished.log")
+    readable("finished.log", "srun")
     return output, 2000.0 / float(timing["busy"].sum())
 
 

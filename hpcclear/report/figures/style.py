@@ -153,6 +153,12 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     }[kind]
     buffer = io.BytesIO()
     with matplotlib().rc_context(RC):
+        if kind == "png":  # whose dots are the layout's; placed here, matplotlib need not draw twice to do so
+            figure.set_dpi(dpi)
+            engine = figure.get_layout_engine()
+            if engine is not None:
+                engine.execute(figure)
+                figure.set_layout_engine("none")
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=stamp)
     return buffer.getvalue()
 

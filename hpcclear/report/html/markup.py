@@ -85,11 +85,14 @@ def _source(name: str) -> str:
     return folder.joinpath(name).read_text(encoding="utf-8")
 
 
+_CONTROLS = {code: None for code in (*range(32), 127) if chr(code) not in "\n\t"}
+
+
 def _without_controls(value: object) -> object:
     """A text without control characters, which no page may hold; finished markup as it is."""
     if hasattr(value, "__html__"):
         return value
-    return "".join(c for c in str(value) if c in "\n\t" or (c >= " " and c != "\x7f"))
+    return str(value).translate(_CONTROLS)
 
 
 def number(value: float, digits: int = 4) -> Number:
