@@ -55,13 +55,19 @@ def start(
     """
     launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
     python = warm().words(program) if begin_warm else [sys.executable, *program]
+    return began([*launch, *python, *words], **settings)
+
+
+def began(words: Sequence[str], place: Path | None = None, **settings: str) -> subprocess.Popen:
+    """A program that has been started, in a folder, what it says in one pipe."""
     return subprocess.Popen(
-        [*launch, *python, *words],
+        words,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
+        cwd=place,
         env=os.environ | {"PYTHONPATH": str(ROOT)} | settings,
         start_new_session=True,
     )

@@ -6,6 +6,25 @@ from typing import Any
 
 import numpy as np
 
+CONTACTS = {
+    "hertz": {"law": "hertz"},
+    "hunt-crossley": {"law": "hunt-crossley", "damping": 0.5},
+    "latched": {"law": "flores", "restitution": 0.5},
+}
+FRICTIONS = {
+    "none": {"law": "none"},
+    "coulomb": {"law": "coulomb", "coefficient": 0.05},
+    "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
+    "lugre": {
+        "law": "lugre",
+        "coefficient": 0.05,
+        "static_coefficient": 0.08,
+        "stribeck_speed": 0.01,
+        "bristle_stiffness": 1e5,
+        "bristle_damping": 0.1,
+    },
+}
+
 Row = dict[str, Any]
 Factors = dict[str, list[Any]]
 

@@ -1,12 +1,15 @@
 """One sample through the kernel with W = 1, every step kept, and what its state says about the bodies."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
@@ -15,6 +18,7 @@ from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Outcome
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 HUNT_CROSSLEY = {"law": "hunt-crossley", "damping": 0.5}
@@ -85,6 +89,23 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
         lanes.collect()[1][0], par[0], start[0].state(n), rows[:, rec.TIME], rows[:, s : s + n],
         rows[:, s + n : s + 2 * n], rows[:, rec.CONTACTS : rec.CONTACTS + 2],
     )  # fmt: skip
+
+
+def methods_agree(scene: Scene, methods: Sequence[str]) -> None:
+    """That f is the same to 1e-8 whichever method integrates."""
+    found = {name: run(scene.with_({"numerics.method": name})).out.objective for name in methods}
+    assert found == pytest.approx(dict.fromkeys(found, found[methods[0]]), rel=1e-8)
+
+
+def lanes_have_single_bits(scene: Scene, columns: Mapping[tuple[str, ...], np.ndarray]) -> None:
+    """That samples beside others have the bits of single ones; values by the scene entries they are of."""
+    names = tuple(paths[0] for paths in columns)
+    points = Points(names, np.transpose(list(columns.values())), tuple(columns))
+    par = parameters(scene, points)
+    start = start_states(scene, par)
+    together, alone = (Lanes(problem_of(scene), width).run(par, start) for width in (16, 1))
+    assert (alone.status == Status.OK).all()
+    np.testing.assert_array_equal(together.rows, alone.rows)
 
 
 def rod_of(scene: Scene, par) -> Rod:

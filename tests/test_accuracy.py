@@ -1,5 +1,6 @@
 """What accuracy costs: orders of the methods, the reference, and each panel against closed forms."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.stats import chi2, f
 from hpcclear.accuracy import averaging, integration, methods, random_inputs, spending, surrogate
 from hpcclear.accuracy.looked_at import QUANTITIES
 from hpcclear.accuracy.methods import LARGEST_STEP
-from hpcclear.accuracy.profile import FULL, QUICK, Profile
+from hpcclear.accuracy.profile import FULL, QUICK
 from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
@@ -39,13 +40,12 @@ PRESSED = TWIN.with_(
     }
 )
 
-TINY = Profile(
+TINY = replace(
+    QUICK,
     name="tiny",
     rungs=(1e-3, 1e-5, 1e-7),
     designs=1,
     repeats=1,
-    outside_repeats=1,
-    more_methods=False,
     revolutions=16,
     copies=4,
     stretches=8,
@@ -67,9 +67,7 @@ def silent(text: str) -> None:
 
 @pytest.mark.full  # test_order.py has it of steps of one length
 def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
-    profile = Profile(
-        **{**vars(TINY), "rungs": tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22))}
-    )
+    profile = replace(TINY, rungs=tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22)))
     found = integration.measure(PRESSED, profile, silent)
     velocity = found.order[:, QUANTITIES.index("slider_velocity")]
     order = dict(zip(found.methods, velocity, strict=True))

@@ -5,14 +5,21 @@ import math
 import numpy as np
 import pytest
 from bending_by_lagrange import IdealSliderCrank, Rod, share_of
-from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
+from running import (
+    HUNT_CROSSLEY,
+    LATCHED,
+    energy_residual,
+    lanes_have_single_bits,
+    methods_agree,
+    run,
+    scene_with,
+)
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.bending import uniform_share
 from hpcclear.dynamics.linkage.elements import held_inverse, sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
@@ -27,11 +34,8 @@ from hpcclear.dynamics.linkage.parts import (
     Slide,
     TorqueDrive,
 )
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
-from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
-from hpcclear.scene.points import Points
 from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain
 
@@ -495,16 +499,8 @@ def test_a_stiff_rod_tends_to_a_rigid_one_like_one_over_its_stiffness():
 
 @pytest.mark.full
 def test_methods_agree():
-    found = {}
-    for method in (
-        "dormand-prince",
-        "radau",
-        "switching",
-        "lobatto",
-    ):  # the last has room for five coordinates
-        scene = bending({"numerics.method": method}, 1e-10, modes=1)
-        found[method] = float(run(scene).out.objective)
-    assert found == pytest.approx(dict.fromkeys(found, found["dormand-prince"]), rel=1e-8)
+    # collocation has room for five coordinates
+    methods_agree(bending({}, 1e-10, modes=1), ("dormand-prince", "radau", "switching", "lobatto"))
 
 
 @pytest.mark.full
@@ -517,12 +513,7 @@ def test_samples_beside_others_have_the_bits_of_single_ones():
         ("mechanism.rod.inertia",): rng.uniform(2e-4, 8e-4, 24),
         ("mechanism.rod.bending.stiffness",): 10 ** rng.uniform(2.5, 5, 24),
     }
-    points = Points(("m2", "u2", "I2", "EI"), np.transpose(list(columns.values())), tuple(columns))
-    par = parameters(scene, points)
-    start = start_states(scene, par)
-    together, alone = (Lanes(problem_of(scene), width).run(par, start) for width in (16, 1))
-    assert (alone.status == Status.OK).all()
-    np.testing.assert_array_equal(together.rows, alone.rows)
+    lanes_have_single_bits(scene, columns)
 
 
 def test_the_slider_crank_written_as_a_linkage_is_the_same():

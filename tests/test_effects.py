@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pairwise import all_pairs, pairs_of, pairwise_table
+from pairwise import CONTACTS, FRICTIONS, all_pairs, pairs_of, pairwise_table
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
 
 from hpcclear.base.errors import InputError
@@ -13,24 +13,6 @@ from hpcclear.scene import load_scene
 TORQUE_CURVE = [[0.0, 2.0], [1.0, 9.0], [3.0, 4.0], [5.0, -1.0]]
 LOAD_CURVE = [[0.0, -200.0], [1.5, -30.0], [4.0, 80.0]]
 FREE = {"kind": "torque", "initial_speed": "5000 rpm", "flywheel_inertia": 1e-2}
-CONTACTS = {
-    "hertz": {"law": "hertz"},
-    "hunt-crossley": HUNT_CROSSLEY,
-    "latched": {"law": "flores", "restitution": 0.5},
-}
-FRICTIONS = {
-    "none": {"law": "none"},
-    "coulomb": {"law": "coulomb", "coefficient": 0.05},
-    "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
-    "lugre": {
-        "law": "lugre",
-        "coefficient": 0.05,
-        "static_coefficient": 0.08,
-        "stribeck_speed": 0.01,
-        "bristle_stiffness": 1e5,
-        "bristle_damping": 0.1,
-    },
-}
 IDEAL = {"kind": "ideal"}
 OIL = {"viscosity": 1e-3, "length": "20 mm"}
 BENDING = {"stiffness": 300.0}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from commands import finish, kill, overrides, ranks_of, result_files, run, start
 from margins import energy_closes
-from pairwise import all_pairs, pairs_of, pairwise_table
+from pairwise import CONTACTS, FRICTIONS, all_pairs, pairs_of, pairwise_table
 
 from hpcclear import Scene, load_scene, simulate
 from hpcclear.base.outcome import Status
@@ -16,23 +16,6 @@ from hpcclear.results.places import parts_of
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"
 NAMES = sorted(path.stem for path in LINKAGES.glob("*.toml"))
 SHORT = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-CONTACTS = {
-    "hertz": {"law": "hertz"},
-    "hunt-crossley": {"law": "hunt-crossley", "damping": 0.4},
-    "latched": {"law": "flores", "restitution": 0.5},
-}
-FRICTIONS = {
-    "none": {"law": "none"},
-    "coulomb": {"law": "coulomb", "coefficient": 0.05},
-    "ambrosio": {"law": "ambrosio", "coefficient": 0.05, "speeds": [0.001, 0.01]},
-    "lugre": {
-        "law": "lugre",
-        "coefficient": 0.05,
-        "static_coefficient": 0.08,
-        "stribeck_speed": 0.01,
-        "bristle_stiffness": 1e4,
-    },
-}
 FACTORS = {
     "linkage": NAMES,
     "contact": list(CONTACTS),

@@ -5,7 +5,15 @@ import math
 
 import numpy as np
 import pytest
-from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
+from running import (
+    HUNT_CROSSLEY,
+    LATCHED,
+    energy_residual,
+    lanes_have_single_bits,
+    methods_agree,
+    run,
+    scene_with,
+)
 from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
@@ -13,7 +21,6 @@ from hpcclear.base.bits import falling
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.physics.friction import bristle_rate, bristle_ratio, stribeck
@@ -235,11 +242,8 @@ def test_bristles_however_stiff_end_in_a_stated_way(contact):
 
 @pytest.mark.full
 def test_methods_agree():
-    found = {}
-    for method in ("dormand-prince", "radau", "auto"):
-        scene = bristled({"numerics.method": method, "numerics.max_steps": 10**7}, 1e-9)
-        found[method] = float(run(scene).out.objective)
-    assert found == pytest.approx(dict.fromkeys(found, found["dormand-prince"]), rel=1e-8)
+    scene = bristled({"numerics.max_steps": 10**7}, 1e-9)
+    methods_agree(scene, ("dormand-prince", "radau", "auto"))
 
 
 @pytest.mark.full
@@ -251,12 +255,7 @@ def test_samples_beside_others_have_the_bits_of_single_ones():
         ("effects.friction.coefficient",): rng.uniform(0.01, 0.15, 24),
         ("effects.friction.bristle_stiffness",): 10 ** rng.uniform(3, 7, 24),
     }
-    points = Points(("m2", "mu", "stiffness"), np.transpose(list(columns.values())), tuple(columns))
-    par = parameters(scene, points)
-    start = start_states(scene, par)
-    together, alone = (Lanes(problem_of(scene), width).run(par, start) for width in (16, 1))
-    assert (alone.status == Status.OK).all()
-    np.testing.assert_array_equal(together.rows, alone.rows)
+    lanes_have_single_bits(scene, columns)
 
 
 @pytest.mark.full

@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
+from commands import began
+
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.prefix) / "bin"
 KINDS = ("--net", "--uts", "--ipc", "--mount")
@@ -159,16 +161,7 @@ class Box:
     def start(self, words: Sequence[str], ranks: int = 1, **settings: str) -> subprocess.Popen:
         """Start the program under mpiexec."""
         program = [sys.executable, "-m", "hpcclear", *words]
-        return subprocess.Popen(
-            [*self.mpiexec(ranks), *program],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env=os.environ | {"PYTHONPATH": str(ROOT)} | settings,
-            start_new_session=True,
-        )
+        return began([*self.mpiexec(ranks), *program], **settings)
 
     def left(self) -> dict[str, list[str]]:
         """What still runs of the program on each node."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Self
 
 from cluster.box import ROOT, Box, Node
+from commands import began
 
 _CONF = ROOT / "tests" / "slurm" / "slurm.conf"
 _OWN = """KillWait=5
@@ -116,17 +117,7 @@ class Slurm:
         time.sleep(0.5)  # the next one needs its socket
 
     def _start(self, node: Node, words: list[str], settings: dict[str, str]) -> subprocess.Popen:
-        return subprocess.Popen(
-            node.words(words),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            cwd=ROOT,
-            env=os.environ | {"PYTHONPATH": str(ROOT)} | self.settings | settings,
-            start_new_session=True,
-        )
+        return began(node.words(words), ROOT, **self.settings, **settings)
 
     def _wait_until_idle(self) -> None:
         patience = time.monotonic() + 60.0

@@ -153,8 +153,10 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     }[kind]
     buffer = io.BytesIO()
     with matplotlib().rc_context(RC):
-        if kind == "png":  # whose dots are the layout's; placed here, matplotlib need not draw twice to do so
-            figure.set_dpi(dpi)
+        if kind == "png":
+            figure.set_dpi(
+                dpi
+            )  # placed by the dots it is drawn in; matplotlib would draw it twice for that
             engine = figure.get_layout_engine()
             if engine is not None:
                 engine.execute(figure)
