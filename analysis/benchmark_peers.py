@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 import xarray as xr
+from drawing import error_panels
 from scenes import LAWS, Setup, ensemble, scene, single
 
 from hpcclear.results.dataset import provenance
@@ -244,21 +245,18 @@ def ensemble_table(runs: xr.Dataset) -> list[str]:
 def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
     """Time against error, a panel for each law."""
     matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, len(runs), figsize=(3.4 * len(runs), 4.6), sharey=True)
-    for axis, (law, data) in zip(np.atleast_1d(axes), runs.items(), strict=True):
+    figure, axes = error_panels(list(runs), 3.4, 4.6)
+    for axis, data in zip(axes, runs.values(), strict=True):
         for k, code in enumerate(data["code"].values):
             row = data.sel(code=code)
             width = 2.0 if str(code).startswith(OWN) else 0.9
             axis.plot(
                 np.maximum(row["error"], 1e-15), row["seconds"].median("round") * 1e3,
                 marker="osv^D"[k % 5], markersize=2.5, linewidth=width, label=code,
-                color=plt.cm.tab20(k % 20),
+                color=matplotlib.colormaps["tab20"](k % 20),
             )  # fmt: skip
-        axis.set(xscale="log", yscale="log", title=law, xlabel="error of the slider position, m")
         axis.legend(fontsize=5.5, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=2)
-    np.atleast_1d(axes)[0].set_ylabel("ms a revolution")
+    axes[0].set_ylabel("ms a revolution")
     figure.tight_layout()
     figure.savefig(path, dpi=200)
 

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import matplotlib
 import numpy as np
 import xarray as xr
+from drawing import error_panels
 from numba import carray, cfunc, njit
 from numbalsoda import lsoda, lsoda_sig
 from plain_loop import motion
@@ -254,19 +255,15 @@ def table(runs: xr.Dataset) -> list[str]:
 def draw(all_runs: dict[str, xr.Dataset], path: Path) -> None:
     """Time against error, a panel for each scene."""
     matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, len(all_runs), figsize=(2.6 * len(all_runs), 3.2), sharey=True)
-    for axis, (name, runs) in zip(np.atleast_1d(axes), all_runs.items(), strict=True):
+    figure, axes = error_panels(list(all_runs), 2.6, 3.2)
+    for axis, runs in zip(axes, all_runs.values(), strict=True):
         for k, method in enumerate(runs["code"].values):
             row = runs.sel(code=method)
             axis.plot(
                 row["error"], row["seconds"].median("round") * 1e3, marker="osv"[k],
                 markersize=3, color=("#0072b2", "#d55e00", "#009e73")[k], label=method,
             )  # fmt: skip
-        axis.set(xscale="log", yscale="log", xlabel="error of the slider position, m")
-        axis.set_title(name, fontsize=9)
-    first = np.atleast_1d(axes)[0]
+    first = axes[0]
     first.set_ylabel("processor time a revolution, ms")
     first.legend(fontsize=7)
     figure.tight_layout()

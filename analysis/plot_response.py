@@ -3,8 +3,9 @@
 python analysis/plot_response.py results/response.nc -o results/figures
 """
 
-import argparse
-from pathlib import Path
+from functools import partial
+
+from drawing import figure_options, save_figures
 
 from hpcclear import report
 from hpcclear.results import dataset
@@ -22,15 +23,9 @@ FIGURES = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("response", type=Path, help="file written by hpcclear simulate")
-    parser.add_argument("-o", "--output", type=Path, default=Path("figures"), help="directory")
-    parser.add_argument("--format", choices=["png", "svg", "pdf"], default="png")
-    options = parser.parse_args()
+    options = figure_options(__doc__, "response", "file written by hpcclear simulate")
     response = dataset.read(options.response, "response")
-    options.output.mkdir(parents=True, exist_ok=True)
-    for name, draw in FIGURES.items():
-        print(report.save(draw(response), options.output / f"{name}.{options.format}"))
+    save_figures({name: partial(draw, response) for name, draw in FIGURES.items()}, options)
 
 
 if __name__ == "__main__":

@@ -3,20 +3,14 @@
 python analysis/plot_study.py results/robust -o results/robust/figures
 """
 
-import argparse
-from pathlib import Path
+from drawing import figure_options, save_figures
 
 from hpcclear import report
-from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("directory", type=Path, help="what hpcclear run wrote")
-    parser.add_argument("-o", "--output", type=Path, default=Path("figures"), help="directory")
-    parser.add_argument("--format", choices=["png", "svg", "pdf"], default="png")
-    options = parser.parse_args()
+    options = figure_options(__doc__, "directory", "what hpcclear run wrote")
     place = options.directory
     sensitivity = dataset.read(place / "sensitivity.nc", "sensitivity")
     kriging = dataset.read(place / "kriging.nc", "kriging")
@@ -33,12 +27,7 @@ def main() -> None:
         "figure_9_fronts": lambda: report.front_figure(front, verification),
         "figure_10_responses": lambda: report.comparison_figure(responses),
     }
-    options.output.mkdir(parents=True, exist_ok=True)
-    for name, draw in figures.items():
-        try:
-            print(report.save(draw(), options.output / f"{name}.{options.format}"))
-        except InputError as error:  # a small study has not all that a figure needs
-            print(f"no {name}: {error}")
+    save_figures(figures, options)  # a small study has not all that a figure needs
 
 
 if __name__ == "__main__":

@@ -163,7 +163,7 @@ def makes_sense(path: Path) -> bool:
     )
 
 
-@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=FULL)])
+@pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=FULL)])
 @pytest.mark.timeout(7200)
 def test_any_scene_file_is_checked_or_refused(hpcclear, tmp_path, count):
     dice, codes = random.Random(count), Counter()

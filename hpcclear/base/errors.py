@@ -70,6 +70,21 @@ class LimitError(RuntimeError):
     """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
 
 
+LEAST_ADDRESS_SPACE = 640
+"""MB of it that it takes to load the program and a compiled kernel."""
+
+
+def check_address_space() -> None:
+    """LimitError where the process may not have enough address space (``ulimit -v``) to load everything.
+
+    Asked before anything is loaded: out of memory amid an import Python 3.11 may raise the error for ever.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESS_SPACE * 2**20:
+        known = f"the limit of address space is {limit // 2**20} MB, it takes {LEAST_ADDRESS_SPACE}"
+        raise _out_of_memory(known)
+
+
 def mendable(error: BaseException) -> InputError | LimitError | None:
     """What a user can do about an error that is no fault of the program; None if it may be one.
 

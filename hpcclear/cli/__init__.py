@@ -11,7 +11,13 @@ from collections.abc import Sequence
 import click
 
 from hpcclear import __version__
-from hpcclear.base.errors import InputError, StorageError, mendable
+from hpcclear.base.errors import (
+    InputError,
+    LimitError,
+    StorageError,
+    check_address_space,
+    mendable,
+)
 from hpcclear.cli import ensembles, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
@@ -82,6 +88,7 @@ def main(arguments: list[str] | None = None) -> None:
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:
+            check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
         except click.ClickException as error:
@@ -91,7 +98,7 @@ def main(arguments: list[str] | None = None) -> None:
         except InputError as error:
             say(f"Error: {error}")
             code = Exit.BAD_INPUT
-        except StorageError as error:
+        except (StorageError, LimitError) as error:
             say(f"Error: {error}")
             code = Exit.FAILED
         except BrokenPipeError:  # the reader of a pipe has seen enough

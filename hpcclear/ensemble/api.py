@@ -11,6 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.steady.telling import recorded
+from hpcclear.ensemble.session import samples_of
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
@@ -80,14 +81,6 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)
-    return dataset.samples_dataset(
-        designs.names,
-        designs.values,
-        dict(zip(designs.names, designs.units, strict=True)),
-        records,
-        dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
-        | recorded(scene, records),
-        scene.objective,
-        designs.words,
-        scene.joint_labels,
-    )
+    made = dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
+    attributes = made | recorded(scene, records)
+    return samples_of(designs, records, attributes, scene.objective, scene.joint_labels)

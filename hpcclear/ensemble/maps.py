@@ -11,11 +11,10 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
 from hpcclear.ensemble.simulate import first_compiled, sample_points, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
-from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
@@ -145,15 +144,7 @@ def run_map(
             attributes = {**session.attributes, SHAPE: " ".join(str(n) for n in shape)}
             with saving(checkpoint.flush):
                 content = session.write(
-                    dataset.samples_dataset(
-                        points.names,
-                        points.values,
-                        units,
-                        records,
-                        attributes,
-                        words=points.words,
-                        joints=session.joints,
-                    )
+                    samples_of(points, records, attributes, joints=session.joints)
                 )
         session.close()
     return session.finished(content, began)

@@ -8,12 +8,11 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
 from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ensemble.split import Part
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
-from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import read_points, sampled
@@ -100,14 +99,5 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
     attributes = session.attributes | recorded(scene, records)
     with saving(checkpoint.flush):  # what came since the last save, if the file cannot be written
         return session.write(
-            dataset.samples_dataset(
-                points.names,
-                points.values,
-                units,
-                records,
-                attributes,
-                scene.objective,
-                points.words,
-                session.joints,
-            )
+            samples_of(points, records, attributes, scene.objective, session.joints)
         )

@@ -11,12 +11,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.arrays import Records
+from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import COLUMNS, Ranks
@@ -25,6 +26,7 @@ from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
 
 
 @dataclass(frozen=True)
@@ -188,12 +190,7 @@ class Session:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._lock.release()
 
     def found(self, kind: str) -> xr.Dataset | None:
@@ -267,6 +264,26 @@ class Session:
         spent = sum(self.ranks.stage_seconds.values(), spent)
         seconds = time.perf_counter() - began
         return Finished(content, self.place.output, self.place.timing, seconds, spent)
+
+
+def samples_of(
+    points: Points,
+    records: Records,
+    attributes: Mapping[str, str],
+    objective: Objective = MEAN_GAP,
+    joints: Sequence[str] = JOINTS,
+) -> xr.Dataset:
+    """A dataset of kind ``samples`` of points and what became of them, a record each."""
+    return dataset.samples_dataset(
+        points.names,
+        points.values,
+        dict(zip(points.names, points.units, strict=True)),
+        records,
+        attributes,
+        objective,
+        points.words,
+        joints,
+    )
 
 
 def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:

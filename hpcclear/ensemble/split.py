@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session, samples_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import check_key
@@ -126,17 +126,9 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
                 [_records(part, scene, points, output) for part in whole(output)]
             )
             session.describe(scene)
+            attributes = session.attributes | recorded(scene, records)
             samples = session.write(
-                dataset.samples_dataset(
-                    points.names,
-                    points.values,
-                    dict(zip(points.names, points.units, strict=True)),
-                    records,
-                    session.attributes | recorded(scene, records),
-                    scene.objective,
-                    points.words,
-                    session.joints,
-                )
+                samples_of(points, records, attributes, scene.objective, session.joints)
             )
     return session.finished(samples, began)
 

@@ -20,7 +20,7 @@ from hpcclear.ensemble.parts import (
     part_length,
     unpacked,
 )
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
 from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import Points
@@ -150,16 +150,8 @@ class _Streaming:
         """Write a block of samples, if they are wanted."""
         if self._raw is not None:
             page = self._points.page(number)
-            units = dict(zip(page.names, page.units, strict=True))
-            content = dataset.samples_dataset(
-                page.names,
-                page.values,
-                units,
-                records,
-                self._session.attributes,
-                self._objective,
-                page.words,
-                self._session.joints,
+            content = samples_of(
+                page, records, self._session.attributes, self._objective, self._session.joints
             )
             dataset.write(content, self._raw / f"samples-{number:08d}.nc")
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 
 if TYPE_CHECKING:
@@ -188,10 +187,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
     InputError
         No response at all, or one with fewer revolutions.
     """
-    if not responses:
-        raise InputError(
-            "responses", {}, "there is nothing to draw", "Give the response of each design"
-        )
+    motion.check_some(responses, "Give the response of each design")
     columns = _columns(list(responses))
     quantities = motion.quantities(next(iter(responses.values())))
     height = 24.0 + 33.0 * len(quantities)

@@ -1,5 +1,7 @@
 """What the figures of a response need beyond its variables: turns, steady part, clearances, f of each turn."""
 
+from collections.abc import Collection
+
 import numpy as np
 import xarray as xr
 
@@ -8,6 +10,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures.style import JOINT_NAMES
 
 TURN = 2.0 * np.pi
+
+
+def check_some(responses: Collection[object], remedy: str) -> None:
+    """InputError unless there is a response to draw."""
+    if not responses:
+        raise InputError("responses", 0, "there is nothing to draw", remedy)
 
 
 def turns(response: xr.Dataset) -> Array:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 
 if TYPE_CHECKING:
@@ -177,10 +176,7 @@ def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None 
     InputError
         No response at all, or one with fewer revolutions.
     """
-    if not responses:
-        raise InputError(
-            "responses", [], "there is nothing to draw", "Give one response for each clearance"
-        )
+    motion.check_some(responses, "Give one response for each clearance")
     figure, axes = style.grid(2, 1, 110.0, sharex=True)
     steady = [motion.steady(response, revolutions) for response in responses]
     clearances = np.array([np.nanmax(motion.clearances(response)) for response in steady])
