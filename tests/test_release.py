@@ -15,6 +15,7 @@ from patience import crowded
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
 DATA = {
+    "hpcclear/cli/four_stroke.toml",
     "hpcclear/cli/starter.toml",
     "hpcclear/py.typed",
     "hpcclear/report/html/page.css",

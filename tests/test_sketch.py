@@ -81,15 +81,17 @@ def test_the_key_has_the_scenes_own_numbers():
     assert "F on the slider" not in rigid
 
 
-def test_check_draws_and_init_writes_what_check_accepts(tmp_path):
+@pytest.mark.parametrize("options", [[], ["--four-stroke"]], ids=["two-stroke", "four-stroke"])
+def test_check_draws_and_init_writes_what_check_accepts(tmp_path, options):
     file, figure = tmp_path / "my engine.toml", tmp_path / "sketch.svg"
-    made = CliRunner().invoke(cli, ["init", str(file)])
+    made = CliRunner().invoke(cli, ["init", str(file), *options])
     assert made.exit_code == 0
     assert f"hpcclear check {file}" in made.output
     assert f"hpcclear run {file} -o results" in file.read_text()
     scene = load_scene(file)
     assert scene.warnings == ()
     assert scene.study.objective in file.read_text()
+    assert ("720 deg" in file.read_text()) == bool(options)
     words = ["check", str(file), "--no-cost", "--sketch", str(figure)]
     checked = CliRunner().invoke(cli, words)
     assert checked.exit_code == 0

@@ -20,12 +20,17 @@ from hpcclear.ranks.stopping import Exit
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
-def init(file: Path) -> int:
+@click.option(
+    "--four-stroke",
+    is_flag=True,
+    help="A gas force against two turns of the crank, in an engine written as a linkage.",
+)
+def init(file: Path, four_stroke: bool) -> int:
     """Write an engine to start from: every table, each number with its unit, and a small study.
 
     An existing file is never overwritten.
 
-    Example: hpcclear init engine.toml
+    Example: hpcclear init engine.toml --four-stroke
     """
     if not is_root():
         return Exit.DONE
@@ -35,7 +40,8 @@ def init(file: Path) -> int:
 
     check_free(file)
     files.probe(place_of(file))
-    text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
+    name = "four_stroke.toml" if four_stroke else "starter.toml"
+    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     click.echo(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
     return Exit.DONE

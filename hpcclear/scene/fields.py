@@ -252,6 +252,9 @@ class CurveOf(Converted):
         }
 
 
+_LONGER = "For more turns write a linkage with `turns` of its drive, as init --four-stroke does"
+
+
 def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:
     """An error for validators unless a table repeats within so many turns; raises PydanticCustomError."""
     span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
@@ -259,7 +262,7 @@ def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: st
     if span > turn * (1 + 1e-12):
         raise invalid(
             f"the table is longer than {length}",
-            f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats",
+            f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}",
             key=key,
         )
     if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:

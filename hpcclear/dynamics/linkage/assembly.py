@@ -46,10 +46,14 @@ class Assembly:
     def report(self) -> list[str]:
         """A line a body: the angle taken, and the rough one it was found from, in degrees."""
         return [
-            f"{body.name}: {math.degrees(self.angle(body.name)):.4g} deg "
-            f"(from {math.degrees(body.start_angle):.4g})"
+            f"{body.name}: {_degrees(self.angle(body.name))} deg (from {_degrees(body.start_angle)})"
             for body in self.loops.mechanism.bodies
         ]
+
+
+def _degrees(angle: float) -> str:
+    """To a thousandth, and 0 for what is left of rounding."""
+    return f"{round(math.degrees(angle), 3) + 0.0:g}"
 
 
 def assemble(mechanism: Mechanism) -> Assembly:
