@@ -105,6 +105,12 @@ def test_limits_that_are_not_known_are_no_numbers():
     assert rows[2][1:3] == ("0.8 mm, limits not known", "0.4 mm, limits not known -50%")
 
 
+def test_limits_are_told_so_far_that_they_differ():
+    told_apart = told(verified(MEAN, DEVIATION, half=1e-9))
+    assert "0.2 mm (0.199999 mm to 0.200001 mm)" in told_apart["true mean"]
+    assert "0.2 mm (0.199 mm to 0.201 mm)" in told(verified(MEAN, DEVIATION))["true mean"]
+
+
 def test_an_original_that_is_best_is_kept():
     lines = told(verified([1e-4, *MEAN[1:]], [1e-6, *DEVIATION[1:]]))
     assert "keep the design" in lines["take"]

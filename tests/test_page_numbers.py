@@ -183,7 +183,8 @@ def test_the_answer_in_the_terminal_tells_what_files_hold(study: Path, capsys) -
     printed = " ".join(capsys.readouterr().out.split())
     found = dataset.read(study / "verification.nc")
     known = {
-        labels.quantity(float(value), str(variable.attrs["units"]))
+        labels.quantity(float(value), str(variable.attrs["units"]), digits)
+        for digits in range(4, 8)
         for variable in found.data_vars.values()
         if variable.attrs.get("units", "1") != "1"
         for value in np.ravel(variable)

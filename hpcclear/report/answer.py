@@ -151,10 +151,10 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
     names = ("first", "second") if "first_goal" in best and not _is_plain(best) else ()
     for name in names:
         value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
-        ends = [float(best[f"{name}_{end}"]) for end in ("lower", "upper")]
+        low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
         text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
-        if ends[0] < ends[1]:
-            text += f" ({' to '.join(labels.quantity(end, unit) for end in ends)})"
+        if low < high:
+            text += f" ({labels.between(low, high, unit)})"
         yield text
     if "constraints" in best and str(best["constraints"].item()):
         yield from str(best["constraints"].item()).split("; ")
@@ -246,8 +246,8 @@ def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
     unit = str(one.attrs["units"])
     text = labels.quantity(float(one), unit)
     if f"{word}_lower" in best and np.isfinite(float(best[f"{word}_lower"])):
-        ends = (labels.quantity(float(best[f"{word}_{end}"]), unit) for end in ("lower", "upper"))
-        text += " (" + " to ".join(ends) + ")"
+        low, high = (float(best[f"{word}_{end}"]) for end in ("lower", "upper"))
+        text += f" ({labels.between(low, high, unit)})"
     if original is None or str(original["design"].item()) == str(best["design"].item()):
         return text
     before = float(original[f"{word}_true"])

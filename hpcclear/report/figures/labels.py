@@ -70,6 +70,15 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
     return f"{value * chosen.factor:.{digits}g}{unit}"
 
 
+def between(low: float, high: float, units: str) -> str:
+    """From where to where limits reach, told so far that they differ."""
+    for digits in range(4, 8):
+        ends = quantity(low, units, digits), quantity(high, units, digits)
+        if ends[0] != ends[1]:
+            break
+    return " to ".join(ends)
+
+
 def of(variable: xr.DataArray) -> Scale:
     """The scale of a variable of a dataset."""
     return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())

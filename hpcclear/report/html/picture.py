@@ -141,8 +141,8 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
         units = str(one[f"{word}_true"].attrs["units"])
         shown = str(quantity(float(one[f"{word}_true"]), units))
         if f"{word}_lower" in one and np.isfinite(float(one[f"{word}_lower"])):
-            ends = (str(quantity(float(one[f"{word}_{end}"]), units)) for end in ("lower", "upper"))
-            shown += " (" + " to ".join(ends) + ")"
+            low, high = (float(one[f"{word}_{end}"]) for end in ("lower", "upper"))
+            shown += f" ({labels.between(low, high, units)})"
         rows.append([word, shown])
     for word in ("mean", "deviation"):
         if f"{word}_error" in one and np.isfinite(float(one[f"{word}_error"])):
