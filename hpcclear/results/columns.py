@@ -1,141 +1,20 @@
 """The tables of `hpcclear.results.names`: what stands in every result file, a row each.
 
-A row named as its only dimension is a coordinate. ``objective`` in the place of a unit, and
-``objective^2``, stand for the unit of the study's objective (`Column.of`). Units are written so
-that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
+A row named as its only dimension is a coordinate.
 """
 
-from typing import NamedTuple
-
-from hpcclear.base.objectives import MEAN_GAP, Objective
-
-Dims = tuple[str, ...]
-
-
-class Column(NamedTuple):
-    """A row of the table: what one variable of a file is."""
-
-    dims: Dims
-    units: str  # "" for text and flags, which have none; see `of`
-    long_name: str
-    dtype: str  # "f8", "i8", "i1" or "text"
-    required: bool = False
-
-    def unit(self, objective: str) -> str:
-        """The unit in a study whose objective has the unit `objective`."""
-        if self.units == "objective":
-            return objective
-        if self.units == "objective^2":
-            return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
-        return self.units
-
-    def of(self, objective: Objective) -> "Column":
-        """The row in a file of results for that objective: its unit, and its words in place of the mean gap's."""
-        words = self.long_name.replace(MEAN_GAP.words, objective.words)
-        return self._replace(units=self.unit(objective.unit), long_name=words)
-
-
-Columns = dict[str, Column]
-
-
-def number(dims: Dims, units: str, long_name: str, *, required: bool = False) -> Column:
-    """A number of double precision."""
-    return Column(dims, units, long_name, "f8", required)
-
-
-def count(dims: Dims, long_name: str, *, required: bool = False) -> Column:
-    """A whole number."""
-    return Column(dims, "1", long_name, "i8", required)
-
-
-def flag(dims: Dims, long_name: str, *, required: bool = False) -> Column:
-    """A small code, whose meanings are attributes."""
-    return Column(dims, "", long_name, "i1", required)
-
-
-def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
-    """Words."""
-    return Column(dims, "", long_name, "text", required)
-
-
-def _outcome(*per_sample: str) -> Columns:
-    """What one simulation comes to, in a file with these dimensions."""
-    per_joint = (*per_sample, "joint")
-    # fmt: off
-    return {
-        "objective": number(per_sample, "objective", f"objective f, {MEAN_GAP.words}", required=True),
-        "objective_spread": number(per_sample, "objective",
-        "standard deviation of f between averaged revolutions", required=True),
-        "objective_uncertainty": number(per_sample, "objective", "scatter of f over kicked copies"),
-        "objective_limit": number(per_sample, "objective", "95 % half-width of the limits of f as a steady mean"),
-        "regime": flag(per_sample, "kind of motion"),
-        "period": number(per_sample, "1", "revolutions after which the motion repeats itself"),
-        "kick_growth": number(per_sample, "1", "mean logarithm of the growth of a kick per revolution"),
-        "kick_growth_limit": number(per_sample, "1", "95 % half-width of the limits of kick_growth"),
-        "attractors": number(per_sample, "1", "kinds of motion that several starts ended in"),
-        "steady_rtol": number(per_sample, "1", "tightest relative tolerance that the steady mean took"),
-        "steady_revolutions": number(per_sample, "1", "revolutions of all copies that the steady mean took"),
-        "mean_gap": number(per_joint, "m", "time mean of the distance from the clearance circle"),
-        "peak_contact_force": number(per_joint, "N", "largest contact force over the averaged revolutions"),
-        "mean_contact_force": number(per_joint, "N", "mean contact force over the averaged revolutions"),
-        "peak_crank_moment": number(per_sample, "N m", "largest size of the moment of the drive on the crank"),
-        "slider_acceleration_deviation": number(per_sample, "m/s^2",
-        "standard deviation of the slider acceleration in time"),
-        "point_acceleration_deviation": number(per_sample, "m/s^2",
-        "root mean square about its mean of the acceleration of the followed point"),
-        "peak_point_acceleration": number(per_sample, "m/s^2", "largest acceleration of the followed point"),
-        "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
-        "energy_error": number(per_sample, "1", "what the energy balance leaves unexplained, relative"),
-        "latched": flag(per_joint, "whole revolutions in contact, impact speed frozen"),
-        "rhs_evaluations": count(per_sample, "number of evaluations of the equations of motion", required=True),
-        "status": flag(per_sample, "how the simulation ended", required=True),
-        "flags": flag(per_sample, "what to mind when reading the result"),
-    }
-    # fmt: on
-
-
-def _fit(*dims: str) -> Columns:
-    """How well a model does."""
-    return {
-        "r2": number(dims, "1", "1 - SSE/SST on test points", required=True),
-        "rmae": number(
-            dims, "1", "largest test error over their standard deviation", required=True
-        ),
-        "r2_explained": number(dims, "1", "explained variance ratio, eq. 26 as printed"),
-        "rmae_mean": number(dims, "1", "largest test error over their mean, eq. 27 as printed"),
-        "rmse": number(dims, "objective", "root mean square error on test points"),
-        "points": count(dims, "number of points fitted"),
-    }
-
-
-def _statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
-    """Statistics of one result."""
-    return {
-        f"{name}_count": count(dims, f"number of finite values of the {words}", required=True),
-        f"{name}_mean": number(dims, units, f"mean of the {words}", required=True),
-        f"{name}_deviation": number(
-            dims, units, f"sample standard deviation of the {words}", required=True
-        ),
-        f"{name}_minimum": number(dims, units, f"least {words}", required=True),
-        f"{name}_maximum": number(dims, units, f"greatest {words}", required=True),
-        f"{name}_histogram": count((*dims, "bin"), f"number of samples by {words}", required=True),
-        f"{name}_edges": number(
-            (*dims, "edge"), units, f"edges of the bins of the {words}", required=True
-        ),
-    }
-
-
-def _goal(name: str) -> Columns:
-    """What a case makes small, where that is not mean and deviation: each design has that of its case."""
-    of = f"of what is made small, the {name}"
-    return {
-        f"{name}_goal": text(("design",), f"{of}: in words"),
-        f"{name}_unit": text(("design",), f"{of}: its unit, empty for none"),
-        f"{name}_true": number(("design",), "", f"{of}: by direct simulation"),
-        f"{name}_lower": number(("design",), "", f"{of}: lower confidence limit"),
-        f"{name}_upper": number(("design",), "", f"{of}: upper confidence limit"),
-    }
-
+from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.results.rows import (
+    Columns,
+    count,
+    fit,
+    flag,
+    goal,
+    number,
+    outcome,
+    statistics_of,
+    text,
+)
 
 # fmt: off
 RESPONSE: Columns = {
@@ -191,14 +70,14 @@ RESPONSE: Columns = {
     "load_work": number(("time",), "J", "work done by the slider load since the start"),
     "dissipated_energy": number(("time",), "J", "energy dissipated since the start"),
     "energy_residual": number(("time",), "J", "what the energy balance leaves unexplained"),
-    **_outcome(),
+    **outcome(),
 }
 
 SAMPLES: Columns = {
     "sample": count(("sample",), "number of the sample in the design"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, joint by joint: cosine and sine of one, of two and so on"),
-    **_outcome("sample"),
+    **outcome("sample"),
     "sliding_waves": number(("sample", "wave"), "J", "sliding work of a revolution times waves of the contact's angle"),
 }
 
@@ -254,7 +133,7 @@ KRIGING: Columns = {
     "output_scale": number(("model",), "objective", "deviation divided by before the fit"),
     "dropped": count(("model",), "number of failed samples left out of the fit"),
     "accepted": flag(("model",), "whether the model passed on its test points"),
-    **_fit("model"),
+    **fit("model"),
 }
 
 FRONT: Columns = {
@@ -301,7 +180,7 @@ VERIFICATION: Columns = {
     "mean_within": number(("design",), "1",
         "relative half-width of the limits of the mean, what the tolerance may add included"),
     "deviation_within": number(("design",), "1", "the same of the deviation"),
-    **_goal("first"), **_goal("second"),
+    **goal("first"), **goal("second"),
     "constraints": text(("design",), "how it stands to the constraints of its case"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),
@@ -378,11 +257,11 @@ STATISTICS: Columns = {
     "flags": flag(("flags",), "with which care a result is to be read"),
     "samples_by_status": count(("outcome",), "number of samples that ended so", required=True),
     "samples_by_flag": count(("flags",), "number of samples with this flag", required=True),
-    **_statistics_of("objective", (), "objective", "objective"),
-    **_statistics_of("objective_spread", (), "objective", "deviation between revolutions"),
-    **_statistics_of("mean_gap", ("joint",), "m", "mean gap"),
-    **_statistics_of("peak_contact_force", ("joint",), "N", "peak contact force"),
-    **_statistics_of("rhs_evaluations", (), "1", "number of force evaluations"),
+    **statistics_of("objective", (), "objective", "objective"),
+    **statistics_of("objective_spread", (), "objective", "deviation between revolutions"),
+    **statistics_of("mean_gap", ("joint",), "m", "mean gap"),
+    **statistics_of("peak_contact_force", ("joint",), "N", "peak contact force"),
+    **statistics_of("rhs_evaluations", (), "1", "number of force evaluations"),
 }
 
 WEAR: Columns = {

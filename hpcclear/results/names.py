@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
-from hpcclear.results.columns import Column, Columns
+from hpcclear.results.rows import Column, Columns
 
 
 class Kind(NamedTuple):
