@@ -3,6 +3,7 @@
 Every mpiexec has a time-out of its own; a job that hangs is killed and fails its test.
 """
 
+import ctypes
 import os
 import pathlib
 import signal
@@ -359,6 +360,20 @@ def test_every_library_is_kept_to_one_thread():
     root = PROGRAMS.parent.parent
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
     assert run.stdout.split() == ["{1}", "1"], run.stderr
+
+
+def test_a_library_that_cannot_be_looked_at_is_left_alone_in_silence(monkeypatch, capsys):
+    """As when file handles have run out, or its folder is another user's: threadpoolctl asks in a callback of C."""
+
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        raise OSError("Too many open files")
+
+    monkeypatch.setattr("threadpoolctl.threadpool_limits", lambda limits: callback())
+    hook = sys.unraisablehook
+    launcher.pin_threads()
+    assert capsys.readouterr().err == ""
+    assert sys.unraisablehook is hook
 
 
 def test_importing_the_boundary_loads_no_mpi():

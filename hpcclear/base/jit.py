@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from numba import config, njit
 
-from hpcclear.base.width import features
+from hpcclear.base.width import asked_width, features
 
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
@@ -93,6 +93,7 @@ def doubles_in_a_vector() -> int:
 # Decided before the first decorator runs; an explicit NUMBA_CACHE_DIR of the user's own wins.
 if not os.environ.get("NUMBA_CACHE_DIR"):
     config.CACHE_DIR = str(cache_folder())
+asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
 if config.ENABLE_AVX and config.CPU_NAME is None and config.CPU_FEATURES is None:
     config.CPU_FEATURES = features(Path(config.CACHE_DIR))
 

@@ -70,6 +70,23 @@ done:
 """
 
 
+def asked_width() -> int | None:
+    """The width that ``HPCCLEAR_VECTOR_BITS`` names; None where it is not set.
+
+    Raises
+    ------
+    InputError
+        If it is set to anything but 256 or 512.
+    """
+    asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
+    if asked not in ("", *map(str, WIDTHS)):
+        raise InputError(
+            "HPCCLEAR_VECTOR_BITS", asked, "is not a width of vectors",
+            "Set it to 256 or 512, or not at all: then the faster one is found",
+        )  # fmt: skip
+    return int(asked) if asked else None
+
+
 def features(folder: Path) -> str | None:
     """The processor's features as Numba is to be told them; None where there is nothing to choose.
 
@@ -81,21 +98,16 @@ def features(folder: Path) -> str | None:
     Raises
     ------
     InputError
-        If ``HPCCLEAR_VECTOR_BITS`` is set to anything but 256 or 512.
+        Of `asked_width`.
     """
-    asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
-    if asked not in ("", *map(str, WIDTHS)):
-        raise InputError(
-            "HPCCLEAR_VECTOR_BITS", asked, "is not a width of vectors",
-            "Set it to 256 or 512, or not at all: then the faster one is found",
-        )  # fmt: skip
+    asked = asked_width()
     known = llvm.get_host_cpu_features()
     if not known.get("avx512f", False):
         return None
     flat = known.flatten()
     words = f"{llvm.get_host_cpu_name()} {llvmlite.__version__} {flat}"
     place = folder / f"vector-bits-{hashlib.sha256(words.encode()).hexdigest()[:12]}"
-    return f"{flat},{_PREFERENCE[int(asked) if asked else kept(place, faster)]}"
+    return f"{flat},{_PREFERENCE[asked or kept(place, faster)]}"
 
 
 def kept(place: Path, measure: Callable[[], int]) -> int:
