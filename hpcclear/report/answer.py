@@ -360,7 +360,7 @@ def _next(
 ) -> Iterator[str]:
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
-        yield "mind the contact: smaller clearances or stiffer bearings, or forces are only a guide"
+        yield "mind the contact: stiffer bearings or less load; beyond Hertz's range forces are only a guide"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "widen the ranges of the variables on a bound if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):
