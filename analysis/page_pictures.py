@@ -71,10 +71,10 @@ PICTURES = {"elastic-rod": elastic_rod, "stick-slip": stick_slip}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("pages", nargs="*", choices=[[], *PICTURES], default=[])
+    parser.add_argument("page", nargs="?", choices=["all", *PICTURES], default="all")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "images")
     options = parser.parse_args()
-    for name in options.pages or PICTURES:
+    for name in PICTURES if options.page == "all" else [options.page]:
         figure = PICTURES[name]()
         figure.align_ylabels()
         figure.tight_layout()

@@ -92,6 +92,15 @@ def test_files_that_are_named_exist(page):
         assert (ROOT / name).exists(), f"{page} names {name}"
 
 
+@pytest.mark.full
+def test_pictures_of_pages_are_drawn_of_their_scenes(tmp_path):
+    program = [sys.executable, ROOT / "analysis" / "page_pictures.py", "-o", tmp_path]
+    subprocess.run(program, check=True, timeout=crowded(600.0))
+    drawn = {path.name: plt.imread(path).shape for path in tmp_path.iterdir()}
+    assert len(drawn) == 2
+    assert drawn == {name: plt.imread(ROOT / "docs" / "images" / name).shape for name in drawn}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
 def test_commands_and_options_that_are_named_exist(page):
     options = {

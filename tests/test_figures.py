@@ -331,3 +331,14 @@ def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
     low, high = upper[1].get_ylim()
     mass = verified["m2"] + verified["m3"]
     assert low <= float(mass.min()) <= float(mass.max()) <= high
+
+
+def test_drawing_leaves_a_figure_as_it_was():
+    """Who adds a title afterwards still has it laid out; drawn again, and in another size, it is the same figure."""
+    figure = report.timing_figure(data.timing())
+    engine, dots = figure.get_layout_engine(), figure.get_dpi()
+    first = style.render(figure, "png", 60)
+    assert figure.get_layout_engine() is engine
+    assert figure.get_dpi() == dots
+    assert style.render(figure, "png", 90) != first
+    assert style.render(figure, "png", 60) == first

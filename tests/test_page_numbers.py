@@ -167,7 +167,8 @@ def test_every_number_is_another_where_the_files_hold_others(place: Path) -> Non
     for path in place.rglob("*.nc"):
         content = dataset.read(path)
         for variable in content.data_vars.values():
-            variable *= factors.get(str(variable.attrs.get("units")), 1)
+            if (unit := str(variable.attrs.get("units"))) in factors:
+                variable *= factors[unit]
         path.unlink()
         dataset.write(content, path)
         free += summed(content)

@@ -88,7 +88,10 @@ def main(arguments: list[str] | None = None) -> None:
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:
-            check_address_space()
+            if (
+                not is_launched()
+            ):  # ranks tell each other, so that none waits for one that cannot begin
+                check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
         except click.ClickException as error:

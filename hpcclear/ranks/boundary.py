@@ -17,7 +17,13 @@ from collections.abc import Callable
 from typing import Any
 
 from hpcclear.base.cores import among_ranks
-from hpcclear.base.errors import InputError, StorageError, mendable
+from hpcclear.base.errors import (
+    InputError,
+    LimitError,
+    StorageError,
+    check_address_space,
+    mendable,
+)
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
 from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
@@ -60,8 +66,9 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
-        if _refused(mail, ""):
-            return Exit.BAD_INPUT
+        refused = _refused(mail, *_want())
+        if refused:
+            return refused
         ranks = Ranks(mail, stop)
         if ranks.size > 1:
             among_ranks()
@@ -114,29 +121,38 @@ def refuse_together(complaint: str) -> int:
         if launcher.launched_rank() in (0, None):
             _say(complaint)
     else:
-        _refused(mail, complaint)
+        _refused(mail, complaint, Exit.BAD_INPUT)
     return Exit.BAD_INPUT
 
 
-def _refused(mail: Mail, complaint: str) -> bool:
-    """Whether the ranks cannot begin together, which root says; every rank calls it and hears the same."""
-    said = mail.everyone((complaint, os.environ.get("HPCCLEAR_LANES", "")))
-    complaints = [(rank, text) for rank, (text, _) in enumerate(said) if text]
-    lanes = sorted({asked for _, asked in said})
+def _want() -> tuple[str, int]:
+    """What this rank's process lacks for the work, and the exit code of that."""
+    try:
+        check_address_space()
+    except LimitError as error:
+        return f"Error: {error}", Exit.FAILED
+    return "", Exit.DONE
+
+
+def _refused(mail: Mail, complaint: str, code: int) -> int:
+    """Exit code if the ranks cannot begin together, which root says, or 0; every rank calls it and hears the same."""
+    said = mail.everyone((complaint, code, os.environ.get("HPCCLEAR_LANES", "")))
+    complaints = [(rank, text, code) for rank, (text, code, _) in enumerate(said) if text]
+    lanes = sorted({asked for _, _, asked in said})
     if complaints:
-        rank, text = complaints[0]
+        rank, text, code = complaints[0]
         text = text if rank == 0 else f"rank {rank} of {mail.size}: {text}"
     elif len(lanes) > 1:
         shown = ", ".join(asked or "nothing" for asked in lanes)
         reason = "it differs from rank to rank"
         remedy = "Set the same for all, or for none"
-        text = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}"
+        text, code = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}", Exit.BAD_INPUT
     else:
-        return False
+        return Exit.DONE
     if mail.rank == 0:
         _say(text)
     mail.finalize()
-    return True
+    return code
 
 
 def alone() -> Ranks:

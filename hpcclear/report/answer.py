@@ -148,7 +148,7 @@ def _asked(one: xr.Dataset) -> list[str]:
 
 def _goals(best: xr.Dataset) -> Iterator[str]:
     """What the case of a design asks for beyond mean and deviation, with limits."""
-    names = ("first", "second") if "first_goal" in best and not _is_plain(best) else ()
+    names = ("first", "second") if "first_goal" in best and not is_plain(best) else ()
     for name in names:
         value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
@@ -160,7 +160,7 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
         yield from str(best["constraints"].item()).split("; ")
 
 
-def _is_plain(one: xr.Dataset) -> bool:
+def is_plain(one: xr.Dataset) -> bool:
     """Whether its case makes mean and deviation small, within no constraints."""
     if "first_goal" not in one:
         return True
@@ -204,7 +204,7 @@ def _original(ours: xr.Dataset) -> xr.Dataset | None:
 
 def _judged(ours: xr.Dataset) -> np.ndarray:
     """What designs of a case are compared by: infinite for those that stand worse to its constraints than others do."""
-    if _is_plain(ours.isel(design=0)):
+    if is_plain(ours.isel(design=0)):
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
     order = ("", "kept", "cannot be told", "broken")
     ranks = np.array([order.index(_standing(str(one))) for one in ours["constraints"].to_numpy()])
@@ -214,7 +214,7 @@ def _judged(ours: xr.Dataset) -> np.ndarray:
 def _merit(ours: xr.Dataset) -> str:
     """What `_judged` goes by, in words."""
     first = ours.isel(design=0)
-    if _is_plain(first):
+    if is_plain(first):
         return f"mean + {SPAN:g} deviations"
     words = str(first["first_goal"].item())
     return f"{words} within the constraints," if str(first["constraints"].item()) else words

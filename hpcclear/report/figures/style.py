@@ -4,9 +4,10 @@ Matplotlib is an extra and is imported when a figure is drawn, never with the pa
 pyplot, so nothing is registered globally and nothing needs closing.
 """
 
+import contextlib
 import functools
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec
 
@@ -144,6 +145,23 @@ def settle(axes: "Sequence[Axes] | np.ndarray", ticks: int = 5) -> None:
                 axis.locator_params(axis=scale, nbins=ticks)
 
 
+@contextlib.contextmanager
+def _laid_out(figure: "Figure", dpi: int) -> Iterator[None]:
+    """The figure with its parts in place for so many dots, for which matplotlib would draw all of it once more."""
+    engine, dots = figure.get_layout_engine(), figure.get_dpi()
+    if engine is None:
+        yield
+        return
+    figure.set_dpi(dpi)
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+        figure.set_dpi(dots)
+
+
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes."""
     stamp: Any = {
@@ -152,15 +170,10 @@ def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
         "pdf": {"CreationDate": None, "Creator": "hpcclear", "Producer": None},
     }[kind]
     buffer = io.BytesIO()
-    with matplotlib().rc_context(RC):
-        if kind == "png":
-            figure.set_dpi(
-                dpi
-            )  # placed by the dots it is drawn in; matplotlib would draw it twice for that
-            engine = figure.get_layout_engine()
-            if engine is not None:
-                engine.execute(figure)
-                figure.set_layout_engine("none")
+    with (
+        matplotlib().rc_context(RC),
+        _laid_out(figure, dpi) if kind == "png" else contextlib.nullcontext(),
+    ):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=stamp)
     return buffer.getvalue()
 

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.answer import is_plain
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
 from hpcclear.report.html.content import Content
@@ -85,15 +86,15 @@ def _effects_words(content: Content) -> list[str]:
 
 def _designs_words(content: Content) -> list[str]:
     verified = content.get("verification")
-    if verified is None or "first_goal" in verified:
-        return []  # what was made small is another: the answer tells
+    if verified is None:
+        return []
     by_name = {str(name): verified.sel(design=name) for name in verified["design"].to_numpy()}
     words = []
     for name, one in by_name.items():
         case, _, letter = name.rpartition(" ")
         base = by_name.get(f"{case} original")
-        if letter not in ("alpha", "beta") or base is None:
-            continue  # not the averaged best of a case
+        if letter not in ("alpha", "beta") or base is None or not is_plain(one):
+            continue  # the averaged best of a case, or of another goal, which the answer tells
         what = "mean" if letter == "alpha" else "deviation"
         change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
         value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
