@@ -73,8 +73,14 @@ def test_a_width_may_be_set(asked, sign, monkeypatch, tmp_path):
     assert width.features(tmp_path) == f"+avx512f,{sign}prefer-256-bit"
 
 
-def test_another_width_is_refused(monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    "named", [{}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "+avx2"}], ids=len
+)
+def test_another_width_is_refused(monkeypatch, tmp_path, named):
+    """Also where the user names the processor to Numba, and the width would say nothing."""
     monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "128")
+    for name, value in named.items():
+        monkeypatch.setenv(name, value)
     with pytest.raises(InputError, match="256 or 512"):
         width.features(tmp_path)
     answer = subprocess.run(
