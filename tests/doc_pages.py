@@ -33,12 +33,13 @@ class Block:
     title: str | None
     no_run: str | None  # the reason
     slow: bool
+    quoted: bool  # out of a file that other tests load
     text: str
 
     @property
     def runs(self) -> bool:
         """Whether it is there to be run, and can be run here."""
-        return self.language not in READ_ONLY and self.no_run is None
+        return self.language not in READ_ONLY and self.no_run is None and not self.quoted
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -58,7 +59,8 @@ def blocks(page: Path) -> list[Block]:
             no_run = rest.removeprefix("no-run:").strip() if rest.startswith("no-run:") else None
             name, line = str(page.relative_to(ROOT)), token.map[0] + 1
             slow = rest.startswith("slow:")
-            found.append(Block(name, line, language, title, no_run, slow, token.content))
+            quoted = rest.startswith("from ")
+            found.append(Block(name, line, language, title, no_run, slow, quoted, token.content))
     return found
 
 
@@ -125,12 +127,16 @@ class Reader:
 
 
 def replaced(scene: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
-    """A scene with the entries of the second level, such as mechanism.rod, taken from a part."""
+    """A scene with the entries of the second level, such as mechanism.rod, taken from a part; a joint that does not say of
+    which kind it is adds to what is there."""
     made = copy.deepcopy(scene)
     for key, value in part.items():
         if isinstance(value, dict) and isinstance(made.get(key), dict):
             whole = made[key] if key != "drive" else {}  # a drive is of one kind
             made[key] = {**whole, **value}
+            if key == "joints":
+                for name, joint in value.items():
+                    made[key][name] = {**({} if "kind" in joint else whole[name]), **joint}
         else:
             made[key] = value
     return made

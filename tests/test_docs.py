@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 import matplotlib.pyplot as plt
 import pytest
+import reference
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
 from patience import crowded
 
@@ -32,7 +33,9 @@ NOT_RUN = [
 BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
 SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
-INFO = re.compile(r'(bash|python|toml|csv|text|singularity)( title="[^"]+"| (no-run|slow): \S.*)?')
+INFO = re.compile(
+    r'(bash|python|toml|csv|text|singularity)( title="[^"]+"| (no-run|slow): \S.*| from \S+)?'
+)
 
 
 def follow(todo: list[Block], place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,6 +68,7 @@ def test_only_these_blocks_are_not_run():
 def test_blocks_that_are_only_read_hide_no_commands():
     for block in (b for page in BLOCKS.values() for b in page if b.language == "text"):
         assert not re.search(r"^\s*(hpcclear|mpiexec|bash|python|pip) ", block.text, re.M), block
+        assert not re.search(r"^\[.*\]\s*(#|$)", block.text, re.M), f"{block}: a scene"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
@@ -209,6 +213,24 @@ def test_the_reference_is_complete(site):
         assert path.rpartition(".")[2] in scene, path
     python = Site(site / "reference/python/index.html").text
     assert all(f"{name}" in python for name in ("load_scene", "simulate", "evaluate", "InputError"))
+
+
+@pytest.mark.parametrize("name", list(reference.MADE))
+def test_the_reference_is_what_the_package_says(name):
+    """`python docs/mkdocs/reference.py` writes it anew."""
+    path, wanted = reference.page(name)
+    assert path.read_text(encoding="utf-8") == wanted
+
+
+def test_every_table_of_a_scene_has_an_example_and_every_entry_a_meaning():
+    text = "\n".join(reference.scene_entries())
+    tables = {part.partition("\n")[0]: part for part in text.split("## ")[1:]}
+    without = [name for name, part in tables.items() if "```toml" not in part]
+    # Their tables stand below them, each with its own example.
+    assert without == ["The file", "[mechanism] of kind planar"]
+    for name, part in tables.items():
+        for row in re.findall(r"^\| `.*$", part, re.M):
+            assert row.startswith("| `kind`") or not row.endswith("|  |"), f"{name}: {row}"
 
 
 def test_no_code_of_ours_is_left_in_the_pages(site):

@@ -65,6 +65,20 @@ def test_the_path_of_a_crank_under_a_torque_begins_where_the_crank_does():
     assert response["path_error"].to_numpy().max() < 3e-5
 
 
+def test_a_point_has_no_path_where_a_drive_does_not_repeat_without_play():
+    """A fan on a torque of its own keeps no time: simulated, and without a path error."""
+    fan = {
+        "mechanism.bodies.fan": {"length": 0.03, "mass": 0.05, "inertia": 4e-6},
+        "mechanism.joints.fan": {"kind": "revolute", "journal": "fan.a", "bearing": "ground.o"},
+        "mechanism.drives.motor.period": True,
+        "mechanism.drives.fan": {"kind": "torque", "body": "fan", "torque": 0.1, "initial_speed": 77.0},
+        "study": None,
+    }  # fmt: skip
+    response = simulate(ROCKER.with_({**dict.fromkeys(PLAYS, 1e-4), **fan}))
+    assert "followed_x" in response
+    assert "path_error" not in response
+
+
 def test_without_play_the_point_stays_on_its_path():
     pins = {
         f"mechanism.joints.{name}": {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}

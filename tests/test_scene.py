@@ -591,7 +591,12 @@ def test_schema_is_closed_and_names_the_units() -> None:
     assert variables["type"] == "object"
 
 
-@pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [*JOBS, *(ROOT / "jobs" / "linkages").glob("*.toml"), *(ROOT / "hpcclear").glob("cli/*.toml"),
+     *(ROOT / "docs" / "mkdocs" / "examples").glob("*.toml")],
+    ids=lambda path: f"{path.parent.stem}-{path.stem}",
+)  # fmt: skip
 def test_schema_accepts_what_is_shipped(path: Path) -> None:
     validator = Draft202012Validator(scene_schema())
     validator.check_schema(scene_schema())

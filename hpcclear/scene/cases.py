@@ -12,6 +12,7 @@ class Case(Table):
 
     name: str
     random: tuple[str, ...]
+    """Names of `[study.random]`; what is left out has its design's value."""
     objectives: tuple[Goal, Goal] | None = None
     """The two things that are made small; default "mean" and "deviation" of f. A word stands for a statistic without
     further entries."""

@@ -25,6 +25,7 @@ class Contact(Table):
     """Normal contact force of every clearance joint."""
 
     law: Literal["hertz", "hunt-crossley", LatchedLaw]
+    """All have Hertz's stiffness; they differ in how an impact loses energy."""
     restitution: Annotated[float, Quantity("", least=0, most=1)] | None = None
     """Coefficient of restitution of the laws that latch the impact speed."""
     damping: Annotated[float, Quantity("s/m", least=0)] | None = None
@@ -89,6 +90,7 @@ class Friction(Table):
     """Tangential force of every clearance joint."""
 
     law: Literal["none", "coulomb", "ambrosio", "lugre"] = "none"
+    """Coulomb's with a ramp about rest, Ambrosio's with two speeds, or LuGre's bristles, which stick."""
     coefficient: Annotated[float, Quantity("", least=0)] | None = None
     """Coefficient of friction; LuGre: of fast sliding."""
     ramp_speed: Speed | None = None

@@ -164,7 +164,8 @@ class Quantity(Converted):
             if bound is not None:
                 number[name] = bound
         if not self.unit:
-            return number
+            share = {"type": "string", "pattern": r"%\s*$", "description": "a number with %"}
+            return {"anyOf": [number, share]}
         text = {"type": "string", "description": f"a number with a unit of {self.unit}"}
         return {"anyOf": [number, text], "description": f"in {self.unit}, or a string with a unit"}
 

@@ -1,4 +1,5 @@
-"""Tables of a planar linkage: bodies, ground, joints, drives, loads. `dynamics/planar/tables.py` makes a mechanism of them."""
+"""Tables of a planar linkage: bodies, ground, joints; `driving` has drives and loads. `dynamics/planar/tables.py` makes a
+mechanism of them."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -6,13 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending, check_bars
+from hpcclear.scene.driving import PlanarDrive, PlanarLoad
 from hpcclear.scene.fields import (
-    Count,
-    Curve,
-    CurveOf,
     Length,
     Mass,
-    MotionTable,
     NamedRows,
     PositiveLength,
     Quantity,
@@ -24,59 +22,11 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.mechanism import Material, check_journal, slender_inertia
+from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
-Angle = Annotated[float, Quantity("rad")]
 Rows = NamedRows()
-
-
-class PairTable(Table):
-    """Two components along x and y; ``[x, y]`` in the file is the same."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_pair(cls, data: Any) -> Any:
-        if not isinstance(data, (list, tuple)):
-            return data
-        if len(data) != 2:
-            raise invalid("a pair [x, y] is expected here", "Write [x, y]")
-        return {"x": data[0], "y": data[1]}
-
-
-class Place(PairTable):
-    """A place or an offset, m."""
-
-    x: Length
-    y: Length
-
-
-class NamedPlace(Place):
-    """A point of a body, in its own axes, m."""
-
-    name: str
-
-
-class PlaceRows(NamedRows):
-    """``{name = [x, y]}`` as named rows."""
-
-    def rows(self, value: Any) -> Any:
-        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; raises PydanticCustomError."""
-        if not isinstance(value, (Mapping, tuple)):
-            raise invalid("named points are expected here", "Write { name = [x, y] }")
-        if isinstance(value, Mapping):
-            for name, place in value.items():
-                if isinstance(place, (list, tuple)) and len(place) != 2:
-                    raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
-            value = {
-                name: {"x": place[0], "y": place[1]} if isinstance(place, (list, tuple)) else place
-                for name, place in value.items()
-            }
-        return super().rows(value)
-
-
-NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]
-NOWHERE = Place(x=0.0, y=0.0)
 
 
 class PlanarBody(Table):
@@ -164,9 +114,9 @@ class PlanarRevolute(Table):
     name: str
     kind: Literal["revolute"]
     journal: str
-    """``body.point``"""
+    """``body.point``, or ``ground.point``."""
     bearing: str
-    """``body.point``"""
+    """``body.point``, or ``ground.point``."""
 
 
 class Materials(Table):
@@ -182,7 +132,9 @@ class PlanarClearance(Table):
     name: str
     kind: Literal["clearance"]
     journal: str
+    """``body.point`` that is the journal's centre."""
     bearing: str
+    """``body.point``, or ``ground.point``, that is the bearing's centre."""
     clearance: PositiveLength
     """R_B - R_J, m."""
     bearing_radius: PositiveLength
@@ -209,8 +161,9 @@ class Rubbing(Table):
     """Friction of a guide."""
 
     coefficient: Annotated[float, Quantity("", least=0)]
+    """Of Coulomb's law."""
     ramp_speed: Speed = 0.01
-    """m/s."""
+    """Sliding speed below which the force falls to zero with the speed, m/s."""
 
 
 class PlanarSlide(Table):
@@ -225,6 +178,7 @@ class PlanarSlide(Table):
     angle: Angle = 0.0
     """Direction of the line in its carrier's axes, rad."""
     friction: Rubbing | None = None
+    """Left out, it slides freely."""
 
 
 class PlanarFixed(Table):
@@ -233,8 +187,11 @@ class PlanarFixed(Table):
     name: str
     kind: Literal["fixed"]
     point: str
+    """``body.point`` that is held."""
     line: str
+    """``ground.point`` at which it is held."""
     angle: Angle = 0.0
+    """Of the body against the ground, rad."""
 
 
 PlanarJoint = Annotated[
@@ -242,128 +199,19 @@ PlanarJoint = Annotated[
 ]
 
 
-class PlanarSpeed(Table):
-    """A body turns at a constant speed."""
-
-    name: str
-    kind: Literal["constant-speed"]
-    body: str
-    speed: Annotated[float, Quantity("rad/s")]
-    period: bool = False
-    """Whether its turn is the revolution."""
-    turns: Annotated[int, Count(least=1, most=64)] = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
-
-
-class PlanarHarmonic(Table):
-    """A body swings: mean + amplitude sin(2 pi frequency t + phase)."""
-
-    name: str
-    kind: Literal["harmonic"]
-    body: str
-    amplitude: Angle
-    frequency: Annotated[float, Quantity("1/s", above=0)]
-    mean: Angle = 0.0
-    phase: Angle = 0.0
-    period: bool = False
-
-
-class PlanarTable(Table):
-    """A body follows a table of angles."""
-
-    name: str
-    kind: Literal["table"]
-    body: str
-    angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
-    """``[[time, angle], ...]``, s and rad: the first time is 0, and the motion repeats at the last, where the angle is the
-    first one again or a turn further on. A cubic spline between, smooth where it repeats."""
-    period: bool = False
-
-
-class PlanarTorque(Table):
-    """A torque acts on a free body."""
-
-    name: str
-    kind: Literal["torque"]
-    body: str
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
-    """N m, constant or over a revolution of the body that gives the period."""
-    initial_speed: Annotated[float, Quantity("rad/s", above=0, why="the body has to start turning")]
-    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    period: bool = False
-    turns: Annotated[int, Count(least=1, most=64)] = 1
-
-
-PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
-]
-
-
-class Components(PairTable):
-    """A force by its components, N."""
-
-    x: Annotated[float, Quantity("N")]
-    y: Annotated[float, Quantity("N")]
-
-
-class ForceLoad(Table):
-    """A force at a point: by its components along the ground's axes, or by size and direction."""
-
-    name: str
-    kind: Literal["force"]
-    place: str
-    force: Components | None = None
-    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """N along `direction`, constant or against the angle of the body that gives the period."""
-    direction: Angle = 0.0
-    """From the ground's x axis, rad."""
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> "ForceLoad":
-        if (self.force is None) == (self.size is None):
-            raise invalid(
-                "is given twice, or not at all",
-                "Write force = [x, y], or size and direction",
-                key="force",
-                value=None if self.force is None else [self.force.x, self.force.y],
-            )
-        return self
-
-
-class TorqueLoad(Table):
-    """A torque on a body."""
-
-    name: str
-    kind: Literal["torque"]
-    body: str
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
-    """N m, constant or against the angle of the body that gives the period."""
-
-
-class SpringLoad(Table):
-    """A spring and damper between two points."""
-
-    name: str
-    kind: Literal["spring"]
-    first: str
-    second: str
-    stiffness: Annotated[float, Quantity("N/m", least=0)]
-    length: Annotated[float, Quantity("m", least=0)] = 0.0
-    damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-
-
-PlanarLoad = Annotated[ForceLoad | TorqueLoad | SpringLoad, Field(discriminator="kind")]
-
-
 class Planar(Table):
     """A planar linkage."""
 
     kind: Literal["planar"] = "planar"
     bodies: Annotated[tuple[PlanarBody, ...], Rows]
+    """What moves. ``like = "NAME"`` takes over what another body says."""
     ground: Ground = Ground()
     joints: Annotated[tuple[PlanarJoint, ...], Rows]
+    """What holds it together. ``like = "NAME"`` takes over what another joint says."""
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
+    """What moves it; one is enough."""
     loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
+    """Forces, torques and springs; gravity is an effect."""
     followed: str | None = None
     """``body.point`` whose acceleration and path responses tell of."""
 

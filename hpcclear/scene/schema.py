@@ -55,6 +55,34 @@ def _describe(definitions: dict[str, Any]) -> None:
                 entry["description"] = docs[key]
 
 
+def _as_written(definitions: dict[str, Any]) -> None:
+    """Rows, pairs and rows like others as a file has them."""
+    for row in definitions.values():
+        if "name" in row["properties"]:  # the key it stands under
+            del row["properties"]["name"]
+            row["required"] = [
+                key for key in row.get("required", []) if key not in ("name", "paths")
+            ]
+    for place in ("Place", "NamedPlace", "Components"):
+        row = definitions[place]
+        number = row["properties"]["x"]
+        pair = {"type": "array", "prefixItems": [number, number], "minItems": 2, "maxItems": 2}
+        definitions[place] = {"description": row.pop("description"), "anyOf": [row, pair]}
+    rows = definitions["Planar"]["properties"]
+    for name in ("bodies", "joints"):
+        one = rows[name]["additionalProperties"]
+        kinds = [choice["$ref"].rpartition("/")[2] for choice in one.get("oneOf", [one])]
+        entries = {key: True for kind in kinds for key in definitions[kind]["properties"]}
+        like = {"type": "string", "description": f"another of the {name}, whose entries it takes"}
+        alike = {
+            "type": "object",
+            "properties": {**entries, "like": like},
+            "required": ["like"],
+            "additionalProperties": False,
+        }
+        rows[name]["additionalProperties"] = {"anyOf": [one, alike]}
+
+
 def scene_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the scene file.
 
@@ -64,11 +92,7 @@ def scene_schema() -> dict[str, Any]:
     schema = Scene.model_json_schema()
     definitions = schema["$defs"]
     _describe({**definitions, "Scene": schema})
-    for name in ("Variable", "RandomInput", "Case"):
-        row = definitions[name]
-        # The name of a row is the key it stands under.
-        del row["properties"]["name"]
-        row["required"] = [key for key in row.get("required", []) if key not in ("name", "paths")]
+    _as_written(definitions)
     for name in ("Variable", "RandomInput"):
         entries = definitions[name]["properties"]
         # Entries whose unit depends on the path are converted before their fields see them.
@@ -76,7 +100,7 @@ def scene_schema() -> dict[str, Any]:
             kind = _BOUNDS if key in ("range", "ratio") else _LIST if key == "values" else _NUMBER
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
-        entries["paths"] = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+        entries["paths"]["minItems"] = 1
     entries = definitions["RandomInput"]["properties"]
     for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
                        ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip

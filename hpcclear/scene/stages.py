@@ -101,7 +101,9 @@ class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23)."""
 
     particles: Annotated[int, Count(2, 10**6)] = 100
+    """Designs that are moved at a time."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
+    """How often they are moved."""
     runs: Annotated[int, Count(1, 10**4)] = 4
     """Independent runs of each case."""
     c1: Factor = 1.8

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.driving import PlanarTorque
 from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, PlanarTorque
+from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import validated

@@ -225,7 +225,7 @@ _LEAST_SHARE = 1e-9
 
 class RandomInput(NamedInput):
     """A random number of the scene: about the design's value, or wherever the design is
-    (`absolute`)."""
+    (`about_design = false`)."""
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
         "file": ("files are read where a scene is loaded, and this came another way",
@@ -236,8 +236,9 @@ class RandomInput(NamedInput):
     distribution: Literal[
         "uniform", "normal", "truncated-normal", "lognormal", "beta", "weibull", "samples", "wear"
     ]
+    """Its law; "samples" are measured values, "wear" takes the clearances of the lives of `[wear]`."""
     range: Range | None = None
-    """Bounds of an absolute "uniform" or "beta" distribution; where "lognormal" and "weibull" are cut off. SI."""
+    """Bounds of a "uniform" or "beta" distribution; where "lognormal" and "weibull" are cut off. SI."""
     mean: float | None = None
     """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; left out, the distribution lies about the value of the
     design. Of "lognormal" its mean, before it is cut off."""

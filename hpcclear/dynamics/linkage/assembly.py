@@ -40,8 +40,9 @@ class Assembly:
 
     def angle(self, body: str) -> float:
         """Angle of a body at the start, rad."""
-        k = self.loops.forest.index("angle", body)
-        return 0.0 if k is None else float(self.q[k])
+        forest = self.loops.forest
+        k = forest.index("angle", forest.frames[body])
+        return forest.offsets[body] + (0.0 if k is None else float(self.q[k]))
 
     def report(self) -> list[str]:
         """A line a body: the angle taken, and the rough one it was found from, in degrees."""

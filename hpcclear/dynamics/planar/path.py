@@ -103,9 +103,9 @@ def rigid_acceleration(
 
 def ideal_path(mechanism: Mechanism, place: str) -> Path | None:
     """Where a place of the linkage is without any play: complex m of the share of a revolution (t,); None where its drives
-    leave something free then, or it cannot pass a dead centre."""
-    ideal = without_play(mechanism)
+    leave something free then or do not repeat, or it cannot pass a dead centre."""
     try:
+        ideal = without_play(mechanism)
         return None if freedom(ideal) else _path(ideal, place)
     except InputError:
         return None

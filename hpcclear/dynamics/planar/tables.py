@@ -13,19 +13,21 @@ from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.physics.contact import contact_stiffness, reduced_compliance
 from hpcclear.scene import Scene
-from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
-from hpcclear.scene.planar import (
+from hpcclear.scene.driving import (
     ForceLoad,
-    Planar,
-    PlanarBody,
-    PlanarClearance,
     PlanarHarmonic,
-    PlanarRevolute,
-    PlanarSlide,
     PlanarSpeed,
     PlanarTable,
     PlanarTorque,
     SpringLoad,
+)
+from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
+from hpcclear.scene.planar import (
+    Planar,
+    PlanarBody,
+    PlanarClearance,
+    PlanarRevolute,
+    PlanarSlide,
 )
 from hpcclear.scene.points import Points
 from hpcclear.scene.validation import validated

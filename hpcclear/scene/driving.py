@@ -1,0 +1,145 @@
+"""What moves a planar linkage: drives of bodies, and loads on bodies and points."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from hpcclear.scene.fields import Count, Curve, CurveOf, MotionTable, Quantity, Table, invalid
+from hpcclear.scene.places import Angle, PairTable
+
+
+class PlanarSpeed(Table):
+    """A body turns at a constant speed."""
+
+    name: str
+    kind: Literal["constant-speed"]
+    body: str
+    """That turns."""
+    speed: Annotated[float, Quantity("rad/s")]
+    """rad/s, counter-clockwise."""
+    period: bool = False
+    """Whether its turn is the revolution; the first drive is, where none says so."""
+    turns: Annotated[int, Count(least=1, most=64)] = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
+
+
+class PlanarHarmonic(Table):
+    """A body swings: mean + amplitude sin(2 pi frequency t + phase)."""
+
+    name: str
+    kind: Literal["harmonic"]
+    body: str
+    """That swings."""
+    amplitude: Angle
+    """rad."""
+    frequency: Annotated[float, Quantity("1/s", above=0)]
+    """1/s: swings, not radians."""
+    mean: Angle = 0.0
+    """rad."""
+    phase: Angle = 0.0
+    """rad."""
+    period: bool = False
+    """Whether its swing is the revolution; the first drive is, where none says so."""
+
+
+class PlanarTable(Table):
+    """A body follows a table of angles."""
+
+    name: str
+    kind: Literal["table"]
+    body: str
+    """That is moved."""
+    angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
+    """``[[time, angle], ...]``, s and rad: the first time is 0, and the motion repeats at the last, where the angle is the
+    first one again or a turn further on. A cubic spline between, smooth where it repeats."""
+    period: bool = False
+    """Whether the table's span is the revolution; the first drive is, where none says so."""
+
+
+class PlanarTorque(Table):
+    """A torque acts on a free body."""
+
+    name: str
+    kind: Literal["torque"]
+    body: str
+    """That the torque turns, against the ground."""
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    """N m, constant or over a revolution of the body that gives the period."""
+    initial_speed: Annotated[float, Quantity("rad/s", above=0, why="the body has to start turning")]
+    """rad/s."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Inertia that turns with the body, kg m2."""
+    period: bool = False
+    """Whether a turn of the body is the revolution; the first drive is, where none says so."""
+    turns: Annotated[int, Count(least=1, most=64)] = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
+
+
+PlanarDrive = Annotated[
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
+]
+
+
+class Components(PairTable):
+    """A force by its components along the ground's axes; ``[x, y]`` is the same."""
+
+    x: Annotated[float, Quantity("N")]
+    """N."""
+    y: Annotated[float, Quantity("N")]
+    """N."""
+
+
+class ForceLoad(Table):
+    """A force at a point: by its components along the ground's axes, or by size and direction."""
+
+    name: str
+    kind: Literal["force"]
+    place: str
+    """``body.point`` that the force acts on."""
+    force: Components | None = None
+    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    """N along `direction`, constant or against the angle of the body that gives the period."""
+    direction: Angle = 0.0
+    """From the ground's x axis, rad."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> "ForceLoad":
+        if (self.force is None) == (self.size is None):
+            raise invalid(
+                "is given twice, or not at all",
+                "Write force = [x, y], or size and direction",
+                key="force",
+                value=None if self.force is None else [self.force.x, self.force.y],
+            )
+        return self
+
+
+class TorqueLoad(Table):
+    """A torque on a body."""
+
+    name: str
+    kind: Literal["torque"]
+    body: str
+    """That the torque acts on, against the ground."""
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    """N m, constant or against the angle of the body that gives the period."""
+
+
+class SpringLoad(Table):
+    """A spring and damper between two points."""
+
+    name: str
+    kind: Literal["spring"]
+    first: str
+    """``body.point``, or ``ground.point``."""
+    second: str
+    """``body.point``, or ``ground.point``."""
+    stiffness: Annotated[float, Quantity("N/m", least=0)]
+    """N/m."""
+    length: Annotated[float, Quantity("m", least=0)] = 0.0
+    """At which it pulls and pushes nothing, m."""
+    damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
+    """N s/m, along the line between both points."""
+
+
+PlanarLoad = Annotated[ForceLoad | TorqueLoad | SpringLoad, Field(discriminator="kind")]
