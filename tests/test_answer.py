@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import report_data as data
+import xarray as xr
 from own_engine import engine
 
 from hpcclear.base.objectives import OBJECTIVES
@@ -78,6 +79,41 @@ def test_designs_within_each_others_limits_are_named_and_others_are_not():
     assert "study.verification.samples" not in told(verified(MEAN, DEVIATION, 1e-8))["next"]
 
 
+def test_the_same_design_under_other_names_is_no_choice():
+    """Beta's variables are alpha's: no cost can decide between them."""
+    twice = {"m2": np.array([0.1, 0.2, 0.2, 0.3, 0.4])}
+    own = told(verified([4e-4, 2e-4, 2e-4, 3e-4, 1e-4], [6e-5, 4e-5, 4e-5, 5e-5, 1e-5], **twice))
+    assert own["as good as it"].startswith("robust beta: the same design; else none")
+    assert "narrower" not in own["next"]
+    near = told(
+        verified([4e-4, 2e-4, 2e-4, 2.001e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4e-5, 1e-5], **twice)
+    )
+    assert near["as good as it"].startswith("robust beta: the same design; robust front 1: within")
+
+
+@pytest.mark.parametrize(
+    ("total", "error", "words"),
+    [
+        ((0.59, 2e-4, 0.4), 1e-4,
+         "m2 59%, m3 40% of the variance of f over the study's ranges; C hardly matters there"),
+        ((2e-4, 2e-4, 1.0), 1e-4, "m3 100% of the variance of f over the study's ranges; m2, C hardly matter there"),
+        ((0.59, 2e-4, 0.4), 0.01, "m2 59%, m3 40%, C 0% of the variance of f over the study's ranges"),
+        ((0.59, np.nan, 0.4), 0.01, None),
+    ],
+)  # fmt: skip
+def test_what_matters_is_told_and_what_hardly_does(total, error, words):
+    """Of limits that reach a hundredth nothing is said to matter hardly."""
+    found = xr.Dataset(
+        {
+            "sobol_total": ("parameter", list(total)),
+            "sobol_total_error": ("parameter", [error] * 3),
+        },
+        {"parameter": ["m2", "C", "m3"]},
+    )
+    files = {"verification": verified(MEAN, DEVIATION), "sensitivity": found}
+    assert dict(answer(files, "")).get("what matters") == words
+
+
 def test_what_is_as_good_says_from_where_to_where():
     assert told(verified(MEAN, DEVIATION))["as good as it"].endswith(
         "(m2 from 0.2 kg to 0.4 kg among them)"
@@ -130,6 +166,15 @@ def test_the_answer_stands_on_top_of_the_page(tmp_path):
     data.write_study(tmp_path)
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert page.index('id="answer"') < page.index('id="summary"')
+
+
+@pytest.mark.parametrize(("least", "words"), [(1.9e-5, True), (2.1e-5, False)])
+def test_the_least_deviation_is_told_as_far_as_limits_tell(tmp_path, least, words):
+    """A design within beta's limits has less; beta is the best of these in the other, and the page says so."""
+    dataset.write(tmp_path / "verification.nc", verified(MEAN, [*DEVIATION[:3], least, 1e-5]))
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    assert ("least deviation of f of all designs simulated as far as limits tell" in page) is words
+    assert "least mean of f of all designs simulated, has" in page
 
 
 SCENES = {

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import page_numbers
 import pytest
 import tomli_w
 import xarray as xr
@@ -483,6 +484,7 @@ def test_figure_and_page(certified):
     page = write_report(place).read_text(encoding="utf-8")
     assert "play in crank_rod changes f by" in page
     assert "time that leaving it out saves" in page
+    page_numbers.check(place)
 
 
 @pytest.mark.mpi

@@ -151,7 +151,7 @@ def test_links_lead_somewhere(page):
                 continue
             place = (page.parent / path).resolve() if path else page
             assert place.exists(), f"{page} links to {target}"
-            if anchor and "reference" not in place.parts:  # headings there are made by the site
+            if anchor and place.name != "python.md":  # headings there are made by the site
                 assert anchor in anchors(place), f"{page} links to {target}"
 
 

@@ -1,6 +1,7 @@
 """Scenes of linkages: whole motions against a dense model and scipy, energy, samples, drives, tables, and what is refused."""
 
 import math
+import re
 import tomllib
 from pathlib import Path
 
@@ -363,4 +364,33 @@ def test_what_a_sample_of_a_linkage_costs_is_told(capsys):
     describe_scene(load_scene(LINKAGES / "crank_rocker.toml"), cost=True)
     told = capsys.readouterr().out
     assert "time a sample" in told
-    assert "all samples" in told
+    assert "60 samples" in told
+    assert re.search(
+        r"about \d+ samples, .* of one core; hpcclear plan tells more", " ".join(told.split())
+    )
+
+
+def test_what_is_on_is_named_all_of_it():
+    """Of a slider-crank and of a linkage: a guide's friction and waves around a bearing as well."""
+    press = load_scene(LINKAGES / "press.toml")
+    waves = {"mechanism.joints.o3.out_of_round": {"bearing": {"cosine_2": 1e-6}}}
+    assert "friction of guide guide, coefficient 0.05" in press.effects_on()
+    assert "joint o3 out of round" not in press.effects_on()
+    assert "joint o3 out of round" in press.with_(waves).effects_on()
+
+
+def test_a_row_like_another_takes_over_what_its_tables_do_not_say():
+    """Another bearing on the same journal, another mass centre of the same kind; points are a body's own."""
+    content = tomllib.loads((LINKAGES / "crank_rocker.toml").read_text(encoding="utf-8"))
+    soft = {"youngs_modulus": 5e8, "poisson_ratio": 0.4}
+    content["mechanism"]["joints"]["o3"]["materials"] = {"bearing": soft}
+    content["mechanism"]["bodies"]["rocker"] = {
+        "like": "coupler", "length": 0.08, "start_angle": "90 deg", "points": {"knob": [0.0, 0.01]},
+    }  # fmt: skip
+    scene = load_scene(content)
+    own, model = (scene.clearance_joint(name).materials for name in ("o3", "o2"))
+    assert own.bearing.youngs_modulus == 5e8
+    assert own.journal == model.journal
+    bodies = {body.name: body for body in scene.mechanism.bodies}
+    assert [point.name for point in bodies["rocker"].points] == ["knob"]
+    assert bodies["rocker"].mass == bodies["coupler"].mass

@@ -1,119 +1,25 @@
-"""Every number on the page of a report comes from its files: found there, and another where the files hold another.
-
-Only numbers of three digits and more: shorter ones are found in any file.
-"""
+"""Every number on the page of a report comes from its files: found there, and another where the files hold another."""
 
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import report_data as data
-import xarray as xr
 from own_engine import engine
-from test_report import Tree
+from page_numbers import NUMBER, check, foreign, held, leading, shown, summed, told
 
-from hpcclear.base.arrays import Array
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import labels
 from hpcclear.report.html import gallery
-from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.study import run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
 import formula
-
-NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?:e([-+]?\d+))?(?![\w.]*\d)")
-TELLING = 3
-LISTED = ("samples", "kriging", "front", "response")
-"""Kinds whose numbers are drawn, or told in sum: in so many any number would be found."""
-
-
-class Cells(Tree):
-    """Its texts apart, cells and tiles too."""
-
-    def handle_data(self, text: str) -> None:
-        super().handle_data(f" {text} ")
-
-
-Told = tuple[str, float, float]
-
-
-def told(text: str) -> Iterator[Told]:
-    """Numbers of a text that tell something, and from where to where what they stand for lies, as 1 to 10."""
-    for match in NUMBER.finditer(text):
-        digits = match[1].replace(".", "").lstrip("0")
-        if len(digits) >= TELLING:
-            unit = 10.0 ** (1 - len(digits))
-            value = int(digits) * unit
-            yield match[0], value - 0.501 * unit, value + 0.501 * unit
-
-
-def held(content: xr.Dataset) -> Iterator[float]:
-    """All that a file says as a number or in words; of long lists only how long they are."""
-    texts = [str(text) for text in content.attrs.values()]
-    yield from map(float, content.sizes.values())
-    for variable in content.variables.values():
-        texts += [str(text) for text in variable.attrs.values()]
-        if variable.dtype.kind not in "fiu":
-            texts += [str(text) for text in np.ravel(variable.to_numpy())]
-        elif content.attrs["hpcclear_kind"] not in LISTED:
-            yield from np.ravel(variable.to_numpy()).astype(float)
-    for text in texts:
-        yield from (0.5 * (low + high) for _, low, high in told(text))
-
-
-def summed(content: xr.Dataset) -> Iterator[float]:
-    """What the page works out of a file: each line is a number that a reader can work out again."""
-    kind = content.attrs["hpcclear_kind"]
-    if kind == "samples":
-        for name in ("objective", "rhs_evaluations"):
-            yield from (float(content[name].min()), float(content[name].max()))
-        yield float(content["rhs_evaluations"].sum())
-    if kind == "verification":
-        for name in ("mean", "deviation"):  # half as wide as limits, and against the original
-            yield from np.ravel(0.5 * (content[f"{name}_upper"] - content[f"{name}_lower"]))
-            true = content[f"{name}_true"].to_numpy()
-            yield from np.ravel(true[:, None] / true[None, :] - 1.0)
-    if kind == "timing":
-        parts = [content[name] for name in ("busy", "idle", "compile", "write")]
-        for part in (*parts, *([content["samples"]] if "samples" in content else [])):
-            yield from np.ravel(part.sum("stage"))
-        yield from np.ravel(sum(part.sum("stage") for part in parts))
-        if "samples" in content:
-            simulated = content["samples"] > 0
-            yield float(content["samples"].sum() / content["busy"].where(simulated).sum())
-    if kind == "accuracy":
-        yield from np.ravel(content["averaged"] * content["turn_seconds"])
-        yield from np.ravel(content["training"] * content["sample_seconds"])
-
-
-def contents(place: Path) -> list[xr.Dataset]:
-    return [dataset.read(path) for path in sorted(place.rglob("*.nc"))]
-
-
-def shown(place: Path) -> str:
-    return Cells(write_report(place).read_text(encoding="utf-8")).text
-
-
-def leading(values: Iterable[float]) -> Array:
-    """Values as 1 to 10, in order."""
-    sizes = np.abs(np.fromiter(values, float))
-    return np.sort(10.0 ** (np.log10(sizes[np.isfinite(sizes) & (sizes > 0.0)]) % 1.0))
-
-
-def foreign(numbers: Iterable[Told], known: Array) -> list[str]:
-    """Numbers that are none of the known ones."""
-    return [
-        text
-        for text, low, high in numbers
-        if np.searchsorted(known, low) == np.searchsorted(known, high, side="right")
-    ]
 
 
 @pytest.fixture(autouse=True)
@@ -146,10 +52,7 @@ def place(request, tmp_path: Path) -> Path:
 
 
 def test_every_number_is_found_in_a_file(place: Path) -> None:
-    numbers = list(told(shown(place)))
-    assert len(numbers) > 10
-    known = leading(x for one in contents(place) for x in (*held(one), *summed(one)))
-    assert foreign(numbers, known) == []
+    check(place)
 
 
 def test_a_number_of_no_file_is_noticed(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Panels of the `accuracy` command, one after the other: what was measured is kept, and goes into one dataset."""
 
-import shlex
-import sys
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Protocol
@@ -16,6 +14,7 @@ from hpcclear.accuracy.standin import with_case
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.steady.telling import in_a_line
+from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
@@ -81,7 +80,7 @@ class Panels:
         self.attributes: dict[str, Any] = {
             **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             "profile": profile.name,
-            "command": shlex.join(sys.argv),
+            "command": command_line(),
             "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",
             "repeats": f"medians of {profile.repeats} runs ({profile.outside_repeats} for scipy's solvers)",
             "copies": f"averaging: {profile.copies} copies over {profile.revolutions} revolutions",

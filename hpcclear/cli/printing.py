@@ -189,8 +189,18 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (kept for the next run)"),
     ]
     if scene.study is not None:
-        rows.append(("all samples", f"{each * scene.study.samples:.3g} core-seconds"))
+        rows.append(("hpcclear sample", _all(scene.study.samples, each)))
+    if scene.study is not None and scene.study.cases:
+        from hpcclear.study.extent import samples_of
+
+        whole = sum(samples_of(scene).values())
+        rows.append(("hpcclear run", f"about {_all(whole, each)}; hpcclear plan tells more"))
     return rows
+
+
+def _all(count: int, each: float) -> str:
+    """What so many samples take, s each."""
+    return f"{count} samples, {duration(count * each)} of one core"
 
 
 def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
@@ -288,8 +298,9 @@ def describe_statistics(found: "Finished") -> None:
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the original, the answer of a finished study in ten lines, what it took, and
     where its files are."""
-    kinds = ("samples", "verification", "timing")
-    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
+    kinds = ("samples", "sensitivity", "verification", "chaos", "timing")
+    paths = {kind: place / f"{kind}.nc" for kind in kinds}
+    found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
     for case, rows in beside_original(found["verification"]):
         beside = Table(

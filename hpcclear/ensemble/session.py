@@ -292,4 +292,11 @@ def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.D
     empty = np.zeros((ranks.size, len(COLUMNS)))
     seconds = np.stack([ranks.stage_seconds.get(stage, empty) for stage in stages], axis=1)
     data = {name: seconds[:, :, k] for k, name in enumerate(COLUMNS)}
-    return dataset.timing_dataset(stages, data, shlex.join(sys.argv), attributes)
+    return dataset.timing_dataset(stages, data, command_line(), attributes)
+
+
+def command_line() -> str:
+    """The command of this process as one would type it, however it was begun."""
+    program = Path(sys.argv[0])
+    ours = program.name == "__main__.py" and program.parent.name == "hpcclear"
+    return shlex.join(["hpcclear" if ours else program.name, *sys.argv[1:]])

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import Flag, Status
+from hpcclear.report import alike
 from hpcclear.report.figures import labels
 
 SPAN = 2.0
@@ -27,11 +28,8 @@ SOME = 0.05
 LARGE = 0.1
 """Share of the variance from which chaos is worth more revolutions."""
 
-SAME = 0.01
-"""Relative difference up to which a variable of two designs is called the same."""
-
-NAMED = 3
-"""Designs named before the rest is counted."""
+LITTLE = 0.01
+"""Share of the variance of f, with two standard errors, below which a variable is said to matter hardly."""
 
 
 class Line(NamedTuple):
@@ -66,8 +64,9 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         Line("true mean", _moment(best, "mean", original)),
         Line("true deviation", _moment(best, "deviation", original)),
         *(Line("asked for", text) for text in _goals(best)),
-        Line("as good as it", _alike(ours, best)),
+        Line("as good as it", alike.words(ours, best)),
         Line("on a bound", _bounds(best)),
+        *(Line("what matters", text) for text in _shares(files)),
         Line("theory", _left(files, best)),
         *([Line("chaos", scatter)] if scatter else []),
         Line("how sure", _sure(best, verified)),
@@ -255,53 +254,6 @@ def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
     return f"{text}: {abs(change):.0%} {'less' if change < 0 else 'more'} than the original's {labels.quantity(before, unit)}"
 
 
-def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
-    lower, upper = ours[f"{word}_lower"].to_numpy(), ours[f"{word}_upper"].to_numpy()
-    return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
-
-
-def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Designs that cannot be told apart from the best: as the file says, else those whose limits overlap."""
-    names = [str(name) for name in ours["design"].to_numpy()]
-    own = str(best["design"].item())
-    if "same_as" in ours:
-        first = [
-            str(same) or name for same, name in zip(ours["same_as"].to_numpy(), names, strict=True)
-        ]
-        group = first[names.index(own)]
-        return [
-            name for name, one in zip(names, first, strict=True) if one == group and name != own
-        ]
-    if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
-        return []
-    alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")
-    return [name for name, one in zip(names, alike, strict=True) if one and name != own]
-
-
-def _alike(ours: xr.Dataset, best: xr.Dataset) -> str:
-    twins = _twins(ours, best)
-    if not twins:
-        return "none: every other design differs by more than the limits"
-    shown = ", ".join(twins[:NAMED])
-    more = len(twins) - NAMED
-    shown += f" and {more} more" if more > 0 else ""
-    shown += ": within the limits they cannot be told apart, choose by cost"
-    spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
-    return f"{shown} ({spans} among them)" if spans else shown
-
-
-def _spans(alike: xr.Dataset) -> str:
-    """From where to where the variables of these designs reach, of those that differ."""
-    texts = []
-    for variable in labels.design_variables(alike):
-        low, high = float(variable.min()), float(variable.max())
-        if high - low > SAME * abs(high):
-            unit = str(variable.attrs["units"])
-            ends = (labels.quantity(end, unit) for end in (low, high))
-            texts.append(f"{labels.words(variable)} from {' to '.join(ends)}")
-    return ", ".join(texts)
-
-
 def _bounds(best: xr.Dataset) -> str:
     found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
     return found or "none of its variables"
@@ -319,6 +271,29 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
         failed = int((samples["status"].to_numpy() != Status.OK).sum())
         parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples, {failed} failed")
     return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
+
+
+def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
+    """Total share of each variable of the variance of f over the ranges of the study, the largest first; none where the study
+    did not look, or did not find out."""
+    found = files.get("sensitivity")
+    if found is None or "sobol_total" not in found:
+        return
+    total, error = (found[f"sobol_total{end}"].to_numpy() for end in ("", "_error"))
+    if not total.size or not np.isfinite([total, error]).all():
+        return
+    names = [str(name) for name in found["parameter"].to_numpy()]
+    order = np.argsort(-total, kind="stable")
+    little = total + 2.0 * error < LITTLE
+    told = ", ".join(f"{names[k]} {max(total[k], 0.0):.0%}" for k in order if not little[k])
+    hardly = [names[k] for k in order if little[k]]
+    yield "; ".join(
+        [
+            *([f"{told} of the variance of f over the study's ranges"] if told else []),
+            *([f"{' and '.join(hardly)} hardly matters there"] if len(hardly) == 1 else []),
+            *([f"{', '.join(hardly)} hardly matter there"] if len(hardly) > 1 else []),
+        ]
+    )
 
 
 def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
@@ -342,7 +317,11 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     level = float(verified.attrs.get("confidence", np.nan))
     text = f"{count} direct simulations of it"
     text += " by scrambled Sobol sequences" if verified.attrs.get("method") == "qmc" else ""
-    text += f", limits of {level:.0%}" if np.isfinite(level) else ""
+    text += (
+        f", limits of {level:.0%} for them (not for what the model leaves out)"
+        if np.isfinite(level)
+        else ""
+    )
     errors = _surrogate_errors(best)
     if len(errors) == 2:
         text += f"; the surrogate was off by {errors[0]:+.1%} and {errors[1]:+.1%} there"
@@ -365,9 +344,10 @@ def _next(
         yield "widen the ranges of the variables on a bound if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):
         yield "raise study.samples: the surrogate is off there, and a better design may hide"
-    if _twins(ours, best) and ours.attrs.get("method") == "qmc":
+    twins = alike.others(ours, best)
+    if twins and ours.attrs.get("method") == "qmc":
         yield "a smaller study.verification.accuracy tells designs apart that read the same"
-    elif _twins(ours, best) and "samples" in best:
+    elif twins and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
     found, name = files.get("chaos"), str(best["design"].item())
     if (

@@ -5,7 +5,7 @@ from typing import Any
 
 from hpcclear.scene.mechanism import TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
-from hpcclear.scene.planar import Planar
+from hpcclear.scene.planar import Planar, PlanarSlide
 from hpcclear.scene.plausibility import implausible
 from hpcclear.scene.tables import SceneTables
 
@@ -18,6 +18,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         clearance = scene.number(f"{scene.joint_key(name)}.clearance")
         size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
         yield f"clearance {size} in joint {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
+        joint: Any = scene.clearance_joint(name)
+        if joint.out_of_round is not None:
+            yield f"joint {name} out of round"
     for name in scene.worn_joints():
         yield f"wear of joint {name}"
     for name, film in scene.films().items():
@@ -35,6 +38,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if isinstance(scene.mechanism, Planar):
         for row in (*scene.mechanism.drives, *scene.mechanism.loads):
             yield f"{row.kind} {row.name}"
+        for guide in scene.mechanism.joints:
+            if isinstance(guide, PlanarSlide) and guide.friction is not None:
+                yield f"friction of guide {guide.name}, coefficient {guide.friction.coefficient:g}"
     if effects.gravity != 0:
         yield f"gravity {effects.gravity:g} m/s2"
     if effects.slider_load is not None:

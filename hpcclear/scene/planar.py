@@ -249,7 +249,8 @@ class Planar(Table):
     @model_validator(mode="before")
     @classmethod
     def _alike(cls, data: Any) -> Any:
-        """Entries of a body or joint that is ``like`` another, written out."""
+        """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
+        what they do not say, points are a body's own."""
         if not isinstance(data, Mapping):
             return data
         written = dict(data)
@@ -273,7 +274,11 @@ def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
             key=f"{table}.{name}.like",
             value=row["like"],
         )
-    return {**model, **{key: value for key, value in row.items() if key != "like"}}
+    made = dict(model)
+    for key, value in row.items():
+        own = isinstance(value, Mapping) and isinstance(model.get(key), Mapping) and key != "points"
+        made[key] = {**model[key], **value} if own else value
+    return {key: value for key, value in made.items() if key != "like"}
 
 
 def names_of_points(body: PlanarBody) -> tuple[str, ...]:

@@ -90,14 +90,20 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
 
 
 def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Where the output stands and how fast it moves: the slider, or angle and speed of a linkage's last body."""
+    """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
+    the axis on which it moves further."""
     if "slider_position" in response:
         return response["slider_position"], response["slider_velocity"]
-    angle, spin = response["body_angle"].isel(body=-1), response["body_spin"].isel(body=-1)
-    name = str(angle["body"].item())
+    last = response.isel(body=-1)
+    pairs = {"angle": (last["body_angle"], last["body_spin"])}
+    if not (last["body_spin"] != 0.0).any():
+        axis = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].to_numpy())))
+        pairs = {axis: (last[f"body_{axis}"], last[f"body_v{axis}"])}
+    ((word, (place, speed)),) = pairs.items()
+    name = str(last["body"].item())
     return (
-        angle.assign_attrs(long_name=f"angle of {name}"),
-        spin.assign_attrs(long_name=f"speed of {name}"),
+        place.assign_attrs(long_name=f"{word} of {name}"),
+        speed.assign_attrs(long_name=f"speed of {name}"),
     )
 
 

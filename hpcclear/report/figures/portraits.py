@@ -83,7 +83,7 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
 def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
-    Of a linkage, speed of its last body over its angle. Parameters as for `orbit_figure`.
+    Of a linkage, speed of its last body over its angle or place. Parameters as for `orbit_figure`.
     """
     from matplotlib.collections import LineCollection
 

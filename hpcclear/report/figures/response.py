@@ -123,7 +123,7 @@ def spectrum_figure(
 
 @style.drawn
 def energy_figure(response: xr.Dataset) -> "Figure":
-    """Energy ledger: what the drive puts in, what is stored, what is lost, and what is left unexplained.
+    """Energy ledger: what drive and loads put in and what is lost since the start, what is stored, what is left unexplained.
 
     Of a dataset of kind ``response``.
     """
@@ -133,16 +133,15 @@ def energy_figure(response: xr.Dataset) -> "Figure":
         ("driving_work", "load_work", "dissipated_energy"),
         ("kinetic_energy", "elastic_energy", "potential_energy"),
     )
-    titles = ("since the start", "stored")
-    for panel, names, title in zip(axes[:2, 0], ledgers, titles, strict=True):
+    kinds = ("exchanged", "stored")
+    for panel, names, kind in zip(axes[:2, 0], ledgers, kinds, strict=True):
         present = [n for n in names if n in response and bool((response[n] != 0.0).any())]
         unit = labels.scale("J", [float(abs(response[n]).max()) for n in present])
         for row, name in enumerate(present):
             values = response[name].to_numpy() * unit.factor
             label = name.replace("_", " ").removesuffix(" energy")
             panel.plot(turn, values, style.DASHES[row], color=style.CYCLE[row], lw=0.8, label=label)
-        panel.set_ylabel(unit.label("energy"))
-        panel.set_title(title)
+        panel.set_ylabel(unit.label(f"energy {kind}"))
         panel.legend(
             loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(present), borderaxespad=0.0
         )

@@ -40,7 +40,7 @@ def timing_figure(timing: xr.Dataset) -> "Figure":
             panel.set_yticks(np.arange(len(names)), names)
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
-        panel.set_ylabel(f"{along} ({'number' if along == 'rank' else 'name'})")
+        panel.set_ylabel(f"{along} (–)")
         panel.set_xlabel("time (s)" if along == "rank" else "time of all ranks (s)")
     handles, words = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, words, loc="outside lower center", ncols=4, columnspacing=1.0)

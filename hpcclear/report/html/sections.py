@@ -1,5 +1,7 @@
 """Sections of the page on designs, findings and trust, made from what there is; None where nothing is."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
@@ -65,7 +67,7 @@ def _samples_words(content: Content) -> list[str]:
         return []
     count, failed = samples.sizes["sample"], int((samples["status"] != 0).sum())
     names = ", ".join(labels.words(v) for v in labels.design_variables(samples))
-    words = [f"{count} designs, different in {names}, were simulated; {_none(failed)} failed."]
+    words = [f"{count} samples, different in {names}, were simulated; {_none(failed)} failed."]
     f = samples["objective"]
     if bool(f.notnull().any()):
         low, high = (str(quantity(float(end), str(f.attrs["units"]))) for end in (f.min(), f.max()))
@@ -98,11 +100,20 @@ def _designs_words(content: Content) -> list[str]:
         what = "mean" if letter == "alpha" else "deviation"
         change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
         value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
+        told = _as_far_as_told(by_name, one, what)
         words.append(
-            f"Design “{name}”, of the least {what} of f of all designs simulated, has a {what} of {value}: "
+            f"Design “{name}”, of the least {what} of f of all designs simulated{told}, has a {what} of {value}: "
             f"{abs(change):.0%} {'less' if change < 0 else 'more'} than the original design."
         )
     return words
+
+
+def _as_far_as_told(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: str) -> str:
+    """Where another design of the case has less, which its limits do not tell from this one's."""
+    case = str(one["case"].item()) if "case" in one else ""
+    rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
+    less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
+    return " as far as limits tell" if less else ""
 
 
 def _claims_words(content: Content) -> list[str]:
@@ -203,7 +214,10 @@ def designs(content: Content) -> dict[str, object] | None:
 _MEANINGS = (
     ("original", "the scene as it is written"),
     ("alpha", "least mean (or of the first that the case makes small) of all designs simulated"),
-    ("beta", "least deviation (or of the second) of these"),
+    (
+        "beta",
+        "least deviation (or of the second) of these, and of designs that cannot be told from it the best in the other",
+    ),
     ("front", "between these two, not beaten in both by any other"),
     ("best", "alpha or beta by the surrogate alone, in the best run of the swarm"),
     ("averaged", "the average of what all runs of the swarm found so"),

@@ -1,0 +1,79 @@
+"""Designs that cannot be told apart from one: the same design under another name, and others within the limits."""
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import labels
+
+SAME = 0.01
+"""Relative difference up to which a variable of two designs is called the same."""
+
+NAMED = 3
+"""Designs named before the rest is counted."""
+
+
+def words(ours: xr.Dataset, best: xr.Dataset) -> str:
+    """What else could be taken, and where its variables reach."""
+    again, twins = _again(ours, best), others(ours, best)
+    known = f"{_listed(again)}: the same design; " if again else ""
+    if not twins:
+        return f"{known}{'else ' if again else ''}none: every other design differs by more than the limits"
+    shown = f"{_listed(twins)}: within the limits they cannot be told apart, choose by cost"
+    spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
+    return f"{known}{shown} ({spans} among them)" if spans else known + shown
+
+
+def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Other designs that cannot be told apart from the best."""
+    again = _again(ours, best)
+    return [name for name in _twins(ours, best) if name not in again]
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Other names of the best: all variables are the same numbers."""
+    alike = np.ones(ours.sizes["design"], bool)
+    for variable in labels.design_variables(ours):
+        own = float(best[variable.name])
+        alike &= np.isclose(variable.to_numpy(), own, rtol=1e-9, atol=0.0, equal_nan=True)
+    names = (str(name) for name in ours["design"].to_numpy()[alike])
+    return [name for name in names if name != str(best["design"].item())]
+
+
+def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
+    lower, upper = ours[f"{word}_lower"].to_numpy(), ours[f"{word}_upper"].to_numpy()
+    return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
+
+
+def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """As the file says, else those whose limits overlap."""
+    names = [str(name) for name in ours["design"].to_numpy()]
+    own = str(best["design"].item())
+    if "same_as" in ours:
+        first = [
+            str(same) or name for same, name in zip(ours["same_as"].to_numpy(), names, strict=True)
+        ]
+        group = first[names.index(own)]
+        return [
+            name for name, one in zip(names, first, strict=True) if one == group and name != own
+        ]
+    if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
+        return []
+    alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")
+    return [name for name, one in zip(names, alike, strict=True) if one and name != own]
+
+
+def _spans(alike: xr.Dataset) -> str:
+    """From where to where the variables of these designs reach, of those that differ."""
+    texts = []
+    for variable in labels.design_variables(alike):
+        low, high = float(variable.min()), float(variable.max())
+        if high - low > SAME * abs(high):
+            unit = str(variable.attrs["units"])
+            ends = (labels.quantity(end, unit) for end in (low, high))
+            texts.append(f"{labels.words(variable)} from {' to '.join(ends)}")
+    return ", ".join(texts)
