@@ -70,7 +70,7 @@ PYTHON
 }
 
 run_setting() {
-    local setting=$1 release=trixie user=root home=/root above=/root inner="" option="" load=0 settings=() words="$run_words" part
+    local setting=$1 release=trixie user=root home=/root above=/opt inner="" option="" load=0 settings=() words="$run_words" part
     for part in ${setting//+/ }; do
         case $part in
         debian13) ;;
@@ -143,7 +143,7 @@ run_setting() {
     verdict() { printf '%s %d:%02d' "$([ "$1" = 0 ] && echo green || echo "red ($1)")" $(($2 / 60)) $(($2 % 60)); }
     printf '| %s | %s | %s | %s | %s | %s |\n' "$setting" "$(chroot "$root" python3 -c 'import platform; print(platform.python_version())')" \
         "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)" "$(verdict "${codes[0]}" "${times[0]}")" \
-        "$(verdict "${codes[1]}" "${times[1]}")${words:+ ($words)}" "$(git rev-parse --short HEAD)" | tee "$results/$setting.row"
+        "$(verdict "${codes[1]}" "${times[1]}")${words:+ ($words)}" "$(git -C "$root$folder" rev-parse --short HEAD)" | tee "$results/$setting.row"
     [ "${codes[*]}" = "0 0" ]
 }
 
