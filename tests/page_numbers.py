@@ -72,8 +72,6 @@ def summed(content: xr.Dataset) -> Iterator[float]:
         if "samples" in content:
             simulated = content["samples"] > 0
             yield float(content["samples"].sum() / content["busy"].where(simulated).sum())
-    if kind == "effects":  # told in percent, with limits, and as a saving of time
-        yield from np.ravel(content["change_upper"] - content["change"])
     if kind == "accuracy":
         yield from np.ravel(content["averaged"] * content["turn_seconds"])
         yield from np.ravel(content["training"] * content["sample_seconds"])

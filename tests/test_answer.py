@@ -171,7 +171,7 @@ def test_the_answer_stands_on_top_of_the_page(tmp_path):
 @pytest.mark.parametrize(("least", "words"), [(1.9e-5, True), (2.1e-5, False)])
 def test_the_least_deviation_is_told_as_far_as_limits_tell(tmp_path, least, words):
     """A design within beta's limits has less; beta is the best of these in the other, and the page says so."""
-    dataset.write(tmp_path / "verification.nc", verified(MEAN, [*DEVIATION[:3], least, 1e-5]))
+    dataset.write(verified(MEAN, [*DEVIATION[:3], least, 1e-5]), tmp_path / "verification.nc")
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert ("least deviation of f of all designs simulated as far as limits tell" in page) is words
     assert "least mean of f of all designs simulated, has" in page
