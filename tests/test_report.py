@@ -125,7 +125,7 @@ def test_every_figure_leads_to_itself_enlarged_and_back(tree: Tree) -> None:
 
 def test_the_page_says_what_was_found(tree: Tree) -> None:
     for words in (
-        "60 designs",
+        "60 samples",
         "3 failed",
         "Design “robust alpha”",
         "19% less than the original design",
