@@ -114,6 +114,11 @@ def test_what_matters_is_told_and_what_hardly_does(total, error, words):
     assert dict(answer(files, "")).get("what matters") == words
 
 
+def test_of_designs_whose_variables_are_not_known_none_is_called_the_same():
+    lines = told(verified(MEAN, DEVIATION).drop_vars("m2"))
+    assert lines["as good as it"].startswith("robust front 1: within")
+
+
 def test_what_is_as_good_says_from_where_to_where():
     assert told(verified(MEAN, DEVIATION))["as good as it"].endswith(
         "(m2 from 0.2 kg to 0.4 kg among them)"

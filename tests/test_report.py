@@ -18,6 +18,7 @@ from browser import Browser
 from light import loaded_by
 
 from hpcclear.base.errors import InputError
+from hpcclear.ensemble.session import command_line
 from hpcclear.report.html import markup, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
@@ -448,3 +449,15 @@ def test_without_scripts_the_tables_remain(browser: Browser, page: Path, tmp_pat
         assert len(notes["nodeIds"]) == 2
     finally:
         browser.command("Emulation.setScriptExecutionDisabled", value=False)
+
+
+def test_what_stands_between_backquotes_is_code_and_all_text_is_escaped() -> None:
+    made = markup.render("list.html", content=["run `hpcclear x` <b>", "`<i>`"])
+    assert "<li>run <code>hpcclear x</code> &lt;b&gt;</li>" in made
+    assert "<li><code>&lt;i&gt;</code></li>" in made
+
+
+@pytest.mark.parametrize("program", ["/a/hpcclear/__main__.py", "/venv/bin/hpcclear"])
+def test_the_command_is_told_as_one_would_type_it(monkeypatch, program: str) -> None:
+    monkeypatch.setattr(sys, "argv", [program, "run", "my engine.toml"])
+    assert command_line() == "hpcclear run 'my engine.toml'"

@@ -50,8 +50,6 @@ def scene_entries() -> Iterator[str]:
             yield from ("Also " + ", ".join(f"`[{path}]`" for path in paths[1:]) + ".", "")
         yield from ("| entry | value | default | meaning |", "| --- | --- | --- | --- |")
         for entry, field in part["properties"].items():
-            if entry == "name" and paths[0].endswith(ANY):
-                continue  # the table's own
             required = entry in part.get("required", ())
             default = "needed" if required else _default(field)
             meaning = _cell(field.get("description") or _first_meaning(field, parts))

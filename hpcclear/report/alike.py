@@ -36,8 +36,9 @@ def _listed(names: list[str]) -> str:
 
 def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """Other names of the best: all variables are the same numbers."""
-    alike = np.ones(ours.sizes["design"], bool)
-    for variable in labels.design_variables(ours):
+    variables = labels.design_variables(ours)
+    alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
+    for variable in variables:
         own = float(best[variable.name])
         alike &= np.isclose(variable.to_numpy(), own, rtol=1e-9, atol=0.0, equal_nan=True)
     names = (str(name) for name in ours["design"].to_numpy()[alike])

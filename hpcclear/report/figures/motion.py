@@ -95,14 +95,13 @@ def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     if "slider_position" in response:
         return response["slider_position"], response["slider_velocity"]
     last = response.isel(body=-1)
-    pairs = {"angle": (last["body_angle"], last["body_spin"])}
-    if not (last["body_spin"] != 0.0).any():
-        axis = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].to_numpy())))
-        pairs = {axis: (last[f"body_{axis}"], last[f"body_v{axis}"])}
-    ((word, (place, speed)),) = pairs.items()
+    word, speed = "angle", last["body_spin"]
+    if not (speed != 0.0).any():
+        word = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].to_numpy())))
+        speed = last[f"body_v{word}"]
     name = str(last["body"].item())
     return (
-        place.assign_attrs(long_name=f"{word} of {name}"),
+        last[f"body_{word}"].assign_attrs(long_name=f"{word} of {name}"),
         speed.assign_attrs(long_name=f"speed of {name}"),
     )
 
