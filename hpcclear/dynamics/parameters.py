@@ -13,6 +13,7 @@ from hpcclear.dynamics.linkage.bending import entries
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar.problem import linkage_of, parameters_of
 from hpcclear.scene import Scene
+from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.effects import LUGRE_ENTRIES
 from hpcclear.scene.points import Points
 
@@ -80,7 +81,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
         name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
     }
     free = scene.drive.kind == "torque"
-    speed = get("drive.initial_speed" if free else "drive.speed")
+    speed = get(f"drive.{speed_entry(scene.drive)}")
     p[:, at.SPEED] = speed
     p[:, at.PERIOD] = at.TURN / speed
     p[:, at.FIRST_STEP] = 1e-3 * p[:, at.PERIOD]

@@ -27,7 +27,8 @@ from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
 from hpcclear.dynamics.views import Outcome, Parameters, Settings
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import turns_of
+from hpcclear.scene.driving import speed_entry
+from hpcclear.scene.planar import main_drive
 
 LEAST_AVERAGED = 10
 """Revolutions before an automatic average may end: fewer say nothing about its standard error."""
@@ -49,6 +50,10 @@ LEAST_RISE = {"torque": 5e-3, "speed": 1e-3}
 
 What it feels changes within so small a part of a turn that steps, or the instants that works are summed over, pass over it.
 Under a torque the energy closes to 1e-4 with 6e-3 and to 0.15 with 2e-3; at a speed to 2e-9 with 2e-3 and to 5e-3 with 2e-4."""
+
+THROWN_BACK = 0.0873
+"""How far (5 degrees) from its start a body that a torque drives may turn back, rad, in its first revolution from rest:
+the first impacts in its joints throw it."""
 
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""
@@ -88,6 +93,8 @@ class Problem:
         Cubic cells of a linkage's tables.
     chosen : tuple of int
         Places of the joints whose gaps count for f; none for all.
+    from_rest : bool
+        Whether the body that a torque drives may begin at rest.
 
     Raises
     ------
@@ -115,6 +122,7 @@ class Problem:
     linkage: Linkage | None = None
     curves: tuple[Array, ...] = ()
     chosen: tuple[int, ...] = ()
+    from_rest: bool = False
 
     def __post_init__(self) -> None:
         n = self.coordinates
@@ -144,6 +152,7 @@ class Problem:
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
         s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
+        s.at_rest = THROWN_BACK if self.from_rest else 0.0
         last = at.waves_of(self.effects)[-1:]
         s.profiled = last[0].rows().stop if last and self.effects.profile else 0
         s.chosen = 0.0 if self.chosen else 1.0
@@ -276,7 +285,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     lengths += [False] * free
     coordinates = [a if length else 10.0 * a for length in lengths]
     drive = scene.drive
-    speed = drive.initial_speed if drive.kind == "torque" else drive.speed
+    speed = getattr(drive, speed_entry(drive))
     rate = 1e3 * min(1.0, scene.slider_crank.crank.length * abs(speed) / 25.0)
     velocities = [rate * a if length else 50.0 * rate * a for length in lengths]
     own = bristles.tolerances(scene, at.TURN / abs(speed))
@@ -370,9 +379,11 @@ def problem_of(
     """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
-    linkage, turns, curves = None, 1, cast(tuple[Array, ...], ())
+    drive: Any = main_drive(planar.tables_of(scene)) if scene.is_planar else scene.drive
+    turns = getattr(drive, "turns", 1)
+    linkage, curves = None, cast(tuple[Array, ...], ())
     if scene.is_planar:
-        linkage, turns = planar.linkage_of(scene), turns_of(planar.tables_of(scene))
+        linkage = planar.linkage_of(scene)
     cells = partial(periodic_cells, turns=turns, interpolation=scene.numerics.interpolation)
     if linkage is not None:
         curves = _cells_of_curves(linkage, curves_of(planar.tables_of(scene)), cells)
@@ -399,6 +410,7 @@ def problem_of(
         linkage=linkage,
         curves=curves,
         chosen=scene.objective.joints,
+        from_rest=getattr(drive, "expected_speed", None) is not None,
     )
 
 

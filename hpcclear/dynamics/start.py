@@ -3,7 +3,7 @@
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.parameters import topology
+from hpcclear.dynamics.parameters import Numbers, topology
 from hpcclear.dynamics.planar.problem import start_states_of
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
@@ -23,20 +23,23 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
     if scene.is_planar:
         return start_states_of(scene, par, points)
     p = Parameters(par)
-    q, v = _minimal(scene, p)
+    speed = (
+        p.speed if scene.drive.kind != "torque" else Numbers(scene, points)("drive.initial_speed")
+    )
+    q, v = _minimal(scene, p, speed)
     first, second, free = topology(scene)
     count = len(par)
     baumgarte = scene.numerics.formulation == "baumgarte"
     if baumgarte:
         zero = np.zeros(count)
         q = [p.crank_near, zero, *q, zero, zero]
-        v = [zero, p.crank_near * p.speed, *v, zero, zero]
+        v = [zero, p.crank_near * speed, *v, zero, zero]
     elif not (first or second or scene.modes):
         q, v = [], []
     elif not (first and second):
         q, v = q[2:], v[2:]  # an ideal joint leaves the rod's angle and the slider
     if free or baumgarte:
-        q, v = [*q, np.zeros(count)], [*v, p.speed]
+        q, v = [*q, np.zeros(count)], [*v, speed]
     start = Start.at_rest(count)
     undeflected = [np.zeros(count)] * (scene.bristles + scene.modes)
     q, v = [*undeflected, *q], [*undeflected, *v]
@@ -48,9 +51,9 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
     return start
 
 
-def _minimal(scene: Scene, p: Parameters) -> tuple[list[Array], list[Array]]:
+def _minimal(scene: Scene, p: Parameters, omega: Array) -> tuple[list[Array], list[Array]]:
     """Rod x, rod y, rod angle and slider x, and their velocities."""
-    crank, length, omega = p.crank_length, p.rod_length, p.speed
+    crank, length = p.crank_length, p.rod_length
     e12, e23 = (_start_eccentricity(scene, joint) for joint in ("crank_rod", "rod_slider"))
     angle = np.arcsin((e12[1] - e23[1]) / length)
     spin = -crank * omega / (length * np.cos(angle))

@@ -1,11 +1,34 @@
 """What moves a planar linkage: drives of bodies, and loads on bodies and points."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from hpcclear.scene.fields import Count, Curve, CurveOf, MotionTable, Quantity, Table, invalid
 from hpcclear.scene.places import Angle, PairTable
+
+
+def started(drive: Any) -> None:
+    """Refuses a drive that starts from rest where nothing tells how fast it will be.
+
+    Raises
+    ------
+    PydanticCustomError
+        Naming ``expected_speed``.
+    """
+    if drive.initial_speed == 0.0 and drive.expected_speed is None:
+        raise invalid(
+            "is needed where initial_speed = 0: the tolerances and the first step go by it",
+            'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
+            key="expected_speed",
+        )
+
+
+def speed_entry(drive: Any) -> str:
+    """The entry of a drive that tells how fast it is: `speed`, or of a torque `expected_speed` or `initial_speed`."""
+    if hasattr(drive, "speed"):
+        return "speed"
+    return "initial_speed" if drive.expected_speed is None else "expected_speed"
 
 
 class PlanarSpeed(Table):
@@ -65,14 +88,21 @@ class PlanarTorque(Table):
     """That the torque turns, against the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
     """N m, constant or over a revolution of the body that gives the period."""
-    initial_speed: Annotated[float, Quantity("rad/s", above=0, why="the body has to start turning")]
-    """rad/s."""
+    initial_speed: Annotated[float, Quantity("rad/s", least=0)]
+    """rad/s; 0 starts from rest."""
+    expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
+    """About how fast it will turn, rad/s, from rest needed: tolerances and the first step go by it; else by `initial_speed`."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Inertia that turns with the body, kg m2."""
     period: bool = False
     """Whether a turn of the body is the revolution; the first drive is, where none says so."""
     turns: Annotated[int, Count(least=1, most=64)] = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
+
+    @model_validator(mode="after")
+    def _started(self) -> "PlanarTorque":
+        started(self)
+        return self
 
 
 PlanarDrive = Annotated[

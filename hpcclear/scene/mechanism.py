@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending
+from hpcclear.scene.driving import started
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -87,7 +88,7 @@ class ConstantSpeed(Table):
     """Crank speed, rad/s, counter-clockwise."""
 
     elsewhere: ClassVar = dict.fromkeys(
-        ("torque", "flywheel_inertia", "initial_speed"),
+        ("torque", "flywheel_inertia", "initial_speed", "expected_speed"),
         (
             "contradicts a prescribed crank speed",
             'Remove it, or set drive.kind = "torque" and give initial_speed instead of speed',
@@ -103,10 +104,10 @@ class TorqueDrive(Table):
     """N m, constant or ``[[crank angle, torque], ...]`` over one turn."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Inertia that turns with the crank, kg m2."""
-    initial_speed: Annotated[
-        float, Quantity("rad/s", above=0, why="the crank has to start turning")
-    ]
-    """Crank speed at the start, rad/s."""
+    initial_speed: Annotated[float, Quantity("rad/s", least=0)]
+    """Crank speed at the start, rad/s; 0 starts from rest."""
+    expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
+    """About how fast it will turn, rad/s, from rest needed: tolerances and the first step go by it; else by `initial_speed`."""
 
     elsewhere: ClassVar = {
         "speed": (
@@ -114,6 +115,11 @@ class TorqueDrive(Table):
             'Remove it and give initial_speed, or set drive.kind = "constant-speed"',
         )
     }
+
+    @model_validator(mode="after")
+    def _started(self) -> "TorqueDrive":
+        started(self)
+        return self
 
 
 Drive = Annotated[ConstantSpeed | TorqueDrive, Field(discriminator="kind")]

@@ -289,5 +289,9 @@ def names_of_points(body: PlanarBody) -> tuple[str, ...]:
 
 def turns_of(planar: Planar) -> int:
     """Turns of the driven body in a revolution."""
-    main = next((drive for drive in planar.drives if drive.period), planar.drives[0])
-    return getattr(main, "turns", 1)
+    return getattr(main_drive(planar), "turns", 1)
+
+
+def main_drive(planar: Planar) -> PlanarDrive:
+    """The drive that gives the period."""
+    return next((drive for drive in planar.drives if drive.period), planar.drives[0])

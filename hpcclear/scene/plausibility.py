@@ -6,7 +6,7 @@ Limits lie well beyond what is built, so that a warning is worth reading; each s
 import math
 from collections.abc import Iterator
 
-from hpcclear.scene.mechanism import TorqueDrive
+from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.tables import SceneTables
 
 FASTEST = 30.0
@@ -52,7 +52,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
 
 def _drive(scene: SceneTables) -> Iterator[str]:
     drive = scene.drive
-    key = "initial_speed" if isinstance(drive, TorqueDrive) else "speed"
+    key = speed_entry(drive)
     speed = float(getattr(drive, key))
     turns = speed / (2.0 * math.pi)
     mean = 4.0 * scene.slider_crank.crank.length * turns
@@ -90,7 +90,7 @@ def _rod(scene: SceneTables) -> Iterator[str]:
     rod = mechanism.rod
     if rod.bending is None:
         return
-    speed = drive.initial_speed if isinstance(drive, TorqueDrive) else drive.speed
+    speed = getattr(drive, speed_entry(drive))
     inertia = (rod.mass + mechanism.slider.mass) * mechanism.crank.length * speed**2
     buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
     if inertia > 0.5 * buckling:

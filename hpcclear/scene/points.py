@@ -83,6 +83,11 @@ def check_points(
             bounds = quantities()[path].bounds()
             reason = f"must be finite and {bounds}" if bounds else "must be finite"
             _refuse(~quantities()[path].holds(column), column, name, reason, label)
+            if path.endswith("initial_speed"):
+                usual = path.replace("initial_speed", "expected_speed")
+                reason = f"starts from rest, and {usual} is not given"
+                if usual not in scene.numeric_paths():
+                    _refuse(column == 0.0, column, name, reason, label)
     pairs = []
     if not scene.is_planar:
         reason = "the rod no longer than the crank"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.driving import PlanarTorque
+from hpcclear.scene.driving import PlanarTorque, speed_entry
 from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
@@ -105,7 +105,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
 
 
 def _drives(scene: Scene) -> Iterator[Switch]:
-    """A free crank, in whose place one turns at the speed that it starts with."""
+    """A free crank, in whose place one turns at the speed that is expected of it, or that it starts with."""
     if isinstance(scene.mechanism, Planar):
         drives = [one for one in scene.mechanism.drives if isinstance(one, PlanarTorque)]
         tables: list[tuple[str, str, PlanarTorque | TorqueDrive]] = [
@@ -116,8 +116,9 @@ def _drives(scene: Scene) -> Iterator[Switch]:
     for whose, key, drive in tables:
         kept = {name: plain(drive).get(name) for name in ("body", "period", "turns")}
         table = {name: value for name, value in kept.items() if value is not None}
-        table |= {"kind": "constant-speed", "speed": drive.initial_speed}
-        moved = {f"{key}.initial_speed": f"{key}.speed"}
+        entry = speed_entry(drive)
+        table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
+        moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
 
 

@@ -255,10 +255,10 @@ def try_step(effects, motion, block, m, tables, settings, n):
 
 
 @lane_function
-def judge_end(effects, work, stages, m, settings, n):
+def judge_end(effects, block, m, settings, n):
     """What an accepted step shows of contacts, turns and integrals; it may yet be cut. Returns OK or why the lane ends."""
     status = OK
-    rules = effects.rules
+    rules, work, stages = effects.rules, block.work, block.stages
     if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
         status = failure(0, 1, n, work, stages, settings)
     if status == OK and work[at.ACCEPT] == 1.0:
@@ -266,7 +266,7 @@ def judge_end(effects, work, stages, m, settings, n):
         quadratures(effects, work, m)
         stop_at_contacts(rules, work, m, settings)
         if work[at.ACCEPT] == 1.0 and rules.free:
-            status = stop_free_crank(0, 1, work, settings, n - 1)
+            status = stop_free_crank(0, 1, block, settings, n - 1)
         if work[at.ACCEPT] == 1.0:
             for p in range(rules.begin, rules.end):
                 integrate_gap(0, 1, work, p)
@@ -293,7 +293,7 @@ def advance(n, rules, block, queue, method, record, m, budget):
     while budget > 0 and work[at.RUNNING] > 0.0 and not full:
         budget -= 1
         try_step(effects, method.numbers[MOTION_OF_EIGHT], block, m, tables, settings, n)
-        status = judge_end(effects, work, stages, m, settings, n)
+        status = judge_end(effects, block, m, settings, n)
         goes_on = status == OK
         if goes_on and work[at.ACCEPT] == 1.0:
             record_nodes(record, counters, work, m, book, n)

@@ -191,8 +191,9 @@ def _numbers(m: Mechanism) -> None:
                 raise InputError(
                     f"{key}.{entry}", getattr(one, entry), "must be above 0", "Write its size"
                 )
+        expected = getattr(one, "expected_speed", None)
         for entry in ("speed", "initial_speed", "amplitude"):
-            if getattr(one, entry, 1.0) == 0:
+            if getattr(one, entry, 1.0) == 0 and expected is None:
                 raise InputError(
                     f"{key}.{entry}", 0.0, "nothing would turn", "Write a speed or amplitude"
                 )

@@ -182,12 +182,18 @@ class TorqueDrive:
     table: bool = False
     period: bool = False
     turns: int = 1
+    expected_speed: float | None = None
     prescribed: ClassVar[bool] = False
 
     @property
+    def usual_speed(self) -> float:
+        """About how fast it turns, rad/s: what is expected, or else what it starts with."""
+        return self.initial_speed if self.expected_speed is None else self.expected_speed
+
+    @property
     def seconds(self) -> float:
-        """One revolution of as many turns at the initial speed, s."""
-        return 2 * math.pi * self.turns / abs(self.initial_speed)
+        """One revolution of as many turns at the usual speed, s."""
+        return 2 * math.pi * self.turns / abs(self.usual_speed)
 
 
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive

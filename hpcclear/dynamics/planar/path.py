@@ -120,7 +120,7 @@ def without_play(mechanism: Mechanism) -> Mechanism:
         return joint
 
     drives = tuple(
-        ConstantSpeed(d.name, d.body, d.initial_speed, d.period, d.turns)
+        ConstantSpeed(d.name, d.body, d.usual_speed, d.period, d.turns)
         if isinstance(d, TorqueDrive)
         else d
         for d in mechanism.drives

@@ -142,7 +142,7 @@ def period_of(mechanism: Any) -> Any:
         return drive.seconds
     if isinstance(drive, Harmonic):
         return 1.0 / drive.frequency
-    speed = drive.initial_speed if isinstance(drive, TorqueDrive) else drive.speed
+    speed = drive.usual_speed if isinstance(drive, TorqueDrive) else drive.speed
     return at.TURN * drive.turns / np.abs(speed)
 
 

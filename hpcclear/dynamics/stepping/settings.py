@@ -23,8 +23,9 @@ from hpcclear.dynamics import layout as at
     CYCLE,  # rad, by which the driven body turns in a revolution
     PARAMETER_ROWS,  # how many parameters a sample has
     PROFILED,  # how many rates of profiles of wear there are to integrate
+    AT_REST,  # rad, within which a crank that starts from rest may turn back
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
-) = range(17)
+) = range(18)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 

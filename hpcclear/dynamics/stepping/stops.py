@@ -4,10 +4,19 @@ from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.events import absolute_integral, impact_fraction, root
-from hpcclear.dynamics.stepping.settings import ANGLE_TOLERANCE, CYCLE, GAP_TOLERANCE, IMPACT_FLOOR
+from hpcclear.dynamics.stepping.settings import (
+    ANGLE_TOLERANCE,
+    AT_REST,
+    CYCLE,
+    GAP_TOLERANCE,
+    IMPACT_FLOOR,
+)
 
 OK = int(Status.OK)
 STALLED = int(Status.STALLED)
+
+LONG_AT_REST = 1e3
+"""Periods after which a body that starts from rest and does not turn has stalled."""
 
 KINK_REACH = 1e-3
 """Part of a step that a kink of the force may stand from either end: its effect falls with the 2.5th power."""
@@ -126,10 +135,19 @@ def integrate_gap(lane, W, work, p):
 
 
 @lane_event
-def stop_free_crank(lane, W, work, settings, last):
-    """End a step where a free crank has made its turn. Returns OK or STALLED."""
+def stop_free_crank(lane, W, block, settings, last):
+    """End a step where a free crank has made its turn. Returns OK or STALLED.
+
+    One that starts from rest may be thrown back by the first impacts, so there it stalls only away from its start, or
+    after `LONG_AT_REST` periods.
+    """
+    work = block.work
     if work[(at.VS + last) * W + lane] <= 0.0:
-        return STALLED
+        starting = block.book[at.REVOLUTION * W + lane] == 0.0
+        starting &= work[at.TIME * W + lane] < LONG_AT_REST * block.par[at.PERIOD * W + lane]
+        margin = settings[AT_REST] if starting else 0.0
+        if abs(work[(at.QS + last) * W + lane]) >= margin:
+            return STALLED
     beyond = work[(at.QS + last) * W + lane] - settings[CYCLE]
     tolerance = settings[ANGLE_TOLERANCE]
     work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0

@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.report.figures import labels, linkage_sketch, style
 from hpcclear.report.figures.linkage_sketch import arrow, word
 from hpcclear.scene import Scene
-from hpcclear.scene.mechanism import ClearanceJoint, Link
+from hpcclear.scene.mechanism import ClearanceJoint, Link, TorqueDrive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,15 +144,19 @@ def _key(scene: Scene) -> list[str]:
         else:
             lines.append(f"{label}, {name}: ideal, no play")
     drive = scene.drive
-    speed = drive.speed if drive.kind == "constant-speed" else drive.initial_speed
-    turns = f"{60.0 * speed / (2.0 * np.pi):.5g} rpm"
-    free = drive.kind == "torque"
-    lines.append(f"crank: {turns} at the start, torque M" if free else f"crank: {turns}, held")
+    if isinstance(drive, TorqueDrive):
+        lines.append(f"crank: {_rpm(drive.initial_speed)} at the start, torque M")
+    else:
+        lines.append(f"crank: {_rpm(drive.speed)}, held")
     if effects.slider_load is not None:
         lines.append(f"F on the slider, along x: {_range(effects.slider_load)}")
     if effects.gravity > 0.0:
         lines.append(f"gravity {effects.gravity:g} m/s², towards -y")
     return lines
+
+
+def _rpm(speed: float) -> str:
+    return f"{60.0 * speed / (2.0 * np.pi):.5g} rpm" if speed else "at rest"
 
 
 def _range(curve: Any) -> str:
