@@ -157,7 +157,7 @@ def closed_form(scene: Scene) -> Run:
 
 
 def uncertainty(scene: Scene) -> float:
-    """Scatter of f over kicked and stricter copies, m."""
+    """How far f may be off, by kicked and stricter copies, m."""
     asked = scene.with_({"numerics.uncertainty": True})
     return float(evaluate_records(asked, NOTHING, lanes=1)["objective_uncertainty"][0])
 
@@ -165,7 +165,7 @@ def uncertainty(scene: Scene) -> float:
 VARIABLES = {
     "objective": ("objective f", "m"),
     "objective_spread": ("standard deviation of f between revolutions", "m"),
-    "objective_uncertainty": ("scatter of f over kicked and stricter copies", "m"),
+    "objective_uncertainty": ("how far f may be off, by kicked and stricter copies", "m"),
     "off_reference": ("f over f at rtol 1e-10, less 1", "1"),
     "energy_residual": ("largest energy residual over max(kinetic energy, driving work)", "1"),
     "rhs_evaluations": ("force evaluations a revolution", "1"),

@@ -106,18 +106,24 @@ def test_a_linkage_starts_from_rest_like_the_slider_crank():
 def test_a_variable_may_go_down_to_rest_where_a_speed_is_expected():
     points = Points(("w",), np.array([[0.0], [50.0]]), (("drive.initial_speed",),))
     moving = from_rest(initial_speed=40.0, expected_speed=None, flywheel_inertia=1e-2)
-    with pytest.raises(InputError, match="starts from rest, and drive.expected_speed is not given"):
+    with pytest.raises(
+        InputError, match=r"starts from rest, and drive\.expected_speed is not given"
+    ):
         check_points(moving, points)
     expecting = from_rest(initial_speed=40.0, flywheel_inertia=1e-2)
     check_points(expecting, points)
     found = evaluate_records(expecting, points)["objective"]
     for row, speed in enumerate((0.0, 50.0)):
         alone = from_rest(initial_speed=speed, flywheel_inertia=1e-2)
-        assert found[row] == evaluate_records(alone, Points((), np.empty((1, 0)), ()))["objective"][0]
+        assert (
+            found[row] == evaluate_records(alone, Points((), np.empty((1, 0)), ()))["objective"][0]
+        )
 
 
 def test_a_drive_of_constant_speed_in_its_place_turns_as_fast_as_expected():
-    scene = load_scene(SCENE, ['drive={kind="torque", torque=1.0, initial_speed=0, expected_speed=90}'])
+    scene = load_scene(
+        SCENE, ['drive={kind="torque", torque=1.0, initial_speed=0, expected_speed=90}']
+    )
     drive = next(one for one in switches(scene) if one.name == "speed fluctuation")
     assert Off(scene, [drive]).scene.drive.speed == 90.0
     assert Off(scene, [drive]).paths(("drive.expected_speed",)) == ("drive.speed",)

@@ -219,7 +219,10 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
         rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
     if np.isfinite(uncertainty := float(response["objective_uncertainty"])):
         rows.append(
-            ("its uncertainty", f"{quantity(uncertainty, unit, 2)}: so far kicked copies differ")
+            (
+                "its uncertainty",
+                f"{quantity(uncertainty, unit, 2)}: so far stricter, kicked copies are off",
+            )
         )
     rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
     for k, joint in enumerate(response["joint"].to_numpy()):

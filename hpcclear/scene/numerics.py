@@ -48,7 +48,7 @@ class Numerics(Table):
     """Accepted and rejected steps of one sample together; beyond it the sample ends with status
     STEP_CAP."""
     uncertainty: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also reports the scatter of its objective under kicks of 1e-10."""
+    """Whether each sample also reports how far its objective may be off, by copies of tighter tolerance, kicked by 1e-10."""
     energy: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also closes its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False
