@@ -332,6 +332,8 @@ def test_text_stands_out_in_both_schemes(
     assert (max(map(int, re.findall(r"\d+", back)[:3])) < 60) == dark
     ratio, where = browser.run(_CONTRAST)
     assert ratio >= 4.5, where  # WCAG AA
+    figure = browser.run("return getComputedStyle(document.querySelector('figure img')).filter;")
+    assert ("invert" in figure) == dark  # figures are drawn on white
 
 
 @pytest.mark.full
