@@ -1,6 +1,7 @@
 """Response surfaces and accuracy measures against closed forms, refits and simulation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,9 +19,11 @@ from hpcclear.statistics.surrogate.response_surface import (
     n_terms,
 )
 from hpcclear.statistics.surrogate.surface_search import (
+    Search,
     SearchSettings,
     SurfaceSearch,
     fit_until_accepted,
+    search,
 )
 
 MASSES = np.array([[0.105, 0.42], [0.07, 0.28]])  # kg, m2 and m3 of the paper
@@ -54,7 +57,10 @@ def search_for(
     rng: np.random.Generator,
     **settings: object,
 ) -> SurfaceSearch:
-    return fit_until_accepted(function, bounds, rng, SearchSettings(**settings))  # type: ignore[arg-type]
+    asking = search(bounds, rng, SearchSettings(**settings))  # type: ignore[arg-type]
+    return fit_until_accepted(lambda asked: {k: function(at) for k, at in asked.items()}, [asking])[
+        0
+    ]
 
 
 def sample(n: int, bounds: np.ndarray, seed: int) -> np.ndarray:
@@ -393,3 +399,32 @@ def test_search_repeats_bit_for_bit() -> None:
     one, two = (search_for(f, BOX, np.random.default_rng(0)) for _ in range(2))
     np.testing.assert_array_equal(one.surface.coefficients, two.surface.coefficients)
     assert one.accuracy == two.accuracy
+
+
+def test_searches_side_by_side_find_what_each_finds_alone() -> None:
+    """One passes at once, one needs more points, one never does; each is asked for no longer than it takes."""
+    waves = [0.0, 16.0, 400.0]
+    settings = SearchSettings(n_points=20, n_test=30, max_points=80, r2_min=0.999, rmae_max=0.1)
+    rounds: list[tuple[int, ...]] = []
+
+    def truth(wave: float, x: np.ndarray) -> np.ndarray:
+        return np.asarray(cubic(x) + 1e-4 * np.sin(wave * x[:, 0]) * (wave > 0.0))
+
+    def searches() -> list[Search]:
+        return [search(MASSES, np.random.default_rng(seed), settings) for seed in range(len(waves))]
+
+    def evaluate(asked: Mapping[int, np.ndarray]) -> dict[int, np.ndarray]:
+        rounds.append(tuple(asked))
+        return {k: truth(waves[k], at) for k, at in asked.items()}
+
+    together = fit_until_accepted(evaluate, searches())
+    assert rounds[0] == (0, 1, 2)
+    assert rounds[-1] == (2,)
+    for k, one in enumerate(searches()):
+        wave = waves[k]
+        alone = fit_until_accepted(partial(lambda w, asked: {0: truth(w, asked[0])}, wave), [one])[
+            0
+        ]
+        assert alone.attempts == together[k].attempts
+        assert alone.accepted == together[k].accepted == (k < 2)
+        assert alone.accuracy == together[k].accuracy

@@ -46,6 +46,12 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     }
 
 
+_COMPILED: list[Mapping[str, Any]] = []
+"""Payloads whose evaluators were made in this process before: small stages need not wait for ranks to meet again."""
+
+_MOST_COMPILED = 8
+
+
 class Judge:
     """A rank's worker: an evaluator whose records hold the objective that was asked for; see `ranks.schedule.Worker`."""
 
@@ -74,7 +80,12 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
     columns = Points(payload["names"], nothing, payload["paths"])
     scene = load_scene(payload["scene"])
     evaluator = evaluator_of(scene, columns, payload["lanes"])
-    return Judge(first_compiled(evaluator, ranks), scene.objective_named(payload["objective"]))
+    if (
+        payload not in _COMPILED
+    ):  # all ranks have seen the same ones, so all wait for each other or none does
+        first_compiled(evaluator, ranks)
+        _COMPILED[:] = [*_COMPILED[1 - _MOST_COMPILED :], payload]
+    return Judge(evaluator, scene.objective_named(payload["objective"]))
 
 
 def first_compiled(worker: Compiled, ranks: Ranks) -> Compiled:
@@ -147,9 +158,7 @@ def sample_points(
     task = Task(stage, maker or make_evaluator, payload_of(scene, points))
     if checkpoint is None:
         return ranks.run_points(task, points.values, progress=progress)
-    completed = checkpoint.completed()
-    inside = (completed["sample"] >= first) & (completed["sample"] < first + len(points))
-    completed = completed[inside]
+    completed = checkpoint.completed(first, len(points))
     completed["sample"] -= first
 
     def take(records: np.ndarray) -> None:

@@ -229,14 +229,19 @@ class Checkpoint:
             self._merge()
         self._written = self._clock()
 
-    def completed(self) -> np.ndarray:
-        """All samples on disk and in memory, by growing number, each once; shape (n,)."""
-        return self.contents()[0]
+    def completed(self, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Samples on disk and in memory, by growing number, each once; shape (n,): all, or those of `count` from `first` on."""
+        return self.contents(first, count)[0]
 
-    def contents(self) -> tuple[np.ndarray, np.ndarray]:
+    def contents(self, first: int = 0, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
+        last = np.inf if count is None else first + count
         pieces = [self._held(part) for part in self._parts] + self._buffer
-        return _join([records for records, _ in pieces], [values for _, values in pieces])
+        rows = [(r["sample"] >= first) & (r["sample"] < last) for r, _ in pieces]
+        records, values = (
+            [piece[k][inside] for piece, inside in zip(pieces, rows, strict=True)] for k in (0, 1)
+        )
+        return _join(records, values)
 
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
         records, values = _join([records], [values])

@@ -112,7 +112,7 @@ class StudyRun:
 
     def _has_samples(self, count: int) -> bool:
         """Whether the samples that a kept stage stands on are there; a file of them may be damaged."""
-        return np.count_nonzero(self.checkpoint.completed()["sample"] < count) == count
+        return len(self.checkpoint.completed(0, count)) == count
 
     def write(
         self, content: xr.Dataset, name: str, attributes: Mapping[str, str] | None = None

@@ -1,6 +1,6 @@
 """Response surfaces, first-order sensitivities against clearance, and global indices."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -22,7 +22,12 @@ from hpcclear.statistics.sensitivity import (
 )
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
-from hpcclear.statistics.surrogate.surface_search import SearchSettings, fit_until_accepted
+from hpcclear.statistics.surrogate.surface_search import (
+    SearchSettings,
+    SurfaceSearch,
+    fit_until_accepted,
+    search,
+)
 from hpcclear.study.run import Result, StudyRun
 
 STAGE = "sensitivity"
@@ -69,14 +74,19 @@ def analyse(run: StudyRun) -> Result:
     sobol = _sobol_points(run)
     if len(sobol):
         batches.append(run.simulations.designs(run.study.names, sobol).values)
-    points = run.simulations.filled(run.study.names, np.concatenate(batches))
-    values = run.simulations.objective(run.simulations.records(points, STAGE))
-    parts = np.split(values, np.cumsum([len(batch) for batch in batches])[:-1])
+    parts = _simulated(run, batches)
     result = _first_order(run, inputs, designs, parts)
     result |= _accepted(run, inputs, designs, parts)
     result |= _global(run, parts[-1] if len(sobol) else None)
-    result["failed"] = np.asarray(np.count_nonzero(np.isnan(values)))
+    result["failed"] = np.asarray(sum(np.count_nonzero(np.isnan(part)) for part in parts))
     return result
+
+
+def _simulated(run: StudyRun, batches: Sequence[Array]) -> list[Array]:
+    """Objectives of designs in all study variables, (n, d) each, at once."""
+    points = run.simulations.filled(run.study.names, np.concatenate(batches))
+    values = run.simulations.objective(run.simulations.records(points, STAGE))
+    return np.split(values, np.cumsum([len(batch) for batch in batches])[:-1])
 
 
 def write(run: StudyRun, result: Result) -> None:
@@ -226,8 +236,15 @@ def _accepted(
     }
     result |= {name: np.zeros(shape, np.int64) for name in ("surface_order", "surface_points")}
     result["surface_accepted"] = np.zeros(shape, np.int8)
-    for k, c in np.ndindex(*shape):
-        reached, order, count, accepted = _surface(run, inputs[k], designs[k], values[k], c)
+    made = {
+        (k, c): _surface(run, len(inputs[k]), designs[k], values[k], c)
+        for k, c in np.ndindex(*shape)
+    }
+    if run.study.sensitivity.resamplings > 0:
+        refused = [place for place, one in made.items() if not one[3]]
+        for place, one in zip(refused, _searched(run, inputs, designs, refused), strict=True):
+            made[place] = one.accuracy, one.surface.order, one.surface.n_points, one.accepted
+    for (k, c), (reached, order, count, accepted) in made.items():
         if reached is not None:
             result["surface_r2"][k, c], result["surface_rmae"][k, c] = reached.r2, reached.rmae
             result["surface_r2_explained"][k, c] = reached.r2_explained
@@ -238,9 +255,9 @@ def _accepted(
 
 
 def _surface(
-    run: StudyRun, names: Sequence[str], design: IntervalDesign, values: Array, level: int
+    run: StudyRun, variables: int, design: IntervalDesign, values: Array, level: int
 ) -> tuple[Accuracy | None, int, int, bool]:
-    """Accuracy, order and points of a surface, and whether it was accepted."""
+    """Accuracy, order and points of a surface of so many variables, and whether it was accepted."""
     settings, laid_out = run.study.sensitivity, design.settings
     size = laid_out.n_points + laid_out.n_test
     rows = slice(level * size, (level + 1) * size)
@@ -248,34 +265,45 @@ def _surface(
     bounds, cut = design.intervals[0], laid_out.n_points
     finite = np.isfinite(outcomes)
     reached, count = None, int(finite[:cut].sum())
-    if count >= n_terms(len(names), laid_out.order) and finite[cut:].sum() >= 2:
+    if count >= n_terms(variables, laid_out.order) and finite[cut:].sum() >= 2:
         surface = fit_response_surface(points[:cut], outcomes[:cut], bounds, laid_out.order)
         reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
         if reached.meets(settings.r2, settings.rmae):
             return reached, laid_out.order, count, True
-    if settings.resamplings == 0:
-        return reached, laid_out.order, count, False
-    clearance = design.clearances[level]
+    return reached, laid_out.order, count, False
 
-    def evaluate(at: Array) -> Array:
-        column = np.full(len(at), clearance)
-        where = np.column_stack([at, column])
-        return run.simulations.values((*names, parameter(run)), where, STAGE)
 
-    search = fit_until_accepted(
-        evaluate,
-        bounds,
-        run.rng("surface", " ".join(names), str(level)),
-        SearchSettings(
+def _searched(
+    run: StudyRun,
+    inputs: Sequence[Sequence[str]],
+    designs: Sequence[IntervalDesign],
+    places: Sequence[tuple[int, int]],
+) -> list[SurfaceSearch]:
+    """More points or another order for the surfaces at these places, (surface, level), all in the same batches."""
+    settings = run.study.sensitivity
+    searches = []
+    for k, level in places:
+        laid_out = designs[k].settings
+        tried = SearchSettings(
             orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
-            n_points=2 * cut,
+            n_points=2 * laid_out.n_points,
             n_test=max(laid_out.n_test, 20),
-            max_points=cut * 2**settings.resamplings,
+            max_points=laid_out.n_points * 2**settings.resamplings,
             r2_min=settings.r2,
             rmae_max=settings.rmae,
-        ),
-    )
-    return search.accuracy, search.surface.order, search.surface.n_points, search.accepted
+        )
+        rng = run.rng("surface", " ".join(inputs[k]), str(level))
+        searches.append(search(designs[k].intervals[0], rng, tried))
+
+    def evaluate(asked: Mapping[int, Array]) -> dict[int, Array]:
+        batches = []
+        for number, at in asked.items():
+            k, level = places[number]
+            where = np.column_stack([at, np.full(len(at), designs[k].clearances[level])])
+            batches.append(run.simulations.designs((*inputs[k], parameter(run)), where).values)
+        return dict(zip(asked, _simulated(run, batches), strict=True))
+
+    return fit_until_accepted(evaluate, searches)
 
 
 def _sobol_points(run: StudyRun) -> Array:

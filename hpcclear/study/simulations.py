@@ -116,7 +116,7 @@ class Simulations:
             first=self.next,
         )
         with self._ranks.writing():  # a long fit may follow
-            self._checkpoint.flush()
+            self._checkpoint.flush_when_due()
         self.next += len(points)
         _refuse_if_all_failed(records, stage)
         return records

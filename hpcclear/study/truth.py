@@ -31,8 +31,10 @@ def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verifi
     return run.simulations.filled(points.names, points.values)
 
 
-def _scattered(run: StudyRun, choice: Choice, count: int, purpose: str, first: int) -> Points:
-    """The points from `first` on of all scramblings of a design, one scrambling after the other."""
+def scattered(
+    run: StudyRun, choice: Choice, count: int, purpose: str = "verification", first: int = 0
+) -> Points:
+    """The points from `first` on of all scramblings of a design, `count` of each, one scrambling after the other."""
     made = [_of_design(run, choice, count, purpose, first, k) for k in range(SCRAMBLINGS)]
     return run.simulations.filled(made[0].names, np.concatenate([one.values for one in made]))
 
@@ -75,10 +77,15 @@ def simulate(
     return sequences(run, choices, stage, purpose, first_length(settings), settings.most_samples)
 
 
+def scrambled_length(simulations: int) -> int:
+    """Points of each scrambling that so many simulations make at most: a power of two."""
+    return 2 ** int(np.log2(max(simulations // SCRAMBLINGS, 1)))
+
+
 def first_length(settings: Verification) -> int:
     """Points of each scrambling from which accuracy is judged: a power of two."""
     least = FIRST if settings.least_samples is None else settings.least_samples
-    return 2 ** int(np.log2(min(least, settings.most_samples) // SCRAMBLINGS))
+    return scrambled_length(min(least, settings.most_samples))
 
 
 def expected(settings: Verification) -> int:
@@ -122,7 +129,7 @@ def _values(
         batches = [samples_of(run, choice, count, purpose) for choice in choices]
         shape = (2, count, 1)
     else:
-        batches = [_scattered(run, choice, count, purpose, first) for choice in choices]
+        batches = [scattered(run, choice, count, purpose, first) for choice in choices]
         shape = (2, SCRAMBLINGS, count)
     values = np.concatenate([batch.values for batch in batches])
     records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)

@@ -1,6 +1,6 @@
 """The search for a response surface that is accurate enough (section 4.2, step 1)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import (
-    Evaluate,
     ResponseSurface,
     Sampler,
     check_bounds,
@@ -34,7 +33,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class SurfaceSearch:
-    """Outcome of `fit_until_accepted`.
+    """Outcome of a `search`.
 
     Attributes
     ----------
@@ -79,13 +78,45 @@ class SearchSettings:
     rmae_max: float = 0.5
 
 
+Search = Generator[Array, Array, SurfaceSearch]
+"""A search under way: yields points, shape (n, d), and is sent the true function there, (n,)."""
+
+
 def fit_until_accepted(
-    evaluate: Evaluate,
+    evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]], searches: Sequence[Search]
+) -> list[SurfaceSearch]:
+    """Carry out searches side by side: what all of them ask for is evaluated at once, round by round.
+
+    Parameters
+    ----------
+    evaluate : callable
+        From points by number of the search to values.
+    searches : sequence of `search`
+
+    Raises
+    ------
+    InputError
+        As `search`.
+    """
+    found: dict[int, SurfaceSearch] = {}
+    asked = {number: next(one) for number, one in enumerate(searches)}
+    while asked:
+        values, more = evaluate(asked), {}
+        for number in asked:
+            try:
+                more[number] = searches[number].send(values[number])
+            except StopIteration as ended:
+                found[number] = ended.value
+        asked = more
+    return [found[number] for number in range(len(searches))]
+
+
+def search(
     bounds: ArrayLike,
     rng: np.random.Generator,
     settings: SearchSettings,
     sample: Sampler = latin_hypercube,
-) -> SurfaceSearch:
+) -> Search:
     """Raise the sample or change the order until a surface passes, or say that none does.
 
     At each sample size the orders are tried as listed and the first that passes is taken (section
@@ -95,8 +126,6 @@ def fit_until_accepted(
 
     Parameters
     ----------
-    evaluate : callable
-        True function, (n, d) -> (n,).
     bounds : array_like, shape (d, 2)
     rng : numpy.random.Generator
     settings : SearchSettings
@@ -116,10 +145,15 @@ def fit_until_accepted(
     _check_search(settings)
     orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
     test = sample(settings.n_test, limits, rng)
-    true = _test_values(evaluate(test))
+    true = _test_values((yield test))
     attempts: list[Attempt] = []
     best: tuple[ResponseSurface, Accuracy] | None = None
-    for points, values in _growing_sample(evaluate, sample, limits, rng, settings):
+    points, values = np.empty((0, len(limits))), np.empty(0)
+    while len(points) < settings.max_points:
+        # doubled each time by new points
+        more = min(len(points) or settings.n_points, settings.max_points - len(points))
+        fresh = sample(more, limits, rng)
+        points, values = np.vstack([points, fresh]), np.append(values, (yield fresh))
         for order in orders:
             try:
                 surface = fit_response_surface(points, values, limits, order)
@@ -158,23 +192,6 @@ def _test_values(values: Array) -> Array:
             "take more test points or mend the failing simulations",
         )
     return values
-
-
-def _growing_sample(
-    evaluate: Evaluate,
-    sample: Sampler,
-    bounds: Array,
-    rng: np.random.Generator,
-    settings: SearchSettings,
-) -> Iterator[tuple[Array, Array]]:
-    """The training sample, doubled each time by new points and never past `max_points`."""
-    points = sample(settings.n_points, bounds, rng)
-    values = evaluate(points)
-    yield points, values
-    while len(points) < settings.max_points:
-        more = sample(min(len(points), settings.max_points - len(points)), bounds, rng)
-        points, values = np.vstack([points, more]), np.append(values, evaluate(more))
-        yield points, values
 
 
 def _check_search(settings: SearchSettings) -> None:

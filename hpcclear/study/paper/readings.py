@@ -20,12 +20,13 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.statistics.random.replicates import moments
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper.printed import printed_designs, printed_moments
 from hpcclear.study.paper.recognition import own_names
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.truth import samples_of
+from hpcclear.study.truth import samples_of, scattered, scrambled_length
 
 STAGE = "readings"
 OTHER_RESTITUTION = 0.46
@@ -74,7 +75,7 @@ def simulations(scene: Scene) -> tuple[int, int]:
         return 0, 0
     designs, made = len(printed_designs(scene)), readings(scene)
     over_steps = sum(reading.over_steps for reading in made)
-    each = scene.required_study.verification.audit_samples + 1
+    each = SCRAMBLINGS * scrambled_length(scene.required_study.verification.audit_samples) + 1
     return designs * each * (len(made) - over_steps), designs * (STEP_SAMPLES + 1) * over_steps
 
 
@@ -130,9 +131,9 @@ def _over_time(
     run: StudyRun, reading: Reading, designs: Sequence[Choice]
 ) -> list[tuple[float, ...]]:
     """All designs as one batch, each with its samples and, last, itself at the smallest gap."""
-    count = run.study.verification.audit_samples
+    length = scrambled_length(run.study.verification.audit_samples)
     batches = [
-        batch for one in designs for batch in (samples_of(run, one, count), _smallest(run, one))
+        batch for one in designs for batch in (scattered(run, one, length), _smallest(run, one))
     ]
     points = Points(
         batches[0].names, np.vstack([batch.values for batch in batches]), batches[0].paths
@@ -146,7 +147,10 @@ def _over_time(
         stage=f"{STAGE}: simulations",
     )
     f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
-    return [(*_moments(part[:count]), float(part[count])) for part in f.reshape(len(designs), -1)]
+    return [
+        (*_moments(part[:-1].reshape(SCRAMBLINGS, length)), float(part[-1]))
+        for part in f.reshape(len(designs), -1)
+    ]
 
 
 def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float, ...]:
@@ -156,12 +160,12 @@ def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float,
         _mean_over_steps(run, scene, sampled.names, row)
         for row in np.vstack([sampled.values, _smallest(run, choice).values])
     ]
-    return (*_moments(np.array(values[:-1])), values[-1])
+    return (*_moments(np.array(values[:-1])[:, None]), values[-1])
 
 
 def _moments(values: Array) -> tuple[float, ...]:
-    """`_COLUMNS` of independent draws."""
-    mean, deviation = moments(values[:, None])
+    """`_COLUMNS` of replicates (r, values): scramblings, or independent draws."""
+    mean, deviation = moments(values)
     failed = int(np.isnan(values).sum())
     return mean.value, mean.error, deviation.value, deviation.error, failed
 
