@@ -33,6 +33,7 @@ from hpcclear.study import (
     paper,
     responses,
     run_study,
+    sensitivities,
     surrogates,
 )
 from hpcclear.study.paper import claims, readings
@@ -320,6 +321,17 @@ def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monk
 
 def _interrupt(checkpoint: Checkpoint) -> None:
     raise KeyboardInterrupt
+
+
+def test_a_run_stopped_amid_fits_has_its_samples_on_disk(tmp_path, monkeypatch):
+    def stopped(*_):
+        raise Stopped("test")
+
+    monkeypatch.setattr(sensitivities, "_first_order", stopped)
+    with pytest.raises(Stopped):
+        run_study(scene_of(), tmp_path / "out", alone(), progress_style="quiet")
+    parts = [dataset.read(path) for path in (tmp_path / "out" / "checkpoint").glob("part-*.nc")]
+    assert sum(part.sizes["sample"] for part in parts) > 100
 
 
 def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):

@@ -29,6 +29,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import Options, Place, Session
+from hpcclear.ensemble.simulate import saving
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -131,7 +132,8 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     simulations = Simulations(known, session.ranks, checkpoint, style)
     directory = session.place.output
     run = StudyRun(known, directory, session.ranks, checkpoint, simulations, session.tell, announce)
-    _tell_the_story(run, scene)
+    with saving(checkpoint.flush):  # samples of small stages wait for the next save
+        _tell_the_story(run, scene)
     return run.times
 
 
