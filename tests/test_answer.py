@@ -130,19 +130,32 @@ def test_what_is_as_good_says_from_where_to_where():
 
 def test_the_ends_of_a_front_stand_beside_the_original():
     content = verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN))
-    ((case, rows),) = beside_original(content)  # "calm" has no original
+    ((case, designs, rows),) = beside_original(content)  # "calm" has no original
     assert case == "robust"
+    assert designs == ("original", "alpha (to take)", "beta")
     assert rows[0] == ("mean", "0.4 mm ±0.25%", "0.2 mm ±0.50% -50%", "0.3 mm ±0.33% -25%")
     assert rows[1][2] == "40 µm ±2.50% -33%"
     assert rows[2] == ("95 % below", "0.8 mm", "0.4 mm -50%", "0.6 mm -25%")
     assert rows[3] == ("held at", "", "m2 lower", "none of its variables")
 
 
+def test_the_design_to_take_stands_in_its_table_whichever_it_is():
+    mean = [4e-4, 2e-4, 3e-4, 1.9e-4, 1e-4]
+    ((_, designs, rows),) = beside_original(verified(mean, DEVIATION))
+    assert designs == ("original", "alpha", "beta", "front 1 (to take)")
+    assert rows[0][4] == "0.19 mm ±0.53% -52%"
+    assert {len(row) for row in rows} == {5}
+    nothing = verified(np.full(5, np.nan), np.full(5, np.nan))
+    ((_, designs, rows),) = beside_original(nothing)
+    assert designs == ("original", "alpha", "beta")
+    assert rows[0][1:] == ("not known",) * 3
+
+
 def test_limits_that_are_not_known_are_no_numbers():
     half = np.array(MEAN)
     limits = {"percentile_lower": 1.9 * half, "percentile_upper": np.full(len(half), np.nan)}
     content = verified(MEAN, DEVIATION, percentile=2.0 * half, **limits)
-    ((_, rows),) = beside_original(content)
+    ((_, _, rows),) = beside_original(content)
     assert rows[2][1:3] == ("0.8 mm, limits not known", "0.4 mm, limits not known -50%")
 
 

@@ -312,7 +312,7 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
         "least share with f above 0.0003 m of" in dict(lines)["why"]
     )  # the case with most random inputs
     assert "least mean" not in dict(lines)["why"]
-    tables = dict(beside_original(found))
+    tables = {case: lines for case, _, lines in beside_original(found)}
     assert [line[0] for line in tables["heavy"]] == [
         "mean",
         "deviation",

@@ -15,7 +15,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
-from hpcclear.report.answer import ENDS, answer, beside_original
+from hpcclear.report.answer import answer, beside_original
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -305,12 +305,12 @@ def describe_study(place: Path) -> None:
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
-    for case, rows in beside_original(found["verification"]):
+    for case, designs, rows in beside_original(found["verification"]):
         beside = Table(
             title=f"Case {case}, directly simulated, against the original",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
-        for header in ("", *ENDS):
+        for header in ("", *designs):
             beside.add_column(header)
         for row in rows:
             beside.add_row(*(fitting(text) for text in row))

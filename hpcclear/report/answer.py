@@ -53,7 +53,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     if verified is None or not np.isfinite(verified["mean_true"]).any():
         return []
     ours = _ours(verified)
-    best = ours.isel(design=int(_judged(ours).argmin()))
+    best = _best(ours)
     original = _original(ours)
     scatter = _scatter(files, best)
     return [
@@ -87,13 +87,20 @@ _TOLD = {
 """Lines of the table of a case, and the variables they show."""
 
 
-def beside_original(verified: xr.Dataset) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
-    """Each case, and lines of a table: what it is, and its value for each of `ENDS`, with limits and against the original."""
+def beside_original(
+    verified: xr.Dataset,
+) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """Each case, the designs of its table, and its lines: what it is, and its value for each, with limits and against the
+    original. The designs are `ENDS`, and the one to take where it is another one."""
+    known = bool(np.isfinite(verified["mean_true"]).any())
+    best = str(_best(_ours(verified))["design"].item()) if known else ""
     names = [str(name) for name in verified["design"].to_numpy()]
     for case in [name.removesuffix(" original") for name in names if name.endswith(" original")]:
         if not {f"{case} {end}" for end in ENDS} <= set(names):
             continue
-        designs = [verified.sel(design=f"{case} {end}") for end in ENDS]
+        own = best.removeprefix(f"{case} ")
+        headers = ENDS if own == best or own in ENDS else (*ENDS, own)
+        designs = [verified.sel(design=f"{case} {end}") for end in headers]
         lines = [
             (words, *(_against(one, designs[0], name) for one in designs))
             for words, name in _TOLD.items()
@@ -104,7 +111,8 @@ def beside_original(verified: xr.Dataset) -> Iterator[tuple[str, list[tuple[str,
             lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
         if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
             lines.append(("constraints", *(_standing(text) or "none" for text in kept)))
-        yield case, [*lines, ("held at", "", *(_bounds(one) for one in designs[1:]))]
+        told = tuple(f"{end} (to take)" if end == own != best else end for end in headers)
+        yield case, told, [*lines, ("held at", "", *(_bounds(one) for one in designs[1:]))]
 
 
 def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
@@ -199,6 +207,11 @@ def _original(ours: xr.Dataset) -> xr.Dataset | None:
         if str(name).rpartition(" ")[2] == "original":
             return ours.isel(design=k)
     return None
+
+
+def _best(ours: xr.Dataset) -> xr.Dataset:
+    """The design to take, of `_ours`."""
+    return ours.isel(design=int(_judged(ours).argmin()))
 
 
 def _judged(ours: xr.Dataset) -> np.ndarray:
