@@ -30,7 +30,7 @@ NEAR = 1e-7
 SCALE = np.array([1e-3, 1e-3, 1e-2, 1e-3, 1.0, 1.0, 50.0, 1.0])
 SPIN_UP = 10
 CLOSE = 0.5
-"""Exponent of 12 revolutions that is so near to 0 that it takes 60 to know its sign."""
+"""Exponent of 12 revolutions that is so near to 0 that it takes 240 to know its sign."""
 
 
 def scene_of(damping: float, clearance: float) -> Scene:
@@ -114,7 +114,7 @@ def signs(cells: int) -> None:
         scene = scene_of(damping, clearance)
         growth, other = float(ours(scene)["kick_growth"]), theirs(scene, 12, cell)
         if abs(other) < CLOSE:
-            other = theirs(scene, 60, cell)
+            other = theirs(scene, 240, cell)
         right += growth * other > 0.0
         print(
             f"{cell:3} {damping:6.3f} s/m {1e3 * clearance:5.2f} mm  ours {growth:+6.2f}  theirs {other:+6.2f}  "
