@@ -80,9 +80,8 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
     columns = Points(payload["names"], nothing, payload["paths"])
     scene = load_scene(payload["scene"])
     evaluator = evaluator_of(scene, columns, payload["lanes"])
-    if (
-        payload not in _COMPILED
-    ):  # all ranks have seen the same ones, so all wait for each other or none does
+    # All ranks have made the same ones before, so all wait for each other or none does.
+    if payload not in _COMPILED:
         first_compiled(evaluator, ranks)
         _COMPILED[:] = [*_COMPILED[1 - _MOST_COMPILED :], payload]
     return Judge(evaluator, scene.objective_named(payload["objective"]))
