@@ -11,6 +11,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulate
 from hpcclear.scene import load_scene
+from hpcclear.scene.describing import effects_on
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.switches import Off, switches
 
@@ -118,6 +119,11 @@ def test_a_variable_may_go_down_to_rest_where_a_speed_is_expected():
         assert (
             found[row] == evaluate_records(alone, Points((), np.empty((1, 0)), ()))["objective"][0]
         )
+
+
+def test_a_start_from_rest_is_told_before_anything_is_simulated():
+    assert "torque-driven crank, from rest" in list(effects_on(from_rest()))
+    assert "torque-driven crank" in list(effects_on(from_rest(initial_speed=40.0)))
 
 
 def test_a_drive_of_constant_speed_in_its_place_turns_as_fast_as_expected():
