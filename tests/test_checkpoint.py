@@ -82,6 +82,26 @@ def test_parts_too_large_to_be_kept_are_read_from_their_files(tmp_path, monkeypa
         assert one.tobytes() == two.tobytes()
 
 
+def test_a_stretch_of_samples_is_found_without_reading_parts_that_hold_none_of_it(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr("hpcclear.results.checkpoint._KEPT", 4)
+    checkpoint = Checkpoint(tmp_path / "c", KEY)
+    for first in (0, 5, 10):
+        checkpoint.add(outcomes(first, 5))
+        checkpoint.flush()
+    checkpoint.add(outcomes(15, 5))  # not on disk yet
+    read, looked = dataset.read, []
+    monkeypatch.setattr(
+        dataset, "read", lambda path, *kind: looked.append(path) or read(path, *kind)
+    )
+    assert checkpoint.completed(8, 4).tobytes() == outcomes(8, 4).tobytes()
+    assert len(looked) == 2
+    assert checkpoint.completed(13, 4).tobytes() == outcomes(13, 4).tobytes()
+    assert checkpoint.completed(20, 9).size == 0
+    assert len(looked) == 3
+
+
 def test_samples_reach_disk_when_the_interval_is_over_and_not_before(tmp_path):
     clock = Clock()
     checkpoint = Checkpoint(tmp_path / "c", KEY, interval=5.0, clock=clock)

@@ -9,7 +9,9 @@ from test_linkage_scenes import slider_crank_pair
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.start import start_states
 from hpcclear.scene import load_scene
 from hpcclear.scene.describing import effects_on
 from hpcclear.scene.points import Points, check_points
@@ -119,6 +121,16 @@ def test_a_variable_may_go_down_to_rest_where_a_speed_is_expected():
         assert (
             found[row] == evaluate_records(alone, Points((), np.empty((1, 0)), ()))["objective"][0]
         )
+
+
+@pytest.mark.parametrize("drive", [{}, {"initial_speed": 40.0, "expected_speed": None}])
+def test_several_designs_start_alike_where_no_points_say_otherwise(drive):
+    """As `hpcclear accuracy` asks for them."""
+    scene = from_rest(**drive)
+    par = parameters(scene)
+    one, three = start_states(scene, par), start_states(scene, np.repeat(par, 3, axis=0))
+    np.testing.assert_array_equal(three.rows, np.repeat(one.rows, 3, axis=0))
+    assert one.velocities(5)[0, 4] == scene.drive.initial_speed
 
 
 def test_a_start_from_rest_is_told_before_anything_is_simulated():

@@ -7,6 +7,7 @@ from hpcclear.dynamics.parameters import Numbers, topology
 from hpcclear.dynamics.planar.problem import start_states_of
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
+from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.points import Points
 
 
@@ -23,12 +24,12 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
     if scene.is_planar:
         return start_states_of(scene, par, points)
     p = Parameters(par)
-    speed = (
-        p.speed if scene.drive.kind != "torque" else Numbers(scene, points)("drive.initial_speed")
-    )
-    q, v = _minimal(scene, p, speed)
     first, second, free = topology(scene)
     count = len(par)
+    speed = p.speed
+    if speed_entry(scene.drive) == "expected_speed":  # which is not what it starts with
+        speed = np.broadcast_to(Numbers(scene, points)("drive.initial_speed"), count)
+    q, v = _minimal(scene, p, speed)
     baumgarte = scene.numerics.formulation == "baumgarte"
     if baumgarte:
         zero = np.zeros(count)

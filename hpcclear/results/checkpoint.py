@@ -118,10 +118,12 @@ def discard(directory: Path) -> None:
 
 @dataclass
 class _Part:
-    """One file; `held`: its records (n,) and designs (n, k), unless there are so many that only the file has them."""
+    """One file; `span`: its least and largest sample; `held`: its records (n,) and designs (n, k), unless there are so many
+    that only the file has them."""
 
     level: int
     path: Path
+    span: tuple[int, int]
     held: tuple[np.ndarray, np.ndarray] | None
 
 
@@ -236,7 +238,8 @@ class Checkpoint:
     def contents(self, first: int = 0, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The same samples with their designs: shapes (n,) and (n, k), a column for each name."""
         last = np.inf if count is None else first + count
-        pieces = [self._held(part) for part in self._parts] + self._buffer
+        parts = [part for part in self._parts if part.span[1] >= first and part.span[0] < last]
+        pieces = [self._held(part) for part in parts] + self._buffer
         rows = [(r["sample"] >= first) & (r["sample"] < last) for r, _ in pieces]
         records, values = (
             [piece[k][inside] for piece, inside in zip(pieces, rows, strict=True)] for k in (0, 1)
@@ -254,8 +257,11 @@ class Checkpoint:
         self._number += 1
 
     def _keep(self, level: int, path: Path, records: np.ndarray, values: np.ndarray) -> None:
+        if not len(records):
+            return
         held = (records, values) if len(records) <= _KEPT else None
-        self._parts.append(_Part(level, path, held))
+        numbers = records["sample"]
+        self._parts.append(_Part(level, path, (int(numbers.min()), int(numbers.max())), held))
 
     def _held(self, part: _Part) -> tuple[np.ndarray, np.ndarray]:
         """A part's records and designs, from memory or from its file; raises InputError if that was damaged meanwhile."""

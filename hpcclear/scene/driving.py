@@ -8,7 +8,7 @@ from hpcclear.scene.fields import Count, Curve, CurveOf, MotionTable, Quantity, 
 from hpcclear.scene.places import Angle, PairTable
 
 
-def started(drive: Any) -> None:
+def check_start(drive: Any) -> None:
     """Refuses a drive that starts from rest where nothing tells how fast it will be.
 
     Raises
@@ -101,7 +101,7 @@ class PlanarTorque(Table):
 
     @model_validator(mode="after")
     def _started(self) -> "PlanarTorque":
-        started(self)
+        check_start(self)
         return self
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending
-from hpcclear.scene.driving import started
+from hpcclear.scene.driving import check_start
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -118,7 +118,7 @@ class TorqueDrive(Table):
 
     @model_validator(mode="after")
     def _started(self) -> "TorqueDrive":
-        started(self)
+        check_start(self)
         return self
 
 
