@@ -40,15 +40,6 @@ def test_the_stated_uncertainty_is_no_excuse(box):
         at_most(bootstrap(ratio_of_medians, stated, apart, side="lower"), 3.0)
 
 
-def test_the_stated_uncertainty_holds_the_true_f(box, shift):
-    """In 97 % at rtol 1e-6 and more at 3e-7, over 2000 scenes (`analysis/uncertainty.py`); 92 % are promised."""
-    scene = load_scene(SCENE, [f"study.seed={2 + shift}", "numerics.rtol=1e-11"])
-    truth = evaluate_records(scene, latin_hypercube(scene, 600))["objective"]
-    for records in box:
-        held = np.abs(records["objective"] - truth) <= records["objective_uncertainty"]
-        at_least(np.count_nonzero(held), fewest(len(truth), 0.92))
-
-
 def test_the_sample_itself_does_not_change_when_its_uncertainty_is_asked_for(box, shift):
     scene = load_scene(SCENE, [f"study.seed={2 + shift}"])
     points = latin_hypercube(scene, 600).take(slice(0, 40))
@@ -124,19 +115,37 @@ def test_an_impact_just_before_the_end_of_a_revolution_is_met():
         assert record["status"] == Status.OK
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9])
+LAWS = (
+    {"law": "lankarani-nikravesh", "restitution": 0.9},
+    {"law": "hunt-crossley", "damping": 0.5},
+)
+CHAOTIC = (LAWS[0], 1e-5)
+
+
 @pytest.mark.parametrize(
-    "contact",
-    [{"law": "lankarani-nikravesh", "restitution": 0.9}, {"law": "hunt-crossley", "damping": 0.5}],
-    ids=lambda contact: contact["law"],
+    ("contact", "rtol"),
+    [
+        pytest.param(
+            contact,
+            rtol,
+            marks=[] if (contact, rtol) == CHAOTIC else pytest.mark.full,
+            id=f"{contact['law']}-{rtol:g}",
+        )
+        for contact in LAWS
+        for rtol in (1e-5, 1e-7, 1e-9)
+    ],
 )
 def test_the_stated_uncertainty_holds_the_true_objective(contact, rtol, shift):
-    """In 93 % or more of 300 designs; 92 % are asked for."""
+    """In 94 % or more, its median 1.7 to 2.7 times the error's, over 2000 designs (`analysis/uncertainty.py`); 92 % and 3 are asked.
+
+    A stricter copy may reach the step cap; what is not known counts as not held.
+    """
     scene = load_scene(SCENE, [f"study.seed={3 + shift}"]).with_({"effects.contact": contact})
     points = latin_hypercube(scene, 300)
     truth = evaluate_records(scene.with_({"numerics.rtol": 1e-11}), points)["objective"]
     asked = scene.with_({"numerics.rtol": rtol, "numerics.uncertainty": True})
     records = evaluate_records(asked, points)
-    held = np.abs(records["objective"] - truth) <= records["objective_uncertainty"]
-    at_least(np.count_nonzero(held), fewest(len(truth), 0.92))
+    error, stated = np.abs(records["objective"] - truth), records["objective_uncertainty"]
+    at_least(np.count_nonzero(error <= stated), fewest(len(truth), 0.92))
+    known = np.isfinite(stated)
+    at_most(bootstrap(ratio_of_medians, stated[known], error[known], side="lower"), 3.0)
