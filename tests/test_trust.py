@@ -136,7 +136,7 @@ CHAOTIC = (LAWS[0], 1e-5)
     ],
 )
 def test_the_stated_uncertainty_holds_the_true_objective(contact, rtol, shift):
-    """In 94 % or more, its median 1.7 to 2.7 times the error's, over 2000 designs (`analysis/uncertainty.py`); 92 % and 3 are asked.
+    """In 94 % or more, its median 1.7 to 2.7 times the error's, over 2000 designs (`analysis/uncertainty.py`); asked: 92 %, 3.
 
     A stricter copy may reach the step cap; what is not known counts as not held.
     """
