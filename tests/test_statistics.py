@@ -130,13 +130,13 @@ def test_deviation_survives_a_large_mean():
     records["status"] = Status.OK
     noise = np.random.default_rng(1).standard_normal(4096)
     records["objective"] = 1e8 + noise
-    found = fill(Accumulator(4096, block=100), records, 1).result()
+    found = fill(Accumulator(4096, block=128), records, 1).result()
     np.testing.assert_allclose(found.deviation[0], np.std(records["objective"], ddof=1), rtol=1e-9)
 
 
 def test_merge_with_nothing_is_exact():
     records = outcomes(500)
-    sums = Accumulator(500, block=500)
+    sums = Accumulator(500, block=512)
     sums.add(records)
     part = summarise(records, sums.edges)
     nothing = summarise(records[:0], sums.edges)
@@ -159,7 +159,7 @@ def test_quantiles_lie_within_a_bin_of_the_true_ones():
 def test_all_samples_failed_leaves_nan_not_zero():
     records = outcomes(300)
     records["status"] = Status.NOT_FINITE
-    sums = fill(Accumulator(300, block=100), records, 1)
+    sums = fill(Accumulator(300, block=128), records, 1)
     content = statistics_dataset(sums)
     assert np.isnan(content["objective_mean"])
     assert np.isnan(content["objective_minimum"])
@@ -169,7 +169,7 @@ def test_all_samples_failed_leaves_nan_not_zero():
 
 def test_a_sample_counts_once():
     records = outcomes(300)
-    sums = Accumulator(300, block=100)
+    sums = Accumulator(300, block=128)
     sums.add(records[:150])
     for again in (records[10:11], records[120:121], np.concatenate([records[200:201]] * 2)):
         with pytest.raises(ValueError, match="before"):
@@ -182,13 +182,13 @@ def test_a_sample_counts_once():
 
 def test_only_incomplete_blocks_are_held():
     records = outcomes(10000)
-    sums = Accumulator(10000, block=100)
+    sums = Accumulator(10000, block=128)
     for first in range(0, 10000, 50):
         sums.add(records[first : first + 50])
         assert sums.held <= 1
-    late = Accumulator(10000, block=100)
+    late = Accumulator(10000, block=128)
     late.add(records[100:])
-    assert late.held == 99  # they wait for block 0, which decides the edges
+    assert late.held == 79  # they wait for block 0, which decides the edges
     late.add(records[:100])
     assert late.held == 0
     assert same(late.result(), sums.result())

@@ -31,5 +31,5 @@ def sample_key(scene: Scene, points: Points) -> dict[str, str]:
 
 def statistics_key(scene: Scene, samples: int) -> dict[str, str]:
     """The key of `sample --statistics`: the run's, and how so many samples are summed up."""
-    layout = f"{samples} in blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
+    layout = f"{samples} in a tree over blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
     return {**run_key(scene, "sample --statistics"), "statistics": layout}

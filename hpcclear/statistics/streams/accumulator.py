@@ -1,10 +1,11 @@
 """Statistics of direct Monte Carlo as the samples finish, without keeping them.
 
-A block of samples that is complete is summed up, blocks are merged in their own order: so the numbers are the same
-bit for bit whichever rank made which sample, and whenever, and whether root got samples or sums of some. Only
-blocks that are still incomplete are held in memory.
+A block of samples that is complete is summed up, and what is summed up is merged along one binary tree over the numbers
+of the samples: so the results are the same bit for bit whichever rank made which sample, and whenever, and whether
+root got samples or sums of some. Only blocks that are still incomplete are held in memory.
 """
 
+from bisect import bisect_left, insort
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 
@@ -33,7 +34,12 @@ class Accumulator:
     total : int
         Samples of the design, at least 1.
     block, bins : int
-        Samples a block, bins of each histogram.
+        Samples a block (a leaf times a power of two), bins of each histogram.
+    edges : ndarray, optional
+        Of the histograms; by default chosen from block 0, so that they are the same in every run.
+    whole : set of (int, int), optional
+        First sample and length of the nodes of the tree that are to be made, by default that of the whole design; nodes
+        may be added on the way.
     on_block : callable, optional
         Gets number and records (in index order) of every block that is complete; it may keep raw samples.
     """
@@ -44,46 +50,54 @@ class Accumulator:
         *,
         block: int = BLOCK,
         bins: int = BINS,
+        edges: Array | None = None,
+        whole: set[tuple[int, int]] | None = None,
         on_block: Callable[[int, np.ndarray], object] | None = None,
     ) -> None:
-        if total < 1 or block < 1 or bins < 1:
-            raise ValueError("samples, length of a block and bins must be positive")
-        self.total, self.block, self.bins = total, block, bins
-        self.blocks = -(-total // block)
-        self._tree = tree_length(block)
-        self.edges: Array | None = (
-            None  # chosen from block 0, so that they are the same in every run
-        )
+        if total < 1 or bins < 1 or block < 1 or tree_length(block) != block:
+            raise ValueError("samples and bins must be positive, a block a leaf times a power of two")
+        self.total, self.block, self.bins, self.edges = total, block, bins, edges
+        self.whole = {(0, max(tree_length(total), block))} if whole is None else whole
         self._on_block = on_block
         self._open: dict[int, np.ndarray] = {}  # records by block; sample -1: not here yet
         self._missing: dict[int, int] = {}
-        self._parts: dict[
-            int, dict[tuple[int, int], Summary]
-        ] = {}  # by block, then place and length
-        self._ready: dict[int, Summary] = {}  # complete, waiting for an earlier block
-        self._merged = empty(bins)
-        self._next = 0  # first block that is not merged
+        # of the tree over the design, apart from each other, none beside its sibling: by their first samples
+        self._nodes: dict[int, tuple[int, Summary]] = {}
+        self._firsts: list[int] = []  # the same, sorted
 
     @property
     def complete(self) -> bool:
         """Whether every sample was taken."""
-        return self._next == self.blocks
+        return all(self._length_at(first) == length for first, length in self.whole)
 
     @property
     def taken(self) -> int:
         """Samples taken so far."""
-        parts = sum(length for nodes in self._parts.values() for _, length in nodes)
-        held = sum(self._length(n) - self._missing[n] for n in self._open)
-        ready = sum(map(self._length, self._ready))
-        return min(self._next * self.block, self.total) + ready + held + parts
+        summed = sum(self._inside(first, length) for first, (length, _) in self._nodes.items())
+        return summed + sum(self._length(n) - self._missing[n] for n in self._open)
 
     @property
     def held(self) -> int:
         """Blocks held in memory because they, or block 0, are incomplete."""
-        return len(self._open) + len(self._parts)
+        return len(self._open)
+
+    def _inside(self, first: int, length: int) -> int:
+        """Samples of a node that are in the design."""
+        return min(length, self.total - first)
 
     def _length(self, number: int) -> int:
-        return min(self.block, self.total - number * self.block)
+        return self._inside(number * self.block, self.block)
+
+    def _length_at(self, first: int) -> int:
+        """Length of the node that begins there; 0: none does."""
+        return self._nodes[first][0] if first in self._nodes else 0
+
+    def _refuse_taken(self, first: int, length: int) -> None:
+        """Raise ValueError if a node covers one of these samples."""
+        place = bisect_left(self._firsts, first + length)
+        before = self._firsts[place - 1] if place else -1
+        if place and before + self._length_at(before) > first:
+            raise ValueError(f"a sample of {first} to {first + length - 1} was taken before")
 
     def add(self, records: np.ndarray) -> None:
         """Take finished samples, records of `OUTCOME` (m,).
@@ -102,74 +116,68 @@ class Accumulator:
         self._reduce()
 
     def add_part(self, first: int, length: int, summary: Summary) -> None:
-        """Take the summary of the samples from `first` on, a node of `length` samples of their block's tree.
+        """Take the summary of the samples from `first` on, a node of `length` samples of the design's tree.
 
         Raises
         ------
         ValueError
             If it is no such node, or some of its samples were taken before.
         """
-        number, place = divmod(first, self.block)
-        if self.edges is None or place % length or tree_length(length) != length:
-            raise ValueError(f"{length} samples from {first} on are no part of a block")
-        if number < self._next or number in self._ready or number in self._open:
-            raise ValueError(f"samples of block {number} were taken before")
-        nodes = self._parts.setdefault(number, {})
-        if any(at < place + length and place < at + size for at, size in nodes):
-            raise ValueError(f"a sample of block {number} was taken before")
-        while length < self._tree:
-            sibling = place ^ length
-            if sibling >= self._length(number):
-                other: Summary | None = empty(
-                    self.bins
-                )  # beyond the end of the design or the block
+        if self.edges is None or first % length or tree_length(length) != length:
+            raise ValueError(f"{length} samples from {first} on are no part of a design")
+        self._refuse_taken(first, length)
+        if any(n * self.block < first + length and first < (n + 1) * self.block for n in self._open):
+            raise ValueError(f"a sample of {first} to {first + length - 1} was taken before")
+        while (first, length) not in self.whole:
+            sibling = first ^ length
+            if sibling >= self.total:
+                other = empty(self.bins)
+            elif self._length_at(sibling) == length:
+                other = self._nodes.pop(sibling)[1]
+                del self._firsts[bisect_left(self._firsts, sibling)]
             else:
-                other = nodes.pop((sibling, length), None)
-            if other is None:
-                nodes[(place, length)] = summary
-                return
-            summary = merge(summary, other) if place < sibling else merge(other, summary)
-            place, length = min(place, sibling), 2 * length
-        del self._parts[number]
-        self._ready[number] = summary
-        self._reduce()
+                break
+            summary = merge(summary, other) if first < sibling else merge(other, summary)
+            first, length = min(first, sibling), 2 * length
+        self._nodes[first] = (length, summary)
+        insort(self._firsts, first)
+
+    def parts(self) -> list[tuple[int, int, Summary]]:
+        """First sample, length and summary of the nodes that were taken or summed up, in order."""
+        return [(first, *self._nodes[first]) for first in self._firsts]
+
+    def hand_on(self) -> list[tuple[int, int, Summary]]:
+        """The nodes that were to be made and are complete, as `parts` has them; this forgets them."""
+        done = [row for row in self.parts() if row[:2] in self.whole]
+        self.whole -= {row[:2] for row in done}
+        for first, _, _ in done:
+            del self._nodes[first]
+        self._firsts = sorted(self._nodes)
+        return done
 
     def parts_left(self, length: int) -> Integers:
         """First sample and length (n, 2) of parts of at most `length` samples that make up all that was not taken.
 
         Blocks of which single samples were taken are left out: they are `remaining`.
         """
-        untouched = self._untouched()
-        starts = np.arange(0, self.block, length)
-        whole = (untouched[:, None] * self.block + starts).ravel()
-        rows = [np.column_stack([whole, np.full(whole.size, length)])]
-        rows += [
-            np.array(self._gaps(number, 0, self._tree, length)) for number in sorted(self._parts)
-        ]
-        found = np.concatenate([row for row in rows if row.size] or rows[:1])
-        found = found[found[:, 0] < self.total]
-        return found[np.argsort(found[:, 0], kind="stable")]
-
-    def _gaps(self, number: int, place: int, size: int, length: int) -> list[tuple[int, int]]:
-        """What is missing of a block under one node of its tree."""
-        nodes = self._parts[number]
-        if (place, size) in nodes or place >= self._length(number):
-            return []
-        if size <= length and not any(place <= at < place + size for at, _ in nodes):
-            return [(number * self.block + place, size)]
-        half = size // 2
-        return self._gaps(number, place, half, length) + self._gaps(
-            number, place + half, half, length
-        )
+        taken = [(first, first + size) for first, (size, _) in self._nodes.items()]
+        taken += [(n * self.block, (n + 1) * self.block) for n in self._open]
+        end = -(-self.total // length) * length  # the last part may reach beyond the design
+        rows, reached = [], 0
+        for first, last in (*sorted(taken), (end, end)):
+            rows.append(nodes_between(reached, first, length))
+            reached = max(reached, last)
+        found = np.concatenate(rows)
+        return found[found[:, 0] < self.total]
 
     def forget_parts(self) -> None:
         """Drop the sums of blocks that are incomplete, for a run that wants their samples."""
-        self._parts.clear()
+        self._nodes = {n: node for n, node in self._nodes.items() if node[0] >= self.block}
+        self._firsts = sorted(self._nodes)
 
     def _put(self, number: int, records: np.ndarray) -> None:
-        if number < self._next or number in self._ready or number in self._parts:
-            raise ValueError(f"samples of block {number} were taken before")
         if number not in self._open:
+            self._refuse_taken(number * self.block, self.block)
             self._open[number] = np.zeros(self._length(number), OUTCOME)
             self._open[number]["sample"] = -1
             self._missing[number] = self._length(number)
@@ -180,7 +188,7 @@ class Accumulator:
         self._missing[number] -= slots.size
 
     def _reduce(self) -> None:
-        """Summarise complete blocks and merge those whose turn it is."""
+        """Summarise complete blocks."""
         if self.edges is None:
             if self._missing.get(0) != 0:
                 return
@@ -188,11 +196,9 @@ class Accumulator:
         for number in sorted(n for n, missing in self._missing.items() if missing == 0):
             if self._on_block is not None:
                 self._on_block(number, self._open[number])
-            self._ready[number] = summarise(self._open.pop(number), self.edges, self._tree)
             del self._missing[number]
-        while self._next in self._ready:
-            self._merged = merge(self._merged, self._ready.pop(self._next))
-            self._next += 1
+            summary = summarise(self._open.pop(number), self.edges, self.block)
+            self.add_part(number * self.block, self.block, summary)
 
     def result(self) -> Summary:
         """Statistics of the whole design.
@@ -204,7 +210,12 @@ class Accumulator:
         """
         if not self.complete:
             raise RuntimeError("statistics are asked for before every sample has finished")
-        return self._merged
+        return self._nodes[0][1]
+
+    def loose(self) -> np.ndarray:
+        """Samples taken of blocks that are incomplete, by growing number: records of `OUTCOME` (m,)."""
+        held = [block[block["sample"] >= 0] for _, block in sorted(self._open.items())]
+        return np.concatenate(held) if held else np.empty(0, OUTCOME)
 
     def remaining(self) -> "Remaining":
         """The samples that were not taken yet."""
@@ -217,30 +228,22 @@ class Accumulator:
 
     def _untouched(self) -> Integers:
         """Blocks of which nothing was taken."""
-        done = np.zeros(self.blocks, bool)
-        done[: self._next] = True
-        for begun in (self._ready, self._open, self._parts):
-            done[list(begun)] = True
+        done = np.zeros(-(-self.total // self.block), bool)
+        done[list(self._open)] = True
+        for first, (length, _) in self._nodes.items():
+            done[first // self.block : -(-(first + length) // self.block)] = True
         return np.flatnonzero(~done)
 
     def state(self) -> dict[str, np.ndarray]:
         """All of it as plain arrays, for a checkpoint; see `restore`."""
-        ready = sorted(self._ready)
-        held = [part[part["sample"] >= 0] for _, part in sorted(self._open.items())]
-        records = np.concatenate(held) if held else np.empty(0, OUTCOME)
-        data = {"layout": np.array([self.total, self.block, self.bins, self._next])}
-        data["ready"] = np.array(ready, np.int64)
-        nodes = {
-            (number * self.block + place, length): summary
-            for number, held_nodes in sorted(self._parts.items())
-            for (place, length), summary in sorted(held_nodes.items(), key=lambda item: item[0])
-        }
-        data["parts"] = np.array(list(nodes), np.int64).reshape(-1, 2)
+        parts, records = self.parts(), self.loose()
+        data = {"layout": np.array([self.total, self.block, self.bins])}
+        data["parts"] = np.array([row[:2] for row in parts], np.int64).reshape(-1, 2)
         if self.edges is not None:
             data["edges"] = self.edges
+        rows = [empty(self.bins), *(summary for _, _, summary in parts)]
         for field in fields(Summary):
-            rows = [self._merged, *(self._ready[number] for number in ready), *nodes.values()]
-            data[f"summary_{field.name}"] = np.stack([getattr(row, field.name) for row in rows])
+            data[f"summary_{field.name}"] = np.stack([getattr(row, field.name) for row in rows])[1:]
         return {**data, **{f"record_{name}": records[name] for name in OUTCOME.names or ()}}
 
     def restore(self, data: Mapping[str, ArrayLike]) -> None:
@@ -252,22 +255,37 @@ class Accumulator:
             If the layout differs.
         """
         arrays = {name: np.asarray(values) for name, values in data.items()}
-        if arrays["layout"][:3].tolist() != [self.total, self.block, self.bins]:
+        if arrays["layout"].tolist() != [self.total, self.block, self.bins]:
             raise ValueError("the state is of other statistics")
         self.edges = arrays.get("edges")
-        rows = [
-            Summary(*(arrays[f"summary_{field.name}"][k] for field in fields(Summary)))
-            for k in range(1 + len(arrays["ready"]) + len(arrays["parts"]))
-        ]
-        self._merged, self._next = rows[0], int(arrays["layout"][3])
-        waiting = 1 + len(arrays["ready"])
-        self._ready = dict(zip(arrays["ready"].tolist(), rows[1:waiting], strict=True))
-        for (first, length), summary in zip(arrays["parts"].tolist(), rows[waiting:], strict=True):
-            self.add_part(first, length, summary)
+        for k, (first, length) in enumerate(arrays["parts"].tolist()):
+            row = (arrays[f"summary_{field.name}"][k] for field in fields(Summary))
+            self.add_part(first, length, Summary(*row))
         records = np.empty(len(arrays["record_sample"]), OUTCOME)
         for name in OUTCOME.names or ():
             records[name] = arrays[f"record_{name}"]
         self.add(records)
+
+
+def nodes_between(first: int, last: int, length: int) -> Integers:
+    """First sample and length (n, 2) of nodes of the tree, at most `length` samples each, from `first` up to `last`."""
+    head, tail = [], []
+    while first < last and first % length:
+        size = first & -first
+        while first + size > last:
+            size //= 2
+        head.append((first, size))
+        first += size
+    whole = max(last - first, 0) // length
+    middle = first + length * np.arange(whole, dtype=np.int64)
+    first, size = first + length * whole, length
+    while first < last:
+        if first + size <= last:
+            tail.append((first, size))
+            first += size
+        size //= 2
+    rows = (head, np.column_stack([middle, np.full(whole, length)]), tail)
+    return np.concatenate([np.array(row, np.int64).reshape(-1, 2) for row in rows])
 
 
 class Remaining:
