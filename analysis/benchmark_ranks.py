@@ -84,7 +84,8 @@ def inside(task: str, count: int) -> int:
     """One rank: samples or statistics on all of them, then a line about itself."""
     from hpcclear.ensemble.simulate import payload_of
     from hpcclear.ranks.boundary import run_on_ranks
-    from hpcclear.ranks.team import COLUMNS, Ranks, Task
+    from hpcclear.ranks.schedule import COLUMNS
+    from hpcclear.ranks.team import Ranks, Task
 
     line = LINE
 

@@ -18,8 +18,9 @@ from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks import boundary, launcher
+from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
-from hpcclear.ranks.team import COLUMNS, Task
+from hpcclear.ranks.team import Task
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"

@@ -28,7 +28,7 @@ from commands import (
 )
 from patience import crowded
 
-from hpcclear.ranks.team import COLUMNS
+from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi

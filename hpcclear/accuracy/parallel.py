@@ -10,7 +10,8 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
-from hpcclear.ranks.team import COLUMNS, Ranks, Task
+from hpcclear.ranks.schedule import COLUMNS
+from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points

@@ -18,7 +18,8 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.steady import telling
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
-from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.ranks.schedule import COLUMNS
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.study import budget, extent, lives

@@ -36,7 +36,7 @@ PARTIAL = np.dtype(
         ("squares", float, (_ROWS,)),
         ("minimum", float, (_ROWS,)),
         ("maximum", float, (_ROWS,)),
-        ("histogram", np.uint16, (_ROWS, BINS + 2)),
+        ("histogram", np.uint32, (_ROWS, BINS + 2)),
         ("status", np.int64, (len(Status),)),
         ("flags", np.int64, (len(Flag),)),
     ]
@@ -194,6 +194,9 @@ class PartsProgress(Progress):
         self._history.append(self._origin)
 
     def add(self, records: np.ndarray) -> None:
-        """Count the samples of finished parts, records of `PARTIAL` (m,)."""
+        """Count the samples of finished parts, records of `PARTIAL` (m,), or samples that came on their own."""
+        if records.dtype != PARTIAL:
+            super().add(records)
+            return
         self._done += int(records["samples"].sum())
         self._failed += int(records["status"][:, 1:].sum())

@@ -20,7 +20,8 @@ from hpcclear.base.arrays import Records
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS
 from hpcclear.ranks.progress import Style
-from hpcclear.ranks.team import COLUMNS, Ranks
+from hpcclear.ranks.schedule import COLUMNS
+from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard, key_attribute
 from hpcclear.results.lock import Lock
@@ -132,7 +133,7 @@ class Finished:
     seconds : float
         Wall time of the command.
     spent : ndarray, shape (ranks, 4)
-        Seconds of every rank, columns as in `hpcclear.ranks.team.COLUMNS`.
+        Seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`.
     """
 
     content: xr.Dataset

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
+from hpcclear.ensemble.bundles import Bundles, RawFiles, bundle_length, make_simulator
 from hpcclear.ensemble.identity import statistics_key
 from hpcclear.ensemble.parts import (
     PARTIAL,
@@ -20,11 +22,11 @@ from hpcclear.ensemble.parts import (
     part_length,
     unpacked,
 )
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import Points
-from hpcclear.ranks.team import COLUMNS, Ranks, Task
+from hpcclear.ranks.schedule import COLUMNS, Points
+from hpcclear.ranks.team import Ranks, Task
 from hpcclear.results import dataset, files
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
@@ -32,6 +34,9 @@ from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
 from hpcclear.statistics.streams.summary import ROWS, Summary
 
 STAGE = "statistics"
+
+SHARED_FROM = 512
+"""Ranks from which on root deals with the leaders of nodes only (`hpcclear.ensemble.bundles`)."""
 
 
 class _Left:
@@ -122,11 +127,21 @@ class _Streaming:
         self._objective = scene.objective
         self._points = points
         self._session = session
-        self._raw = raw
+        self._raw = None
         self._checkpoint = session.opened()
+        kept = None
         if raw is not None:
             files.make_directory(raw)
-        self._sums = Accumulator(len(points), on_block=self._keep_raw)
+            self._raw = {
+                "folder": str(raw.absolute()),
+                "attributes": session.attributes,
+                "objective": scene.objective.name,
+                "joints": session.joints,
+            }
+            kept = RawFiles(raw, points, session.attributes, scene.objective, session.joints).write
+        leaders = session.ranks.mail.leaders
+        self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
+        self._sums = Accumulator(len(points), on_block=kept)
         earlier = self._checkpoint.load_stage(STAGE)
         session.tell_problems()
         if earlier is not None:
@@ -138,22 +153,13 @@ class _Streaming:
         with saving(self._save):
             seconds = self._run_samples()
             if not self._sums.complete:
-                self._run_parts(seconds)
+                (self._run_bundles if self._leaders else self._run_parts)(seconds)
         return self._session.write(self._dataset())
 
     def _dataset(self) -> xr.Dataset:
         return statistics_dataset(
             self._sums, self._session.attributes, self._objective, self._session.joints
         )
-
-    def _keep_raw(self, number: int, records: np.ndarray) -> None:
-        """Write a block of samples, if they are wanted."""
-        if self._raw is not None:
-            page = self._points.page(number)
-            content = samples_of(
-                page, records, self._session.attributes, self._objective, self._session.joints
-            )
-            dataset.write(content, self._raw / f"samples-{number:08d}.nc")
 
     def _save(self) -> None:
         with self._session.ranks.writing():
@@ -172,12 +178,12 @@ class _Streaming:
         )
 
     def _run_samples(self) -> float:
-        """Let ranks send samples: all of them if they are kept, else those of the first block, which decides the
+        """Let ranks send samples: all of them if root keeps them, else those of the first block, which decides the
         histograms, and of blocks that an earlier run left with samples. Returns seconds of a rank for one; 0: none was made."""
         if self._raw is not None:
             self._sums.forget_parts()
         left = self._sums.remaining()
-        if self._raw is None:
+        if self._raw is None or self._leaders:
             left = left.begun(self._sums.edges is None)
         if len(left) == 0:
             return 0.0
@@ -195,20 +201,40 @@ class _Streaming:
 
     def _run_parts(self, seconds: float) -> None:
         """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
-        sums = self._sums
-        left = int(sums.total - sums.taken)
-        parts = Parts(sums, part_length(left, self._session.ranks.size, sums.block, seconds))
-        payload = {
+        left = self._sums.total - self._sums.taken
+        length = part_length(left, self._session.ranks.size, self._sums.block, seconds)
+        self._run_sums(Task(STAGE, make_summariser, self._summing(), PARTIAL), length)
+
+    def _run_bundles(self, seconds: float) -> None:
+        """Let the leaders of nodes share samples out and sum them up, so that root's work does not grow with the ranks."""
+        left, ranks = self._sums.total - self._sums.taken, self._session.ranks.size
+        length = bundle_length(left, self._leaders, ranks, seconds, self._raw is not None)
+        block = min(length, self._sums.block)
+        self._sums.forget_parts(block)
+        payload = self._summing() | {"block": block, "raw": self._raw}
+        self._run_sums(Task(STAGE, make_simulator, payload, PARTIAL, share=Bundles), length)
+
+    def _summing(self) -> dict[str, Any]:
+        """What those who sum up need to know."""
+        return {
             "make": make_evaluator,
             "samples": self._payload,
             "design": self._design,
             "total": len(self._points),
-            "edges": sums.edges,
+            "edges": self._sums.edges,
         }
-        progress = PartsProgress("samples", self._session.options.style, sums.total, sums.taken)
-        self._run(Task(STAGE, make_summariser, payload, PARTIAL), parts, self._add_parts, progress)
 
-    def _add_parts(self, records: np.ndarray) -> None:
+    def _run_sums(self, task: Task, length: int) -> None:
+        """Hand out what is left as parts of at most `length` samples."""
+        sums = self._sums
+        progress = PartsProgress("samples", self._session.options.style, sums.total, sums.taken)
+        self._run(task, Parts(sums, length), self._add_sums, progress)
+
+    def _add_sums(self, records: np.ndarray) -> None:
+        """Take summaries, or samples that a stop left without."""
+        if records.dtype != PARTIAL:
+            self._sums.add(records)
+            return
         for record in records:
             self._sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
 

@@ -25,9 +25,9 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.ranks import launcher
-from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
-from hpcclear.ranks.stopping import GRACE, Exit, Stopped, StopSwitch
-from hpcclear.ranks.team import Leave, RankFailed, Ranks
+from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.stopping import GRACE, Exit, RankFailed, Stopped, StopSwitch
+from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.watch import Watch, silence
 
 PATIENCE = 600.0
@@ -295,6 +295,8 @@ def _report(ranks: Ranks, error: BaseException) -> str:
     known = mendable(error)
     if isinstance(known, InputError):
         return f"Error: {known}"
+    if isinstance(error, StorageError):
+        return f"Error: {ranks.where}: {error}"
     if known is not None:
         return f"Error: {ranks.where}: {known}; what was finished is saved"
     trace = "".join(traceback.format_exception(error)).rstrip()

@@ -9,14 +9,23 @@ import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 _SHORTEST = 2e-4  # s
 
 
+class Leave(BaseException):
+    """Root said to leave with an exit code: unwinds a rank to its boundary."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
+
+
 class Tag(IntEnum):
-    """What a message says; the first five come from root."""
+    """What a message says; the first five come from root, or of a stage from who hands out its samples."""
 
     STAGE = 1  # a stage begins: its task
     CALL = 2  # do this once: (name, function, payload)
@@ -25,7 +34,7 @@ class Tag(IntEnum):
     LEAVE = 5  # the program is over: exit code
     ASK = 6  # wants samples: (finished records or None, need)
     RECORDS = 7  # finished records
-    DONE = 8  # stage or call are over here: (finished records or None, busy and set-up seconds)
+    DONE = 8  # stage or call are over here: (finished records or None, [(rank, busy and set-up seconds)])
     STOP = 9  # was told to stop: reason
     ERROR = 10  # failed: (report or InputError, finished records or None)
     LEFT = 11  # has heard LEAVE
@@ -74,6 +83,10 @@ class Mail:
         The same within this node, and the cores its ranks may use together.
     neighbours : list of int
         Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
+    leaders : list of int
+        The first rank of each node but for root, which is none of them.
+    crew : list of int
+        Of a leader: the other ranks of its node but for root.
     """
 
     def __init__(self, mpi: Any = None, finalizes: bool = True) -> None:
@@ -84,6 +97,8 @@ class Mail:
         self._lock = threading.Lock()
         self._news: deque[Message] = deque()  # what this rank has to tell itself
         self.neighbours: list[int] = []
+        self.leaders: list[int] = []
+        self.crew: list[int] = []
         cores = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
         if mpi is None:
             self.rank, self.size = 0, 1
@@ -95,17 +110,24 @@ class Mail:
         self._node = self._comm.Split_type(mpi.COMM_TYPE_SHARED)
         self.node_rank, self.node_size = self._node.rank, self._node.size
         self.node_cores = len(set().union(*self._node.allgather(set(cores))))
-        if mpi.Query_thread() >= mpi.THREAD_SERIALIZED:
-            self.neighbours = self._find_neighbours()
+        self._look_around(mpi.Query_thread() >= mpi.THREAD_SERIALIZED)
 
-    def _find_neighbours(self) -> list[int]:
-        """Root: the first rank of every other node, and all of its own; the first of a node: root and its others."""
+    def _look_around(self, threads: bool) -> None:
+        """Who leads each node, and whom this rank exchanges pulses with, if it may from a thread.
+
+        Root: the first rank of every other node, and all of its own; the first of a node: root and its others.
+        """
         here = self._node.allgather(self.rank)
-        first = here[0]
-        firsts = sorted(set(self._comm.allgather(first)) - {0})
-        if self.rank != first:
-            return [first]
-        return [*(firsts if first == 0 else [0]), *here[1:]]
+        first, working = here[0], [rank for rank in here if rank != 0]
+        every = self._comm.allgather((first, working[0] if working else 0))
+        self.leaders = sorted({leader for _, leader in every} - {0})
+        if self.rank in self.leaders:
+            self.crew = working[1:]
+        if threads and self.rank != first:
+            self.neighbours = [first]
+        elif threads:
+            firsts = sorted({head for head, _ in every} - {0})
+            self.neighbours = [*(firsts if first == 0 else [0]), *here[1:]]
 
     def everyone(self, word: object) -> list[Any]:
         """What every rank has to say, by rank; all must call it at the same time, before any work."""
@@ -118,11 +140,14 @@ class Mail:
 
     def tell_others(self, tag: Tag, body: object = None) -> None:
         """Post one message to every other rank."""
+        self.tell((other for other in range(self.size) if other != self.rank), tag, body)
+
+    def tell(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
+        """Post one message to each of these ranks."""
         if self._mpi is not None:
             data = self._mpi.pickle.dumps(body)
-            for other in range(self.size):
-                if other != self.rank:
-                    self._post(other, tag, data)
+            for other in others:
+                self._post(other, tag, data)
 
     def _post(self, to: int, tag: Tag, data: bytes) -> None:
         with self._lock:

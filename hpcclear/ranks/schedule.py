@@ -17,6 +17,10 @@ TAIL = 2.0
 """A block is at most 1/TAIL of a rank's fair share of what is left (guided self-scheduling)."""
 
 
+COLUMNS = ("busy", "idle", "compile", "write")
+"""What a rank's seconds are spent on: samples or serial code, waiting, set-up, output."""
+
+
 class Worker(Protocol):
     """A stream of simulations in one process: samples go in, finished records come out."""
 
@@ -148,6 +152,11 @@ class HandOut:
         self._next += size
         self.outstanding += size
         return index, ask_below
+
+    def extend(self, samples: np.ndarray) -> None:
+        """More samples to hand out, by their numbers (m,)."""
+        self._queue = np.concatenate([self._queue[self._next :], samples])
+        self._next = 0
 
     def accept(self, records: np.ndarray) -> None:
         """Book finished records."""

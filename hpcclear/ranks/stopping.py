@@ -33,6 +33,10 @@ class Stopped(Exception):
     """The run was asked to end early; everything finished is saved, the same command goes on."""
 
 
+class RankFailed(Exception):
+    """Another rank met a program error; the text is its report."""
+
+
 class StopSwitch:
     """Collects the signals and the time limit of one process; loops poll `is_set`.
 

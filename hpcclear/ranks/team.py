@@ -15,16 +15,14 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks.mailbox import Mail, Message, Nap, Tag
+from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
+from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import Desk, HandOut, Kept, Points, Worker
-from hpcclear.ranks.stopping import Stopped, StopSwitch
+from hpcclear.ranks.schedule import COLUMNS, Desk, HandOut, Kept, Points, Worker
+from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 FLUSH_INTERVAL = 1.0
 """Seconds that a finished record waits on a rank at most."""
-
-COLUMNS = ("busy", "idle", "compile", "write")
-"""What a rank's seconds are spent on: samples or serial code, waiting, set-up, output."""
 
 Maker = Callable[[Any, "Ranks"], Worker]
 """Makes a rank's worker from the payload of a stage; called on every rank."""
@@ -46,6 +44,9 @@ class Task:
         Of the records; has a field ``sample``.
     workers : int, optional
         How many ranks get samples, root first; by default all. The others only make their worker.
+    share : callable, optional
+        Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles,
+        and root, which hands them out, simulates nothing.
     """
 
     name: str
@@ -53,18 +54,7 @@ class Task:
     payload: object
     dtype: np.dtype = OUTCOME
     workers: int | None = None
-
-
-class RankFailed(Exception):
-    """Another rank met a program error; the text is its report."""
-
-
-class Leave(BaseException):
-    """Root said to leave with an exit code: unwinds a rank to its boundary."""
-
-    def __init__(self, code: int) -> None:
-        super().__init__(code)
-        self.code = code
+    share: Callable[[Any], Sharing] | None = None
 
 
 class Ranks:
@@ -128,7 +118,7 @@ class Ranks:
             If another rank has failed.
         """
         while (message := self.mail.poll()) is not None:
-            self._heed(message)
+            self.heed(message)
         return self.stop_switch.is_set()
 
     def raise_if_stopped(self) -> None:
@@ -195,9 +185,11 @@ class Ranks:
         """
         earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
         progress = Progress("", style="quiet") if progress is None else progress
-        book = HandOut(len(points), earlier["sample"], task.workers or self.size)
-        run = _Run(self, book, points, progress)
-        run.on_records, run.save = on_records, save
+        shared = task.share is not None
+        members = self.mail.leaders if shared else list(range(1, self.size))
+        working = len(members) if shared else task.workers or self.size
+        run = RootLead(self, HandOut(len(points), earlier["sample"], working), points, members)
+        run.on_records, run.save, run.progress = on_records, save, progress
         run.kept = Kept(len(points), earlier) if keep else None
         progress.start(len(points), earlier)
         with contextlib.closing(progress), self._timed(task.name) as spent:
@@ -237,9 +229,9 @@ class Ranks:
                     nap.take()
                 elif message.tag == Tag.DONE:
                     waited_for.discard(message.source)
-                    spent[message.source, COLUMNS.index("compile")] = message.body[2]
+                    spent[message.source, COLUMNS.index("compile")] = message.body[1][0][2]
                 else:
-                    self._heed(message)
+                    self.heed(message)
             self.raise_if_stopped()
 
     def _call(self, function: Callable[[Any, "Ranks"], object], payload: object) -> float:
@@ -267,7 +259,7 @@ class Ranks:
             self._booked += wall
             self._write = write
 
-    def _heed(self, message: Message) -> None:
+    def heed(self, message: Message) -> None:
         """Act on what a rank may say at any time."""
         if message.tag == Tag.STOP:
             self.stop_switch.request(message.body)
@@ -275,11 +267,12 @@ class Ranks:
             report, _ = message.body
             raise report if isinstance(report, InputError) else RankFailed(report)
 
-    def _make_desk(self, task: Task) -> tuple[Desk, float]:
+    def make_desk(self, task: Task) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
         self._desk = Desk(task.make(task.payload, self))
-        self._desk.exhausted = task.workers is not None and self.rank >= task.workers
+        working = self.size if task.workers is None else task.workers
+        self._desk.exhausted = self.rank >= working or (task.share is not None and self.is_root)
         return self._desk, time.perf_counter() - started
 
     def serve(self) -> NoReturn:
@@ -287,26 +280,33 @@ class Ranks:
         nap = Nap(0.02)
         while True:
             message = self.mail.poll()
-            self._pass_on_stop()
+            self.pass_on_stop()
             if message is None:
                 nap.take()
             elif message.tag == Tag.LEAVE:
                 raise Leave(message.body)
             elif message.tag == Tag.STAGE:
                 self._stage = message.body.name
-                self._serve_stage(message.body)
+                if message.body.share is not None and message.source == 0:
+                    sharing = message.body.share(message.body.payload)
+                    NodeLead(self, sharing, self.mail.crew).work(message.body)
+                else:
+                    self._serve_stage(message.body, message.source)
+                self._desk = None
                 nap.reset()
             elif message.tag == Tag.CALL:
                 self._stage, function, payload = message.body
-                self.mail.send(0, Tag.DONE, (None, 0.0, self._call(function, payload)))
+                self.mail.send(
+                    0, Tag.DONE, (None, [(self.rank, 0.0, self._call(function, payload))])
+                )
                 nap.reset()
 
-    def _serve_stage(self, task: Task) -> None:
-        """Ask for samples before the last ones are done, send records along, until root ends it."""
-        desk, setup = self._make_desk(task)
+    def _serve_stage(self, task: Task, leader: int) -> None:
+        """Ask for samples before the last ones are done, send records along, until who hands them out ends it."""
+        desk, setup = self.make_desk(task)
         asked, sent_at, nap = False, time.monotonic(), Nap()
         while (message := self.mail.poll()) is None or message.tag != Tag.END:
-            self._pass_on_stop()
+            self.pass_on_stop()
             if message is not None:
                 if message.tag == Tag.LEAVE:
                     raise Leave(message.body)
@@ -315,17 +315,16 @@ class Ranks:
                 nap.reset()
             overdue = desk.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
             if desk.hungry and not asked:
-                self.mail.send(0, Tag.ASK, (self.outbox(), desk.need))
+                self.mail.send(leader, Tag.ASK, (self.outbox(), desk.need))
                 asked, sent_at = True, time.monotonic()
             elif self._unsent and overdue:
-                self.mail.send(0, Tag.RECORDS, self.outbox())
+                self.mail.send(leader, Tag.RECORDS, self.outbox())
                 sent_at = time.monotonic()
             if desk.idle:
                 nap.take()
             else:
                 self._unsent.append(desk.work())
-        self.mail.send(0, Tag.DONE, (self.outbox(), desk.busy, setup))
-        self._desk = None
+        self.mail.send(leader, Tag.DONE, (self.outbox(), [(self.rank, desk.busy, setup)]))
 
     def outbox(self) -> np.ndarray | None:
         """Finished records that root has not got yet; empties the box."""
@@ -333,114 +332,8 @@ class Ranks:
         self._unsent.clear()
         return records
 
-    def _pass_on_stop(self) -> None:
+    def pass_on_stop(self) -> None:
         """Tell root of a signal that only this rank may have got."""
         if self.stop_switch.is_set() and not self._passed_on:
             self.mail.send(0, Tag.STOP, f"{self.stop_switch.reason} on rank {self.rank}")
             self._passed_on = True
-
-
-class _Run:
-    """One design on its way through the ranks, seen from root."""
-
-    def __init__(self, ranks: Ranks, book: HandOut, points: Points, progress: Progress) -> None:
-        self._ranks = ranks
-        self._mail = ranks.mail
-        self._points = points
-        self._progress = progress
-        self._present = set(range(1, ranks.size))  # ranks that will still say DONE
-        self._closing = False
-        self._failed = False
-        self.book = book
-        self.on_records: Callable[[np.ndarray], object] | None = None
-        self.save: Callable[[], object] | None = None
-        self.kept: Kept | None = None
-
-    def work(self, task: Task, spent: np.ndarray) -> None:
-        """Run the stage; whatever ends it, everything finished is collected and delivered."""
-        self._spent = spent
-        self._ranks.raise_if_stopped()
-        self._mail.tell_others(Tag.STAGE, task)
-        try:
-            self._hand_out(task)
-        except BaseException as error:
-            self._failed = not isinstance(error, Stopped)
-            self._gather(until=time.monotonic() + 1.2)
-            raise
-        self._gather(until=None)
-        self._ranks._desk = None
-
-    def _hand_out(self, task: Task) -> None:
-        """Answer the others and work along until every sample is finished."""
-        desk, self._spent[0, COLUMNS.index("compile")] = self._ranks._make_desk(task)
-        nap = Nap()
-        while not self.book.done:
-            while (message := self._mail.poll()) is not None:
-                self._answer(message)
-                nap.reset()
-            if self._ranks.stop_switch.is_set():
-                raise Stopped(self._ranks.stop_switch.reason)
-            if desk.hungry:
-                index, ask_below = self.book.grant(desk.need)
-                desk.take(index, self._points[index], ask_below)
-            if desk.idle:
-                nap.take()
-            else:
-                self._accept(desk.work())
-                self._spent[0, COLUMNS.index("busy")] = desk.busy
-            self._progress.refresh()
-
-    def _gather(self, until: float | None) -> None:
-        """End the stage on every rank; after an error or a stop, do not wait for ever."""
-        self._closing = True
-        self._mail.tell_others(Tag.END)
-        nap = Nap()
-        while self._present and (until is None or time.monotonic() < until):
-            message = self._mail.poll()
-            if message is None:
-                nap.take()
-            elif until is None:
-                self._answer(message)
-            else:  # one failure is on its way up already: the records count, not another report
-                with contextlib.suppress(RankFailed, InputError):
-                    self._answer(message)
-
-    def _answer(self, message: Message) -> None:
-        """Book what a rank sends, and give it what it asks for."""
-        source, tag, body = message
-        if tag == Tag.ASK:
-            records, need = body
-            self._accept(records)
-            if not self._closing:
-                index, ask_below = self.book.grant(need)
-                self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
-        elif tag == Tag.RECORDS:
-            self._accept(body)
-        elif tag == Tag.DONE:
-            records, busy, setup = body
-            self._present.discard(source)
-            self._spent[source, [COLUMNS.index("busy"), COLUMNS.index("compile")]] = busy, setup
-            self._accept(records)
-        elif tag == Tag.ERROR:
-            self._present.discard(source)
-            self._accept(body[1])
-            self._ranks._heed(message)
-        else:
-            self._ranks._heed(message)
-
-    def _accept(self, records: np.ndarray | None) -> None:
-        """Book finished records and hand them on; after a failure, do no more than keep them."""
-        if records is None or records.size == 0:
-            return
-        self.book.accept(records)
-        if self.kept is not None:
-            self.kept.add(records)
-        with self._ranks.writing():
-            if self.on_records is not None:
-                callback, self.on_records = self.on_records, None  # one that fails gets no more
-                callback(records)
-                self.on_records = callback
-            if self.save is not None and not self._failed:
-                self.save()
-        if not self._failed:
-            self._progress.add(records)

@@ -158,10 +158,15 @@ class Box:
         total = str(ranks * len(self.nodes))
         return self.nodes[0].words([*command, *options, "-hosts", hosts, "-n", total])
 
-    def start(self, words: Sequence[str], ranks: int = 1, **settings: str) -> subprocess.Popen:
+    def start(
+        self,
+        words: Sequence[str],
+        ranks: int = 1,
+        program: Sequence[str] = ("-m", "hpcclear"),
+        **settings: str,
+    ) -> subprocess.Popen:
         """Start the program under mpiexec."""
-        program = [sys.executable, "-m", "hpcclear", *words]
-        return began([*self.mpiexec(ranks), *program], **settings)
+        return began([*self.mpiexec(ranks), sys.executable, *program, *words], **settings)
 
     def left(self) -> dict[str, list[str]]:
         """What still runs of the program on each node."""

@@ -8,7 +8,8 @@ import numpy as np
 from synthetic import design, make_sleeping
 
 from hpcclear.ranks.boundary import run_on_ranks
-from hpcclear.ranks.team import COLUMNS, Ranks, Task
+from hpcclear.ranks.schedule import COLUMNS
+from hpcclear.ranks.team import Ranks, Task
 
 
 def leave_a_mark(name: str, ranks: Ranks) -> None:

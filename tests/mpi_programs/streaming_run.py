@@ -1,5 +1,9 @@
-"""Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT]."""
+"""Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT].
 
+SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept.
+"""
+
+import os
 import resource
 import sys
 import time
@@ -71,10 +75,13 @@ def scene_of(samples: int):
 def main(output: str, samples: str, limit: str = "") -> int:
     def program(ranks: Ranks) -> None:
         options = Options(style="quiet")
-        run_statistics(scene_of(int(samples)), Path(output), ranks, options=options)
+        raw = Path(os.environ["RAW"]) if "RAW" in os.environ else None
+        run_statistics(scene_of(int(samples)), Path(output), ranks, raw=raw, options=options)
         print("peak MB", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
     statistics.make_evaluator = make_made_up  # type: ignore[assignment]
+    if "SHARED" in os.environ:
+        statistics.SHARED_FROM = 2
     with StopSwitch(ends_process=True) as stop:
         if limit:
             stop.limit_time(float(limit))

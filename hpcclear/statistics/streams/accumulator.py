@@ -55,7 +55,9 @@ class Accumulator:
         on_block: Callable[[int, np.ndarray], object] | None = None,
     ) -> None:
         if total < 1 or bins < 1 or block < 1 or tree_length(block) != block:
-            raise ValueError("samples and bins must be positive, a block a leaf times a power of two")
+            raise ValueError(
+                "samples and bins must be positive, a block a leaf times a power of two"
+            )
         self.total, self.block, self.bins, self.edges = total, block, bins, edges
         self.whole = {(0, max(tree_length(total), block))} if whole is None else whole
         self._on_block = on_block
@@ -126,7 +128,9 @@ class Accumulator:
         if self.edges is None or first % length or tree_length(length) != length:
             raise ValueError(f"{length} samples from {first} on are no part of a design")
         self._refuse_taken(first, length)
-        if any(n * self.block < first + length and first < (n + 1) * self.block for n in self._open):
+        if any(
+            n * self.block < first + length and first < (n + 1) * self.block for n in self._open
+        ):
             raise ValueError(f"a sample of {first} to {first + length - 1} was taken before")
         while (first, length) not in self.whole:
             sibling = first ^ length
@@ -170,9 +174,10 @@ class Accumulator:
         found = np.concatenate(rows)
         return found[found[:, 0] < self.total]
 
-    def forget_parts(self) -> None:
-        """Drop the sums of blocks that are incomplete, for a run that wants their samples."""
-        self._nodes = {n: node for n, node in self._nodes.items() if node[0] >= self.block}
+    def forget_parts(self, length: int | None = None) -> None:
+        """Drop the sums of fewer samples than `length`, by default a block, for a run that wants their samples."""
+        least = self.block if length is None else length
+        self._nodes = {n: node for n, node in self._nodes.items() if node[0] >= least}
         self._firsts = sorted(self._nodes)
 
     def _put(self, number: int, records: np.ndarray) -> None:
