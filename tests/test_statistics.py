@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -209,7 +210,7 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
     output, raw = tmp_path / "statistics.nc", tmp_path / "raw"
     content = run_statistics(scene, output, ranks, raw=raw, options=QUIET).content
     assert dataset.read(output, "statistics").identical(content)
-    kept = [dataset.read(path, "samples") for path in sorted(raw.iterdir())]
+    kept = [dataset.read(path, "samples") for path in sorted(raw.glob("samples-*.nc"))]
     objective = np.concatenate([part["objective"].values for part in kept])
     assert objective.size == 9000
     points = monte_carlo(scene).values
@@ -261,7 +262,7 @@ def test_latin_hypercubes_are_refused(tmp_path):
         run_statistics(hypercube, tmp_path / "out.nc", alone())
 
 
-def launch(ranks: int, *arguments: object) -> subprocess.CompletedProcess:
+def launch(ranks: int, *arguments: object, **settings: str) -> subprocess.CompletedProcess:
     """The streaming program on so many ranks."""
     mpiexec = Path(sys.executable).parent / "mpiexec"
     command = [str(mpiexec), "-n", str(ranks)] if ranks else []
@@ -271,7 +272,7 @@ def launch(ranks: int, *arguments: object) -> subprocess.CompletedProcess:
         capture_output=True,
         text=True,
         timeout=crowded(120),
-        env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[2])},
+        env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[2])} | settings,
         check=False,
     )
 
@@ -287,6 +288,84 @@ def test_bytes_do_not_depend_on_ranks_or_stops(tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes() == files[2].read_bytes()
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".lock"}
     assert left == {*(path.name for path in files), "timing.nc"}
+
+
+def written(folder: Path) -> dict[str, bytes]:
+    """Statistics and samples in a folder, by name."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*.nc")
+        if path.name != "timing.nc"
+    }
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("keeps", [False, True])
+def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
+    here, there, stopped = (tmp_path / name for name in ("here", "there", "stopped"))
+    for place in (here, there, stopped):
+        place.mkdir()
+
+    def run(place: Path, ranks: int, *limit: float, shared: bool = True) -> int:
+        settings = {"RAW": str(place / "raw")} if keeps else {}
+        settings |= {"SHARED": "1"} if shared else {}
+        return launch(ranks, place / "out.nc", 120_000, *limit, **settings).returncode
+
+    assert run(here, 0, shared=False) == 0
+    assert run(there, 4) == 0
+    assert run(stopped, 4, 0.5) == 3
+    assert run(stopped, 2, 0.5, shared=False) == 3
+    assert run(stopped, 3) == 0
+    assert written(there) == written(stopped) == written(here)
+    assert len(written(here)) == (1 + 30 + 1 if keeps else 1)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("rank", [1, 2])
+def test_an_error_of_a_leader_or_of_who_it_leads_is_told_once_and_loses_nothing(tmp_path, rank):
+    place = tmp_path / "out.nc"
+    failed = launch(4, place, 60_000, SHARED="1", FAILS=str(rank))
+    assert failed.returncode == 1
+    assert failed.stderr.count("Traceback") == 1
+    assert f"on rank {rank} of 4" in failed.stderr
+    assert launch(0, place, 60_000).returncode == 0
+    assert launch(0, tmp_path / "whole.nc", 60_000).returncode == 0
+    assert place.read_bytes() == (tmp_path / "whole.nc").read_bytes()
+
+
+def test_many_files_of_samples_open_as_one(tmp_path):
+    raw = tmp_path / "raw"
+    run_statistics(scene_of(9000), tmp_path / "out.nc", alone(), raw=raw, options=QUIET)
+    raw = raw.rename(tmp_path / "moved")
+    parts = sorted(raw.glob("samples-*.nc"))
+    expected = xr.concat([xr.load_dataset(path) for path in parts], "sample", data_vars="minimal")
+    for engine in ("netcdf4", "h5netcdf"):
+        assert xr.load_dataset(raw / "samples.nc", engine=engine).equals(expected)
+    with pytest.raises(InputError, match="in other files"):
+        dataset.read(raw / "samples.nc")
+    parts[1].unlink()
+    left = xr.load_dataset(raw / "samples.nc", engine="netcdf4")
+    gone = slice(4096, 8192)
+    assert np.isnan(left["objective"][gone]).all()
+    assert (left["status"][gone] == -1).all()  # never 0, which is a success
+    assert left.isel(sample=slice(8192, None)).equals(expected.isel(sample=slice(8192, None)))
+
+
+def test_samples_that_were_not_kept_are_not_promised(tmp_path):
+    scene, output, raw = scene_of(9000), tmp_path / "out.nc", tmp_path / "raw"
+    run_statistics(scene, output, alone(), options=QUIET)
+    with pytest.raises(InputError, match="were not kept"):
+        run_statistics(scene, output, alone(), raw=raw, options=QUIET)
+
+
+@pytest.mark.mpi
+def test_samples_summed_up_without_files_are_made_again(tmp_path):
+    output, raw = tmp_path / "out.nc", tmp_path / "raw"
+    assert launch(2, output, 60_000, FAILS="1").returncode == 1
+    done = launch(2, output, 60_000, RAW=str(raw))
+    assert done.returncode == 0, done.stderr
+    assert "simulated again" in done.stderr + done.stdout
+    assert xr.load_dataset(raw / "samples.nc").sizes["sample"] == 60_000
 
 
 def peak(output: Path, samples: int) -> float:

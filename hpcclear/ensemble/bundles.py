@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import PARTIAL, packed, part_length
 from hpcclear.ensemble.session import samples_of
-from hpcclear.results import dataset
+from hpcclear.results import collection, dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class RawFiles:
-    """Samples themselves, kept in a directory: a file of kind ``samples`` for each block.
+    """Samples themselves, kept in a directory: a file of kind ``samples`` for each block, and one that shows all as one.
 
     Parameters
     ----------
@@ -56,7 +56,16 @@ class RawFiles:
         content = samples_of(
             self._points.page(number), records, self._attributes, self._objective, self._joints
         )
-        dataset.write(content, self._folder / f"samples-{number:08d}.nc")
+        dataset.write(content, self._folder / self._name(number))
+
+    def finish(self) -> None:
+        """All blocks are written: write the file that shows them as one."""
+        blocks = -(-len(self._points) // BLOCK)
+        collection.write(self._folder, [self._name(number) for number in range(blocks)])
+
+    @staticmethod
+    def _name(number: int) -> str:
+        return f"samples-{number:08d}.nc"
 
 
 def bundle_length(

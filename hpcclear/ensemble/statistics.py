@@ -27,7 +27,7 @@ from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, Points
 from hpcclear.ranks.team import Ranks, Task
-from hpcclear.results import dataset, files
+from hpcclear.results import collection, dataset, files
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
@@ -73,7 +73,7 @@ def run_statistics(
     samples : int, optional
         Number of samples, the study's by default.
     raw : Path, optional
-        Directory for the samples themselves, a file of kind ``samples`` for every 4096.
+        Directory for the samples themselves, a file of kind ``samples`` for every 4096, and samples.nc, which shows all as one.
     options : Options
 
     Returns
@@ -98,6 +98,9 @@ def run_statistics(
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     with Session(place, statistics_key(scene, len(points)), ranks, options) as session:
         content = session.found("statistics")
+        if content is not None and raw is not None and not (raw / collection.NAME).exists():
+            reason = f"the statistics are there, in {output}, and the samples were not kept"
+            raise InputError("--raw", str(raw), reason, "Choose another output, or add --fresh")
         if content is None:
             content = _Streaming(scene, points, session, raw).run()
         session.close()
@@ -129,7 +132,7 @@ class _Streaming:
         self._session = session
         self._raw = None
         self._checkpoint = session.opened()
-        kept = None
+        self._files = None
         if raw is not None:
             files.make_directory(raw)
             self._raw = {
@@ -138,13 +141,15 @@ class _Streaming:
                 "objective": scene.objective.name,
                 "joints": session.joints,
             }
-            kept = RawFiles(raw, points, session.attributes, scene.objective, session.joints).write
+            self._files = RawFiles(raw, points, session.attributes, scene.objective, session.joints)
         leaders = session.ranks.mail.leaders
         self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
-        self._sums = Accumulator(len(points), on_block=kept)
+        self._sums = Accumulator(len(points), on_block=self._files.write if self._files else None)
         earlier = self._checkpoint.load_stage(STAGE)
         session.tell_problems()
-        if earlier is not None:
+        if earlier is not None and raw is not None and not earlier["kept"]:
+            session.tell("what was summed up without keeping the samples is simulated again")
+        elif earlier is not None:
             self._sums.restore(earlier)
         self._saved = time.monotonic()
 
@@ -154,6 +159,9 @@ class _Streaming:
             seconds = self._run_samples()
             if not self._sums.complete:
                 (self._run_bundles if self._leaders else self._run_parts)(seconds)
+            if self._files is not None:
+                with self._session.ranks.stage("files"), self._session.ranks.writing():
+                    self._files.finish()
         return self._session.write(self._dataset())
 
     def _dataset(self) -> xr.Dataset:
@@ -163,7 +171,8 @@ class _Streaming:
 
     def _save(self) -> None:
         with self._session.ranks.writing():
-            self._checkpoint.save_stage(STAGE, self._sums.state())
+            kept = {"kept": np.array(self._files is not None)}
+            self._checkpoint.save_stage(STAGE, self._sums.state() | kept)
         self._saved = time.monotonic()
 
     def _save_when_due(self) -> None:

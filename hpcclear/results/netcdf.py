@@ -13,9 +13,9 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -36,6 +36,16 @@ _HIDDEN = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid",
 _ATTRIBUTE_LIMIT = (
     30_000  # bytes; HDF5 keeps at most 64 kB in an object header, longer text goes to the heap
 )
+
+
+class Elsewhere(NamedTuple):
+    """Where the values of a variable are."""
+
+    shape: tuple[int, ...]
+    pieces: Sequence[tuple[int, str, tuple[int, ...]]]  # first row, name of the file, shape there
+
+
+NOTHING: Mapping[str, Elsewhere] = {}
 
 
 def read_bytes(path: Path) -> bytes:
@@ -80,9 +90,12 @@ def seal(content: Buffer) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset as a sealed NetCDF-4 file (see `write_bytes`, `encode`)."""
-    image = _image(dataset)
+def save(dataset: xr.Dataset, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> None:
+    """Write a dataset as a sealed NetCDF-4 file (see `write_bytes`, `encode`).
+
+    `elsewhere`: variables whose values are in other files; what is missing of them there reads as NaN or -1.
+    """
+    image = _image(dataset, elsewhere)
     with image.getbuffer() as content:
         ending = seal(content)
     image.seek(0, io.SEEK_END)
@@ -119,28 +132,34 @@ def encode(dataset: xr.Dataset) -> bytes:
     return _image(dataset).getvalue()
 
 
-def _image(dataset: xr.Dataset) -> io.BytesIO:
+def _image(dataset: xr.Dataset, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
     """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", track_order=True) as file:
         scales = {
-            name: _encode_dimension(file, str(name), number, dataset)
+            name: _encode_dimension(file, str(name), number, dataset, elsewhere)
             for number, name in enumerate(dataset.sizes)
         }
         for name in dataset.data_vars:
             if name in scales:
                 raise ValueError(f"{name!r} names a dimension and a data variable")
             variable = dataset[name]
-            target = _encode_variable(file, str(name), variable, filled=True)
+            target = _encode_variable(file, str(name), variable, elsewhere, filled=True)
             for axis, dimension in enumerate(variable.dims):
                 target.dims[axis].attach_scale(scales[dimension])
         _encode_attributes(file, dataset.attrs)
     return buffer
 
 
-def _encode_dimension(file: h5py.File, name: str, number: int, dataset: xr.Dataset) -> h5py.Dataset:
+def _encode_dimension(
+    file: h5py.File,
+    name: str,
+    number: int,
+    dataset: xr.Dataset,
+    elsewhere: Mapping[str, Elsewhere],
+) -> h5py.Dataset:
     if name in dataset.coords:
-        scale = _encode_variable(file, name, dataset[name], filled=False)
+        scale = _encode_variable(file, name, dataset[name], elsewhere, filled=False)
         scale.make_scale(name)
     else:
         scale = file.create_dataset(
@@ -152,7 +171,12 @@ def _encode_dimension(file: h5py.File, name: str, number: int, dataset: xr.Datas
 
 
 def _encode_variable(
-    file: h5py.File, name: str, variable: xr.DataArray, *, filled: bool
+    file: h5py.File,
+    name: str,
+    variable: xr.DataArray,
+    elsewhere: Mapping[str, Elsewhere],
+    *,
+    filled: bool,
 ) -> h5py.Dataset:
     values = variable.to_numpy()
     dtype = values.dtype.newbyteorder("<")
@@ -163,11 +187,31 @@ def _encode_variable(
         raise ValueError(f"{name!r} has type {dtype}, which a dataset cannot hold")
     elif dtype.kind == "f" and filled:
         fill = dtype.type(np.nan)
-    target = file.create_dataset(name, data=values, dtype=dtype, fillvalue=fill, track_order=True)
+    if name in elsewhere:
+        target = _virtual(file, name, dtype, elsewhere[name])
+    else:
+        target = file.create_dataset(
+            name, data=values, dtype=dtype, fillvalue=fill, track_order=True
+        )
     if fill is not None:
         target.attrs["_FillValue"] = np.array([fill], dtype)
     _encode_attributes(target, variable.attrs)
     return target
+
+
+def _virtual(file: h5py.File, name: str, dtype: np.dtype, where: Elsewhere) -> h5py.Dataset:
+    """A variable whose values are in other files. By hand, since h5py's own way writes the time into it."""
+    space = h5py.h5s.create_simple(where.shape)
+    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    made.set_obj_track_times(False)
+    made.set_attr_creation_order(h5py.h5p.CRT_ORDER_TRACKED | h5py.h5p.CRT_ORDER_INDEXED)
+    made.set_fill_value(np.array(np.nan if dtype.kind == "f" else -1, dtype))
+    for first, source, shape in where.pieces:
+        chosen = space.copy()
+        chosen.select_hyperslab((first, *[0] * (len(shape) - 1)), shape)
+        made.set_virtual(chosen, source.encode(), name.encode(), h5py.h5s.create_simple(shape))
+    kind = h5py.h5t.py_create(dtype)
+    return h5py.Dataset(h5py.h5d.create(file.id, name.encode(), kind, space, made))
 
 
 def _encode_attributes(
@@ -231,8 +275,10 @@ def _decode_values(source: h5py.Dataset) -> np.ndarray:
     text = h5py.check_string_dtype(source.dtype) is not None and source.dtype.kind == "O"
     if not text and source.dtype.str not in _DTYPES:
         raise ValueError(f"{source.name!r} has type {source.dtype}")
+    if source.is_virtual:
+        raise ValueError(f"{source.name!r} is in other files, which xarray reads as one")
     # Data stored elsewhere would read other files; not stored in full, fill the memory.
-    if source.is_virtual or source.external or source.chunks is not None:
+    if source.external or source.chunks is not None:
         raise ValueError(f"{source.name!r} is not stored in one piece")
     if source.id.get_storage_size() < source.nbytes:
         raise ValueError(f"{source.name!r} is not stored in full")

@@ -1,6 +1,7 @@
 """Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT].
 
 SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept.
+FAILS=rank: its worker raises once it has finished some thousand samples.
 """
 
 import os
@@ -15,6 +16,7 @@ from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.ensemble import statistics
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
+from hpcclear.ranks import launcher
 from hpcclear.ranks.boundary import run_on_ranks
 from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.ranks.team import Ranks
@@ -30,6 +32,9 @@ class MadeUp:
 
     def __init__(self) -> None:
         self._queue: list[np.ndarray] = []
+        self._left = np.inf
+        if os.environ.get("FAILS") == str(launcher.launched_rank()):
+            self._left = 3000
 
     @property
     def pending(self) -> int:
@@ -58,6 +63,9 @@ class MadeUp:
         if records.size > 1000:
             records, rest = np.split(records, [1000])
             self._queue.insert(0, rest.copy())
+        self._left -= records.size
+        if self._left < 0:
+            raise ArithmeticError("raised on purpose")
         time.sleep(1e-5 * records.size)
         return records.copy()
 

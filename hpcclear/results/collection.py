@@ -1,0 +1,65 @@
+"""Many files of samples that open as one: a file that holds none of them and says where each is.
+
+Its variables are virtual datasets of HDF5: xarray, netCDF4 and h5py read them as if all samples were in it. Names are relative,
+so that the directory may be moved. Opening thousands of files one by one takes minutes.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import h5py
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.results import netcdf
+
+NAME = "samples.nc"
+"""What it is called, in the directory of the others."""
+
+
+def write(folder: Path, names: Sequence[str]) -> None:
+    """Write `NAME` beside files of kind ``samples``, which stand in the order of `names`.
+
+    Variables that only some of the files have are missing (NaN) in the others.
+
+    Raises
+    ------
+    InputError
+        One of the files is missing or damaged.
+    StorageError
+        The disk refuses.
+    """
+    pieces: dict[str, list[tuple[int, str, tuple[int, ...]]]] = {}
+    known: dict[str, xr.Variable] = {}
+    attributes: dict[str, object] = {}
+    total = 0
+    for name in names:
+        shapes = _shapes(folder / name)
+        if set(shapes) - set(known):
+            content = netcdf.load(folder / name).isel(sample=slice(1))  # what it is called and is
+            known |= {str(key): found for key, found in content.variables.items()}
+            attributes = dict(content.attrs)
+        for key, shape in shapes.items():
+            pieces.setdefault(key, []).append((total, name, shape))
+        total += shapes["sample"][0]
+    elsewhere = {
+        key: netcdf.Elsewhere((total, *rows[0][2][1:]), rows) for key, rows in pieces.items()
+    }
+    netcdf.save(xr.Dataset(known, attrs=attributes), folder / NAME, elsewhere)
+
+
+def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
+    """Shapes of what runs along a file's samples; raises InputError if it cannot be read."""
+    try:
+        with h5py.File(path, "r") as file:
+            return {key: v.shape for key, v in file.items() if _first_dimension(v) == "sample"}
+    except (OSError, KeyError, ValueError) as error:
+        remedy = "Run the command again with --fresh"
+        raise InputError("file", str(path), f"it cannot be read ({error})", remedy) from None
+
+
+def _first_dimension(variable: h5py.Dataset) -> str:
+    if variable.is_scale:
+        return str(variable.name).lstrip("/")
+    scales = [scale[0].name for scale in variable.dims]
+    return str(scales[0]).lstrip("/") if scales else ""
