@@ -11,18 +11,28 @@ others beside it. Start-up is shown apart: it is paid once, whatever the work.
 """
 
 import argparse
+import functools
 import os
 import pickle
 import subprocess
 import sys
-import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import xarray as xr
-from scaling_model import POLICIES, WORK, Costs, Outcome, simulate, simulate_sums
+from many_ranks import fitted
+from scaling_model import (
+    POLICIES,
+    WORK,
+    Costs,
+    Outcome,
+    simulate,
+    simulate_shared,
+    simulate_sums,
+)
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import part_length
@@ -33,7 +43,7 @@ LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
 LONGER = {"measured samples": 1, "10 times as long": 10, "100 times as long": 100}
 LIMIT = 0.9
-SUMS = "package, sums"
+SUMS, SHARED, KEPT = "sums", "shared", "shared, kept"
 
 
 # ---- measurements ------------------------------------------------------------------------------------
@@ -91,28 +101,6 @@ def seconds_each(action, repeats: int, items: int) -> float:
     for _ in range(repeats):
         action()
     return (time.process_time() - started) / (repeats * items)
-
-
-def record_cost() -> float:
-    """Seconds of root for a record in statistics mode: unpickled, summed up, checkpointed every five seconds."""
-    from hpcclear.results.checkpoint import Checkpoint
-    from hpcclear.statistics.streams.accumulator import Accumulator
-
-    total, batch = 400_000, 500
-    records = np.zeros(total, OUTCOME)
-    records["sample"] = np.arange(total)
-    records["objective"] = np.random.default_rng(1).random(total)
-    messages = [pickle.dumps(records[k : k + batch]) for k in range(0, total, batch)]
-    sums = Accumulator(total)
-    started = time.process_time()
-    for message in messages:
-        sums.add(pickle.loads(message))  # made a moment ago, in this process
-    each = (time.process_time() - started) / total
-    with tempfile.TemporaryDirectory() as folder:
-        checkpoint = Checkpoint(Path(folder) / "parts", {"run": "scaling"})
-        save = seconds_each(lambda: checkpoint.save_stage("statistics", sums.state()), 3, 1)
-    # five seconds of a thousand ranks stand behind a checkpoint: next to nothing for each record
-    return each + save / (5.0 * 1000 / 1e-3)
 
 
 def handed_cost() -> float:
@@ -181,29 +169,40 @@ def start_up() -> float:
 
 def measure(samples: int) -> Costs:
     """All costs, on this machine."""
+    line, message, handed = fitted(), message_cost(), handed_cost()
     return Costs(
         samples=sample_costs(samples),
-        message=message_cost(),
-        record=record_cost(),
-        handed=handed_cost(),
+        message=message,
+        record=max(line.sample - handed, 0.0),
+        handed=handed,
         partial=partial_cost(),
         start=start_up(),
+        batch=max(line.message - message, 0.0),
+        written=line.written,
     )
 
 
 # ---- model and figure ---------------------------------------------------------------------------
 
 
+ACROSS: dict[str, Callable[..., Outcome]] = {
+    SUMS: simulate_sums,
+    SHARED: simulate_shared,
+    KEPT: functools.partial(simulate_shared, keeps=True),
+}
+"""Statistics: summed up by ranks, by leaders of nodes, and by these with all samples written."""
+
+
 def model(costs: Costs, ranks: tuple[int, ...], seed: int = 1) -> xr.Dataset:
     """Every policy on every number of ranks, for samples as measured and for longer ones."""
-    names = [*POLICIES, SUMS]
+    names = [*POLICIES, *ACROSS]
     shape = (len(LONGER), len(names), len(ranks))
     table = {name: np.full(shape, np.nan) for name in Outcome._fields}
     for a, longer in enumerate(LONGER.values()):
         chosen = costs._replace(samples=costs.samples * longer)
         for b, name in enumerate(names):
             for c, count in enumerate(ranks):
-                run = simulate_sums if name == SUMS else simulate
+                run = ACROSS.get(name, simulate)
                 found = run(chosen, count, POLICIES.get(name, POLICIES["package"]), seed=seed)
                 for key, value in found._asdict().items():
                     table[key][a, b, c] = value
@@ -240,7 +239,7 @@ def draw(data: xr.Dataset, path: Path) -> None:
     figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.0), sharey=True, layout="constrained")
     for axis, length in zip(axes, data["samples"].values, strict=True):
         for style, policy in zip(
-            ("-o", "-s", "-^", "-v", "-D"), data["policy"].values, strict=True
+            ("-o", "-s", "-^", "-v", "-D", "-P", "-X"), data["policy"].values, strict=True
         ):
             shown = data["efficiency"].sel(samples=length, policy=policy)
             axis.plot(data["ranks"], shown, style, markersize=3, linewidth=1, label=policy)
@@ -263,6 +262,8 @@ def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
         return f"{policy}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
     first = int(np.argmax(short))
     ranks = int(chosen["ranks"][first])
+    if policy in (SHARED, KEPT):
+        return f"{policy}: below {LIMIT} from {ranks} ranks on"
     mean = float(data["cost_sample"].sel(quantile=0.5)) * LONGER[length]
     parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096, mean))
     each = (
@@ -275,8 +276,9 @@ def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
             "points handed out": float(data["cost_handed"]) * WORK / mean,
         }
     )
+    message = float(data["cost_message"]) + (policy != SUMS) * float(data["cost_batch"])
     each |= {
-        "messages": float(data["cost_message"]) * float(chosen["requests"][first]) / ranks,
+        "messages": message * float(chosen["requests"][first]) / ranks,
     }
     name = max(each, key=lambda key: each[key])
     load = float(chosen["root_load"][first])
@@ -294,11 +296,14 @@ def report(data: xr.Dataset) -> str:
     )]  # fmt: skip
     for length in data["samples"].values:
         lines += ["", f"{length}: efficiency, {WORK:g} s of work a rank"]
-        lines.append(f"{'ranks':>8}" + "".join(f"{name:>13}" for name in data["policy"].values))
+        widths = [len(str(name)) + 2 for name in data["policy"].values]
+        named = zip(data["policy"].values, widths, strict=True)
+        lines.append(f"{'ranks':>8}" + "".join(f"{name:>{width}}" for name, width in named))
         for count in data["ranks"].values:
             row = data["efficiency"].sel(samples=length, ranks=count).values
-            lines.append(f"{count:>8}" + "".join(f"{value:>13.3f}" for value in row))
-        lines += [bottleneck(data, str(length), policy) for policy in ("package", SUMS)]
+            shown = zip(row, widths, strict=True)
+            lines.append(f"{count:>8}" + "".join(f"{value:>{width}.3f}" for value, width in shown))
+        lines += [bottleneck(data, str(length), name) for name in ("package", SUMS, SHARED, KEPT)]
     return "\n".join(lines)
 
 

@@ -13,12 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.ensemble.bundles import bundle_length
 from hpcclear.ensemble.parts import part_length
 from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
 from hpcclear.ranks.team import FLUSH_INTERVAL
 from hpcclear.statistics.streams.summary import BLOCK
 
 LANES = 32
+NODE = 64  # ranks of a node
 LATENCY = 5e-6  # s, network
 WORK = 60.0  # s of work for a rank
 MOST_REQUESTS = 2_000_000  # beyond, root's load alone decides
@@ -35,6 +37,8 @@ class Costs(NamedTuple):
     handed: float  # root, for each sample handed out
     partial: float  # root, for each part of a block that arrives summed up already
     start: float  # from the launch of a process to its first simulation
+    batch: float = 0.0  # root, besides, for a message with records, however many
+    written: float = 0.0  # who keeps samples in files, for each
 
     @property
     def mean(self) -> float:
@@ -135,8 +139,10 @@ class _Team:
 class _Root:
     """Root's clock and books."""
 
-    def __init__(self, costs: Costs, team: _Team, total: int, policy: Policy) -> None:
-        self.costs, self.team, self.policy = costs, team, policy
+    def __init__(
+        self, costs: Costs, team: _Team, total: int, policy: Policy, *, works: bool = True
+    ) -> None:
+        self.costs, self.team, self.policy, self.works = costs, team, policy, works
         self.size = len(team.each)
         self.left = total
         self.now = 0.0
@@ -153,7 +159,7 @@ class _Root:
         # records are sent on their own while a rank need not ask
         flushed = finished * self.team.each[rank] // FLUSH_INTERVAL
         size, ask_below = self.policy(self.left, self.size, self.team.need(rank, asked))
-        service = self.costs.message * (1.0 + flushed)
+        service = (self.costs.message + self.costs.batch) * (1.0 + flushed)
         service += self.costs.record * finished
         service += self.costs.handed * size
         self.now += service
@@ -167,7 +173,7 @@ class _Root:
     def work(self) -> None:
         """A quantum of root's own samples, if it has any; else wait for a message."""
         stock = self._own / self.team.each[0]
-        if self.left > 0 and stock < self._ask_below:
+        if self.works and self.left > 0 and stock < self._ask_below:
             rate = 1.0 / self.team.each[0] if self.team.given[0] else 0.0
             size, self._ask_below = self.policy(
                 self.left, self.size, Need(self.team.lanes, int(stock), rate)
@@ -203,7 +209,7 @@ def _run(root: _Root, idle: float | None = None) -> Outcome:
     # the last samples leave lanes empty
     last = max(end + idle * each for end, each in zip(team.end, team.each, strict=True))
     unreported = sum(team.given[1:]) - sum(team.reported[1:])
-    closing = costs.message * root.size + costs.record * unreported
+    closing = (costs.message + costs.batch) * root.size + costs.record * unreported
     makespan = max(last, root.now) + closing
     busy = sum(team.busy)
     return Outcome(
@@ -244,7 +250,8 @@ def _equal_shares(costs: Costs, team: _Team, total: int) -> Outcome:
     ranks = len(team.each)
     share = total / ranks
     sending = (costs.message + costs.handed * share) * np.arange(ranks)
-    taking = costs.record * total + costs.message * ranks * (1.0 + WORK / FLUSH_INTERVAL)
+    taking = costs.record * total
+    taking += (costs.message + costs.batch) * ranks * (1.0 + WORK / FLUSH_INTERVAL)
     took = np.array([team.seconds(rank, round(share)) for rank in range(ranks)])
     last = float((sending + took + 0.5 * team.lanes * np.array(team.each)).max())
     makespan = max(last, float(took[0] + sending[-1] + taking))
@@ -255,7 +262,9 @@ def _equal_shares(costs: Costs, team: _Team, total: int) -> Outcome:
 
 def _saturated(costs: Costs, ranks: int, total: int, work: float, requests: float) -> Outcome:
     """A root that does nothing but answer: it decides how long the run takes."""
-    serving = ranks * requests * costs.message + total * (costs.record + costs.handed)
+    serving = ranks * requests * (costs.message + costs.batch) + total * (
+        costs.record + costs.handed
+    )
     makespan = max(serving, work)
     return Outcome(work / makespan, serving / makespan, makespan, ranks * requests)
 
@@ -273,6 +282,45 @@ def simulate_sums(
     mean, spread = length * costs.mean, math.sqrt(length) * float(costs.samples.std())
     parts = np.maximum(rng.normal(mean, spread, 2000), 0.1 * mean)
     # points are made where they are used; a part is handed out as two numbers, within its message
-    summed = costs._replace(samples=parts, record=costs.partial, handed=0.0)
+    summed = costs._replace(samples=parts, record=costs.partial, handed=0.0, batch=0.0)
     team = _Team(summed, ranks, 1, seed)
     return _run(_Root(summed, team, max(total // length, 1), policy), 0.5 * LANES / length)
+
+
+def simulate_shared(
+    costs: Costs,
+    ranks: int,
+    policy: Policy,
+    *,
+    work: float = WORK,
+    seed: int = 1,
+    keeps: bool = False,
+) -> Outcome:
+    """`simulate_sums` with leaders of nodes between root and the ranks (`hpcclear.ensemble.bundles`).
+
+    A node is a root and few ranks that never have more than two bundles in stock; to root it is one rank, that takes bundles.
+    Root itself simulates nothing. What a node loses at its end and what nodes lose waiting for root is multiplied: the worst of
+    both. `keeps`: leaders write all samples.
+    """
+    nodes, size = max((ranks - 1) // NODE, 1), min(ranks - 1, NODE)
+    total = max(round(nodes * size * work / costs.mean), nodes)
+    length = bundle_length(total, nodes, ranks, costs.mean, keeps)
+
+    def stocked(remaining: int, members: int, need: Need) -> Allotment:
+        return policy(min(remaining, 2 * length), members, need)
+
+    inside = costs._replace(record=costs.record + keeps * costs.written)
+    node = _run(_Root(inside, _Team(inside, size, LANES, seed), total // nodes, stocked))
+    each = np.array([length * costs.mean / size])  # the sum of so many hardly varies
+    bundles = costs._replace(samples=each, record=costs.partial, handed=0.0, batch=0.0)
+    root = _Root(
+        bundles, _Team(bundles, nodes + 1, 1, seed), max(total // length, 1), policy, works=False
+    )
+    found = _run(root, idle=0.0)
+    between = found.efficiency * (nodes + 1) / nodes  # root is none of those who work
+    return Outcome(
+        node.efficiency * between * (ranks - 1) / ranks,
+        found.root_load,
+        found.makespan / node.efficiency,
+        found.requests,
+    )

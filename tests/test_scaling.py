@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 
 from scaling_model import (
     LANES,
+    NODE,
     POLICIES,
     Costs,
     _Root,
@@ -17,6 +18,7 @@ from scaling_model import (
     _Team,
     equal_shares,
     simulate,
+    simulate_shared,
     simulate_sums,
 )
 
@@ -79,6 +81,25 @@ def test_sums_spare_root_the_records():
     assert flat.root_load > 0.9
     assert sums.root_load < 0.2
     assert sums.efficiency > 0.95
+
+
+@pytest.mark.parametrize("keeps", [False, True])
+def test_leaders_spare_root_the_ranks(keeps):
+    # what root does for a part takes a hundredth of what a rank works for: a hundred ranks, or a hundred nodes
+    costs = FREE._replace(message=2e-5, partial=2e-2, record=1e-6, handed=1e-6, written=1e-6)
+    alone = simulate_sums(costs, 1000, PACKAGE, work=20.0)
+    shared = simulate_shared(costs, 1000, PACKAGE, work=20.0, keeps=keeps)
+    assert alone.efficiency < 0.3
+    assert shared.efficiency > 0.85
+    assert shared.root_load < 0.7
+
+
+def test_a_leader_that_writes_slowly_holds_up_its_node():
+    # sixty-four ranks make a sample in 31 us, their leader writes one in 62
+    costs = FREE._replace(written=2.0 * FREE.mean / NODE)
+    found = simulate_shared(costs, 1000, PACKAGE, work=20.0, keeps=True)
+    assert found.efficiency == pytest.approx(0.5, abs=0.06)
+    assert simulate_shared(costs, 1000, PACKAGE, work=20.0).efficiency > 0.9
 
 
 def test_equal_seeds_give_equal_runs():

@@ -54,7 +54,7 @@ def _check_kind(
 @click.option(
     "--raw",
     type=PATH,
-    help="With --statistics: directory for the samples themselves.",
+    help="With --statistics: directory for the samples themselves; samples.nc in it opens as all of them.",
 )
 @click.option(
     "--part",

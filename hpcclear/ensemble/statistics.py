@@ -35,7 +35,7 @@ from hpcclear.statistics.streams.summary import ROWS, Summary
 
 STAGE = "statistics"
 
-SHARED_FROM = 512
+SHARED_FROM = 256
 """Ranks from which on root deals with the leaders of nodes only (`hpcclear.ensemble.bundles`)."""
 
 
