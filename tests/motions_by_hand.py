@@ -83,7 +83,7 @@ def two_open(effects, work, par, phi, omega, i, W):
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
     guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     crank_load = (
         crank * (sphi * fx1 - cphi * fy1)
         + mj1
@@ -143,7 +143,7 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
     )
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     m2 = par[at.ROD_MASS * W + i]
     m3 = par[at.SLIDER_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
@@ -210,7 +210,7 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
     )
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
     m2 = par[at.ROD_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near

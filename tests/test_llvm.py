@@ -66,6 +66,7 @@ MARKERS = {
     "ambrosio": (set(), {par(at.JOINT_12 + at.DEAD_SPEED), par(at.JOINT_23 + at.DEAD_SPEED)}),
     "torque": (set(), {par(at.TORQUE), par(at.CRANK_INERTIA)}),
     "torque_table": ({"torque"}, {("constant", PER_TURN)}),
+    "torque_falls": ({"torque"}, {par(at.TORQUE_FALL)}),
     "gravity": (set(), {par(at.GRAVITY)}),
     "load": (set(), {par(at.LOAD)}),
     "load_table": (set(), {par(at.LOAD), ("constant", PER_TURN)}),

@@ -12,6 +12,7 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.ensemble.bundles import Bundles
 from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpacked
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
@@ -483,3 +484,35 @@ def test_parts_are_short_where_ranks_are_many_or_samples_long():
     assert part_length(10**9, 2, 4096, 3.3e-3) == 512
     assert part_length(10**9, 2, 4096, 1.0) == 32
     assert part_length(10**9, 2, 4096) == 256  # nobody knows yet
+
+
+def test_a_leader_sums_up_bundles_of_any_size_and_hands_on_what_a_stop_leaves():
+    scene, total = scene_of(9000), 9000
+    points, worker = MonteCarloPoints(scene, total), MadeUp()
+    worker.submit(np.arange(total), points[np.arange(total)])
+    records = np.concatenate([worker.advance(1.0) for _ in range(9)])
+    whole = Accumulator(total)
+    whole.add(records)
+    sums = Accumulator(total)
+    sums.add(records[:4096])
+    payload = {"design": scene.resolved(), "total": total, "edges": sums.edges, "block": 256}
+    leader = Bundles(payload | {"raw": None})
+    rows = np.array([[4096.0, 2048.0], [6144.0, 256.0], [8192.0, 4096.0]])
+    opened = leader.open(np.array([3, 4, 7]), rows)
+    assert [len(bundle) for bundle in opened] == [2048, 256, 808]
+    assert opened[2][-1] == total - 1  # the last one reaches beyond the design
+    leader.take(records[6000:6400])
+    done = leader.finished()
+    assert done["sample"].tolist() == [4]
+    assert done["samples"].tolist() == [256]
+    leader.take(records[8192:])
+    leader.take(records[4096:5000])
+    done = np.concatenate([done, leader.finished()])
+    assert done["samples"].tolist() == [256, 808]
+    (left,) = leader.unfinished()  # of the first bundle, in whole blocks of 256 samples
+    assert left["samples"].sum() == 5000 // 256 * 256 - 4096
+    for record in (*done, *left):
+        sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+    for first, length in sums.parts_left(64):
+        summed(records, sums, first, length)
+    assert same(sums.result(), whole.result())

@@ -29,6 +29,7 @@ class Effects(NamedTuple):
     ambrosio: Any = None
     torque: Any = None  # the crank is free, driven by a torque
     torque_table: Any = None
+    torque_falls: Any = None  # with the speed
     gravity: Any = None
     load: Any = None  # constant slider load
     load_table: Any = None
@@ -125,6 +126,7 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     GRAVITY,
     LOAD,
     TORQUE,
+    TORQUE_FALL,  # share of it that a rad/s takes: the inverse of the speed without load
     GUIDE_COEFFICIENT,
     GUIDE_INVERSE_RAMP,
     BAUMGARTE_ALPHA2,  # 2 alpha
@@ -136,9 +138,9 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
-) = range(27)
+) = range(28)
 JOINT_ROWS = 14
-JOINT_BLOCKS = 27  # of all joints, one behind the other
+JOINT_BLOCKS = 28  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,

@@ -117,6 +117,8 @@ def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
         p[:, at.LOAD] = get("effects.slider_load")
     if isinstance(getattr(scene.drive, "torque", None), float):
         p[:, at.TORQUE] = get("drive.torque")
+    if getattr(scene.drive, "no_load_speed", None) is not None:
+        p[:, at.TORQUE_FALL] = 1.0 / get("drive.no_load_speed")
     if scene.effects.guide_friction is not None:
         p[:, at.GUIDE_COEFFICIENT] = get("effects.guide_friction.coefficient")
         p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")

@@ -234,6 +234,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         bending=None if scene.is_planar else scene.modes or None,
         torque=_flag(free),
         torque_table=_flag(free and torque_is_table),
+        torque_falls=_flag(free and getattr(scene.drive, "no_load_speed", None) is not None),
         gravity=_flag(e.gravity > 0.0),
         load=_flag(e.slider_load is not None and not load_is_table),
         load_table=_flag(load_is_table),

@@ -117,13 +117,13 @@ class Bundles:
         )
         self._numbers: dict[int, int] = {}  # of bundles, by their first samples
 
-    def open(self, index: Integers, rows: Array) -> Integers:
-        """Begin bundles: numbers (m,), rows of first sample and length (m, 2); the numbers of their samples."""
+    def open(self, index: Integers, rows: Array) -> list[Integers]:
+        """Begin bundles: numbers (m,), rows of first sample and length (m, 2); the numbers of the samples of each."""
         spans = rows.astype(np.int64).tolist()
         self._numbers |= {first: k for k, (first, _) in zip(index.tolist(), spans, strict=True)}
         self._sums.whole |= {(first, length) for first, length in spans}
         total = self._sums.total
-        return np.concatenate([np.arange(a, min(a + length, total)) for a, length in spans])
+        return [np.arange(a, min(a + length, total)) for a, length in spans]
 
     def take(self, records: np.ndarray) -> None:
         """Take finished samples, records of `OUTCOME` (m,)."""

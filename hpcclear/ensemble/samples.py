@@ -17,6 +17,12 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import read_points, sampled
 
+MEMORY = 2.3e-6
+"""GB that root takes for a sample (`analysis/many_ranks.py`)."""
+
+NOTABLE = 1.0
+"""GB from which on that is told."""
+
 
 def design(scene: Scene, table: Path | None) -> Points:
     """The points to simulate: a user's table, or the study's sampling.
@@ -92,6 +98,11 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
     """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
     units = dict(zip(points.names, points.units, strict=True))
     session.describe(scene)
+    if len(points) * MEMORY >= NOTABLE:
+        session.tell(
+            f"root keeps all {len(points)} samples in memory, {len(points) * MEMORY:.1f} GB at the end; "
+            "Monte Carlo samples it can write as they come: --statistics --raw DIR"
+        )
     checkpoint = session.opened(points.names, units)
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)

@@ -31,8 +31,8 @@ class Sharing(Protocol):
     def points(self) -> Points:
         """Points of the samples, by their numbers."""
 
-    def open(self, index: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Numbers of the samples in bundles that came from root: their numbers (m,) and rows (m, d)."""
+    def open(self, index: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
+        """Numbers of the samples in each of the bundles that came from root: their numbers (m,) and rows (m, d)."""
 
     def take(self, records: np.ndarray) -> None:
         """Take finished samples."""
@@ -88,6 +88,21 @@ class Lead:
         index, ask_below = self.book.grant(need)
         self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
 
+    def _work_along(self, desk: Desk, nap: Nap) -> None:
+        """Take samples oneself when it is time, and work on them for a moment; sleep if there is nothing to do."""
+        if desk.hungry and self._can_answer:
+            index, ask_below = self.book.grant(desk.need)
+            desk.take(index, self._points[index], ask_below)
+        if desk.idle:
+            nap.take()
+        else:
+            self._accept(desk.work())
+
+    @property
+    def _can_answer(self) -> bool:
+        """Whether it is known now what a rank that asks may have; nothing, if no more will come."""
+        return True
+
     def _accept(self, records: np.ndarray | None) -> None:
         """Book finished records, and do with them what is to be done."""
         raise NotImplementedError
@@ -141,14 +156,8 @@ class RootLead(Lead):
                 nap.reset()
             if self._ranks.stop_switch.is_set():
                 raise Stopped(self._ranks.stop_switch.reason)
-            if desk.hungry:
-                index, ask_below = self.book.grant(desk.need)
-                desk.take(index, self._points[index], ask_below)
-            if desk.idle:
-                nap.take()
-            else:
-                self._accept(desk.work())
-                self._spent[0, _BUSY] = desk.busy
+            self._work_along(desk, nap)
+            self._spent[0, _BUSY] = desk.busy
             self.progress.refresh()
 
     def _gather(self, until: float | None) -> None:
@@ -229,13 +238,7 @@ class NodeLead(Lead):
                 nap.reset()
             self._ranks.pass_on_stop()
             self._speak()
-            if desk.hungry and (self.book.remaining or self._exhausted):
-                index, ask_below = self.book.grant(desk.need)
-                desk.take(index, self._points[index], ask_below)
-            if desk.idle:
-                nap.take()
-            else:
-                self._accept(desk.work())
+            self._work_along(desk, nap)
 
     def _hear(self, message: Message) -> None:
         """Root's word, or an answer to one of the others."""
@@ -249,9 +252,9 @@ class NodeLead(Lead):
             index, rows, self._ask_below = message.body
             self._asked, self._exhausted = False, index.size == 0
             if index.size:
-                samples = self._sharing.open(index, rows)
-                self.book.extend(samples)
-                self._sizes += [samples.size // index.size] * index.size
+                bundles = self._sharing.open(index, rows)
+                self.book.extend(np.concatenate(bundles))
+                self._sizes += map(len, bundles)
             waiting, self._waiting = self._waiting, []
             for source, need in waiting:
                 self._give(source, need)
@@ -274,8 +277,12 @@ class NodeLead(Lead):
             left -= self._sizes[-found]
         return found
 
+    @property
+    def _can_answer(self) -> bool:
+        return self.book.remaining > 0 or self._exhausted
+
     def _give(self, source: int, need: Need) -> None:
-        if self.book.remaining or self._exhausted:
+        if self._can_answer:
             super()._give(source, need)
         else:
             self._waiting.append((source, need))

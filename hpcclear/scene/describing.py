@@ -34,7 +34,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if effects.friction.law != "none":
         yield f"friction {effects.friction.law}, coefficient {effects.friction.coefficient:g}"
     if isinstance(scene.drive, TorqueDrive):
-        yield "torque-driven crank" + (", from rest" if scene.drive.initial_speed == 0.0 else "")
+        falls = "" if scene.drive.no_load_speed is None else ", torque falling with speed"
+        rest = ", from rest" if scene.drive.initial_speed == 0.0 else ""
+        yield f"torque-driven crank{falls}{rest}"
     if isinstance(scene.mechanism, Planar):
         for row in (*scene.mechanism.drives, *scene.mechanism.loads):
             yield f"{row.kind} {row.name}"

@@ -88,6 +88,8 @@ class PlanarTorque(Table):
     """That the torque turns, against the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
     """N m, constant or over a revolution of the body that gives the period."""
+    no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
+    """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
     """rad/s; 0 starts from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None

@@ -88,7 +88,7 @@ class ConstantSpeed(Table):
     """Crank speed, rad/s, counter-clockwise."""
 
     elsewhere: ClassVar = dict.fromkeys(
-        ("torque", "flywheel_inertia", "initial_speed", "expected_speed"),
+        ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
         (
             "contradicts a prescribed crank speed",
             'Remove it, or set drive.kind = "torque" and give initial_speed instead of speed',
@@ -102,6 +102,8 @@ class TorqueDrive(Table):
     kind: Literal["torque"]
     torque: Annotated[Curve, CurveOf("N*m")]
     """N m, constant or ``[[crank angle, torque], ...]`` over one turn."""
+    no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
+    """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Inertia that turns with the crank, kg m2."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]

@@ -137,7 +137,7 @@ def nine_coordinates(effects, crank_rod, rod_slider, work, par, i, W):
     g = gravity_of(effects.gravity, par, i, W)
     moment = par[at.CRANK_MOMENT * W + i]
     load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     # on the crank about its bearing, from everything but the rod
     rest = moment * (s * rx - c * ry) - product(effects.gravity, moment * c, g)
     here = Here(

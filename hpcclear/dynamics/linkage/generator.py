@@ -253,6 +253,10 @@ class _Generator:
             torque = write.let(
                 drive.name, torque * self._turned(drive.name, self.rows.torque_value)
             )
+        if drive.no_load_speed is not None:
+            speed = self.kinematics.spin(self.forest.frames[drive.body])
+            fall = write.parameter(f"{drive.name}_fall") * speed
+            torque = write.let(f"{drive.name}_falling", torque * (ONE - fall))
         return Column("angle", self.forest.frames[drive.body]), torque
 
     # ---- accelerations --------------------------------------------------------------------------

@@ -79,12 +79,14 @@ def load_of(load, load_table, par, looked_up, i, W):
 
 
 @lane_function
-def torque_of(torque_table, work, par, i, W):
+def torque_of(torque_table, torque_falls, work, par, omega, i, W):
     """Drive torque on the crank in N m."""
+    torque = par[at.TORQUE * W + i]
     if torque_table is not None:
-        return par[at.TORQUE * W + i] * work[at.TORQUE_VALUE * W + i]
-    else:
-        return par[at.TORQUE * W + i]
+        torque = torque * work[at.TORQUE_VALUE * W + i]
+    if torque_falls is not None:
+        torque = torque * (1.0 - par[at.TORQUE_FALL * W + i] * omega)
+    return torque
 
 
 @lane_function
@@ -287,7 +289,7 @@ def both_ideal(effects, work, par, phi, omega, i, W):
     dy2 = far * (st * k * k - ct * dk)
     g = gravity_of(effects.gravity, par, i, W)
     load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, work, par, i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     v3 = x3 * omega
     inertia = (
         par[at.CRANK_INERTIA * W + i]

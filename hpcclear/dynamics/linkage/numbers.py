@@ -98,6 +98,8 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
                 found[f"{drive.name}_shift"] = trees.offsets[drive.body]
             case TorqueDrive():
                 found[f"{drive.name}_torque"] = drive.torque
+                if drive.no_load_speed is not None:
+                    found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
                 found[f"{drive.name}_speed"] = drive.initial_speed
     for load in trees.mechanism.loads:
         match load:

@@ -172,7 +172,10 @@ class TableDrive:
 
 @dataclass(frozen=True)
 class TorqueDrive:
-    """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle."""
+    """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle.
+
+    Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one.
+    """
 
     name: str
     body: str
@@ -183,6 +186,7 @@ class TorqueDrive:
     period: bool = False
     turns: int = 1
     expected_speed: float | None = None
+    no_load_speed: float | None = None
     prescribed: ClassVar[bool] = False
 
     @property

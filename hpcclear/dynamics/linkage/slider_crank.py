@@ -26,6 +26,7 @@ from hpcclear.dynamics.linkage.parts import (
 PARAMETERS = {
     "drive_speed": at.SPEED,
     "drive_torque": at.TORQUE,
+    "drive_fall": at.TORQUE_FALL,
     "gravity": at.GRAVITY,
     "alpha2": at.BAUMGARTE_ALPHA2,
     "beta2": at.BAUMGARTE_BETA2,
@@ -63,7 +64,9 @@ def mechanism_of(effects: at.Effects) -> Mechanism:
     )
     drive: Drive = ConstantSpeed("drive", "crank", 1.0)
     if effects.torque:
-        drive = TorqueDrive("drive", "crank", 1.0, 1.0, table=bool(effects.torque_table))
+        falls = 1.0 if effects.torque_falls else None
+        table = bool(effects.torque_table)
+        drive = TorqueDrive("drive", "crank", 1.0, 1.0, table=table, no_load_speed=falls)
     loads: tuple[Load, ...] = ()
     if effects.load or effects.load_table:
         loads = (Force("load", "slider.pin", (1.0, 0.0), table=bool(effects.load_table)),)

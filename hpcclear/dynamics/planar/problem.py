@@ -26,7 +26,7 @@ PLACEHOLDER = 1e-3
 """Stands in the structure for a number that is nought in the scene and varied by its study: what is nought is not in a text."""
 
 NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
-                "torque", "flywheel_inertia", "stiffness", "damping", "size", "direction",
+                "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping", "size", "direction",
                 "coefficient", "ramp_speed")  # fmt: skip
 """Entries that no sample's start depends on."""
 

@@ -146,7 +146,7 @@ def _drive(drive: Any) -> parts.Drive:
     return parts.TorqueDrive(
         drive.name, drive.body, 1.0 if table else drive.torque,  # type: ignore[arg-type]
         drive.initial_speed, drive.flywheel_inertia, table, drive.period, drive.turns,
-        drive.expected_speed,
+        drive.expected_speed, drive.no_load_speed,
     )  # fmt: skip
 
 
@@ -230,5 +230,5 @@ def _slider_crank_drive(drive: Any) -> parts.Drive:
     table = isinstance(drive.torque, tuple)
     return parts.TorqueDrive(
         "drive", "crank", 1.0 if table else drive.torque, drive.initial_speed,
-        drive.flywheel_inertia, table, True, 1, drive.expected_speed,
+        drive.flywheel_inertia, table, True, 1, drive.expected_speed, drive.no_load_speed,
     )  # fmt: skip
