@@ -52,7 +52,7 @@ class RawFiles:
         self._objective, self._joints = objective, joints
 
     def write(self, number: int, records: np.ndarray) -> None:
-        """Write block `number`, all of its records in order."""
+        """Write block `number`, all of its records in order, shape (m,)."""
         content = samples_of(
             self._points.page(number), records, self._attributes, self._objective, self._joints
         )
@@ -130,11 +130,11 @@ class Bundles:
         self._sums.add(records.astype(OUTCOME))
 
     def finished(self) -> np.ndarray:
-        """Summaries (`PARTIAL`) of the bundles that are complete, once."""
+        """Summaries (`PARTIAL`, (m,)) of the bundles that are complete, once."""
         return self._packed(self._sums.hand_on())
 
     def unfinished(self) -> list[np.ndarray]:
-        """Summaries of what is complete of others, and where samples are kept, those that no file has."""
+        """Summaries of what is complete of others, and where samples are kept, those that no file has; shape (m,) each."""
         loose = [self._sums.loose()] if self._keeps else []
         return [self._packed(self._sums.parts()), *loose]
 

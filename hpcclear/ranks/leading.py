@@ -7,21 +7,42 @@ and within a node all is as between root and a few ranks.
 import contextlib
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Protocol
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.ranks.mailbox import Leave, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, Desk, HandOut, Kept, Need, Points
-from hpcclear.ranks.stopping import RankFailed, Stopped
-
-if TYPE_CHECKING:
-    from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
 _NONE = np.empty(0, np.int64)
+
+
+class Process(Protocol):
+    """What a lead needs of its own process; see `hpcclear.ranks.team.Ranks`."""
+
+    mail: Mail
+    stop_switch: StopSwitch
+    rank: int
+
+    def make_desk(self, task: Any, /) -> tuple[Desk, float]:
+        """A worker for a task, and the seconds it took to make it."""
+
+    def raise_if_stopped(self) -> None:
+        """Raise `Stopped` if asked to end early."""
+
+    def pass_on_stop(self) -> None:
+        """Tell root of a signal that only this rank may have got."""
+
+    def heed(self, message: Message, /) -> None:
+        """Act on what a rank may say at any time."""
+
+    def writing(self) -> AbstractContextManager[None]:
+        """Count the time inside as output."""
 
 
 class Sharing(Protocol):
@@ -35,13 +56,13 @@ class Sharing(Protocol):
         """Numbers of the samples in each of the bundles that came from root: their numbers (m,) and rows (m, d)."""
 
     def take(self, records: np.ndarray) -> None:
-        """Take finished samples."""
+        """Take finished samples, records (m,)."""
 
     def finished(self) -> np.ndarray:
-        """For root, once: a record for each bundle that is complete."""
+        """For root, once: a record for each bundle that is complete, shape (m,)."""
 
     def unfinished(self) -> list[np.ndarray]:
-        """For root, at the end: records of whatever was taken of others, by type."""
+        """For root, at the end: records of whatever was taken of others, by type, shape (m,) each."""
 
 
 class Lead:
@@ -49,7 +70,8 @@ class Lead:
 
     Parameters
     ----------
-    ranks : Ranks
+    ranks : Process
+        This one.
     book : HandOut
     points : Points
     members : iterable of int
@@ -57,7 +79,7 @@ class Lead:
     """
 
     def __init__(
-        self, ranks: "Ranks", book: HandOut, points: Points, members: Iterable[int]
+        self, ranks: Process, book: HandOut, points: Points, members: Iterable[int]
     ) -> None:
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
@@ -120,7 +142,7 @@ class RootLead(Lead):
     """Root's part in a stage; parameters as `Lead`."""
 
     def __init__(
-        self, ranks: "Ranks", book: HandOut, points: Points, members: Iterable[int]
+        self, ranks: Process, book: HandOut, points: Points, members: Iterable[int]
     ) -> None:
         super().__init__(ranks, book, points, members)
         self._members = sorted(self._present)
@@ -130,7 +152,7 @@ class RootLead(Lead):
         self.save: Callable[[], object] | None = None
         self.kept: Kept | None = None
 
-    def work(self, task: "Task", spent: np.ndarray) -> None:
+    def work(self, task: object, spent: np.ndarray) -> None:
         """Run the stage; whatever ends it, everything finished is collected and delivered.
 
         `spent`: seconds of each rank, columns as `COLUMNS`, to be filled in.
@@ -146,7 +168,7 @@ class RootLead(Lead):
             raise
         self._gather(until=None)
 
-    def _hand_out(self, task: "Task") -> None:
+    def _hand_out(self, task: object) -> None:
         """Answer the others and work along until every sample is finished."""
         desk, self._spent[0, _COMPILE] = self._ranks.make_desk(task)
         nap = Nap()
@@ -206,7 +228,7 @@ class RootLead(Lead):
 class NodeLead(Lead):
     """A leader's part in a stage: it takes bundles from root, and shares out what they hold with the others on its node."""
 
-    def __init__(self, ranks: "Ranks", sharing: Sharing, crew: list[int]) -> None:
+    def __init__(self, ranks: Process, sharing: Sharing, crew: list[int]) -> None:
         super().__init__(ranks, HandOut(0, _NONE, 1 + len(crew)), sharing.points, crew)
         self._sharing, self._crew = sharing, crew
         self._sizes: list[int] = []  # samples of each bundle
@@ -215,7 +237,7 @@ class NodeLead(Lead):
         self._asked = self._exhausted = self._over = False
         self._times: list[tuple[int, float, float]] = []
 
-    def work(self, task: "Task") -> None:
+    def work(self, task: object) -> None:
         """Serve the node until root ends the stage."""
         self._mail.tell(self._crew, Tag.STAGE, task)  # before the worker is made: nodes meet there
         desk, setup = self._ranks.make_desk(task)
