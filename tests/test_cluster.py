@@ -198,7 +198,7 @@ def test_leaders_of_nodes_share_out_what_one_process_makes(box, tmp_path):
     assert finish(start(statistics(here, 20_000), 0, PLAIN))[0] == 0
     code, output = ended(box, box.start(statistics(there, 20_000), 3, SHARED), 200.0)
     assert code == 0, output
-    assert len(contents(there)) == 1 + 5
+    assert len(contents(there)) == 1 + 5 + 1
     assert contents(there) == contents(here)
 
 
