@@ -8,7 +8,7 @@ Root's seconds are those of its own thread, so that others on its core do not co
 with 2 ranks against how many samples came and went with each; it says what those of 64 ranks should have taken together,
 and that is set against what they took. So are samples written by root.
 
-Then samples that are made at once, so that only what is done with them counts: `sample`, which keeps them all, and
+Then samples that root makes at once, so that only what is done with them counts: `sample`, which keeps them all, and
 `sample --statistics --raw`, which writes them as they come, with memory of root, time to write and time to open.
 """
 
@@ -248,7 +248,7 @@ def memory(counts: list[int]) -> str:
                 continue
             with tempfile.TemporaryDirectory() as place:
                 folder = Path(place)
-                found = launch(task, 2, samples, folder, 0.0)
+                found = launch(task, 1, samples, folder, 0.0)
                 name = folder / ("samples.nc" if task == "sample" else "raw/samples.nc")
                 size = sum(file.stat().st_size for file in folder.rglob("*.nc")) / 1e6
                 opened, summed = opening(name)
@@ -281,12 +281,13 @@ def main() -> int:
     """Trials and tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--memory", action="store_true", help="memory alone")
     parser.add_argument("--inside", nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.inside:
         return inside(options.inside[0], int(options.inside[1]))
-    print(confirmed(fitted(), 16 if options.quick else 64), flush=True)
-    print()
+    if not options.memory:
+        print(confirmed(fitted(), 16 if options.quick else 64), end="\n\n", flush=True)
     print(memory([10**k for k in range(4, 6 if options.quick else 8)]))
     return 0
 

@@ -36,6 +36,7 @@ from scaling_model import (
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import part_length
+from hpcclear.ensemble.statistics import SHARED_FROM
 from hpcclear.ranks.schedule import HandOut, Need
 from hpcclear.results.dataset import provenance
 
@@ -257,6 +258,8 @@ def draw(data: xr.Dataset, path: Path) -> None:
 def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
     """Where the package's policy falls below the limit, and what root does there."""
     chosen = data.sel(samples=length, policy=policy)
+    if policy in (SHARED, KEPT):  # for few, things are not shared out twice
+        chosen = chosen.sel(ranks=chosen["ranks"] >= SHARED_FROM)
     short = chosen["efficiency"].values < LIMIT
     if not short.any():
         return f"{policy}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"

@@ -129,16 +129,19 @@ class HandOut:
         if np.unique(completed).size != completed.size:
             raise ValueError("a sample is completed twice")
         self._ranks = ranks
-        waiting = np.ones(total, bool)
-        waiting[completed] = False
-        self._queue = np.flatnonzero(waiting)
+        self._total = total
+        self._queue: np.ndarray | None = None  # of all in order there is no list
+        if completed.size:
+            waiting = np.ones(total, bool)
+            waiting[completed] = False
+            self._queue = np.flatnonzero(waiting)
         self._next = 0
         self.outstanding = 0
 
     @property
     def remaining(self) -> int:
         """Samples not handed out yet."""
-        return self._queue.size - self._next
+        return (self._total if self._queue is None else self._queue.size) - self._next
 
     @property
     def done(self) -> bool:
@@ -148,15 +151,18 @@ class HandOut:
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
         """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
         size, ask_below = allot(self.remaining, self._ranks, need)
-        index = self._queue[self._next : self._next + size]
+        index = self._waiting(self._next, self._next + size)
         self._next += size
         self.outstanding += size
         return index, ask_below
 
     def extend(self, samples: np.ndarray) -> None:
         """More samples to hand out, by their numbers (m,)."""
-        self._queue = np.concatenate([self._queue[self._next :], samples])
-        self._next = 0
+        left = self._waiting(self._next, self._next + self.remaining)
+        self._queue, self._next = np.concatenate([left, samples]), 0
+
+    def _waiting(self, first: int, last: int) -> np.ndarray:
+        return np.arange(first, last) if self._queue is None else self._queue[first:last]
 
     def accept(self, records: np.ndarray) -> None:
         """Book finished records."""
