@@ -232,7 +232,7 @@ def test_statistics_are_those_of_the_samples(tmp_path):
     assert hpcclear(*words, "-o", tmp_path / "samples.nc").returncode == 0
     statistics = dataset.read(out, "statistics")
     samples = dataset.read(tmp_path / "samples.nc", "samples")
-    (kept,) = raw.iterdir()
+    (kept,) = raw.glob("samples-*.nc")
     assert (dataset.read(kept, "samples")["objective"] == samples["objective"]).all()
     assert float(statistics["objective_mean"]) == pytest.approx(
         float(samples["objective"].mean()), rel=1e-12
