@@ -314,6 +314,8 @@ def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
 
     assert run(here, 0, shared=False) == 0
     assert run(there, 4) == 0
+    busy = xr.load_dataset(there / "timing.nc")["busy"].sel(stage="statistics")
+    assert busy[0] < 0.5 * busy[1:].mean()  # after the first block root only hands out
     assert run(stopped, 4, 0.5) == 3
     assert run(stopped, 2, 0.5, shared=False) == 3
     assert run(stopped, 3) == 0
@@ -357,6 +359,20 @@ def test_samples_that_were_not_kept_are_not_promised(tmp_path):
     run_statistics(scene, output, alone(), options=QUIET)
     with pytest.raises(InputError, match="were not kept"):
         run_statistics(scene, output, alone(), raw=raw, options=QUIET)
+
+
+@pytest.mark.parametrize("what", ["samples", "foreign"])
+def test_a_file_of_that_name_in_the_directory_is_not_lost(tmp_path, what):
+    other = tmp_path / "samples.nc"
+    if what == "samples":
+        run_statistics(scene_of(100), tmp_path / "o.nc", alone(), raw=tmp_path / "r", options=QUIET)
+        other.write_bytes((tmp_path / "r" / "samples-00000000.nc").read_bytes())
+    else:
+        other.write_text("mine")
+    before = other.read_bytes()
+    with pytest.raises(InputError, match="would be lost"):
+        run_statistics(scene_of(100), tmp_path / "p.nc", alone(), raw=tmp_path, options=QUIET)
+    assert other.read_bytes() == before
 
 
 @pytest.mark.mpi

@@ -94,6 +94,8 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
+    if raw is not None:
+        collection.check_place(raw)
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     with Session(place, statistics_key(scene, len(points)), ranks, options) as session:

@@ -195,6 +195,7 @@ class Ranks:
         with contextlib.closing(progress), self._timed(task.name) as spent:
             if not run.book.done:
                 run.work(task, spent)
+                self._desk = None
         return earlier[:0] if run.kept is None else run.kept.records()
 
     def everywhere(
