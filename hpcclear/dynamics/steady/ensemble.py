@@ -18,23 +18,29 @@ LOOSEST = 1e-5
 LOOSEST_LATCHED = 1e-6
 """Likewise with a damping that keeps the impact speed."""
 
-POOLED = 1.5
+POOLED = 2.0
 """Standard errors that the means at both tolerances may differ by for both to be used."""
 
-DOUBTED = 2.5
-"""Those from which on the looser tolerance is given up."""
+DOUBTED = 3.5
+"""Those from which on the looser tolerance is given up: at 2.5 every fifth ensemble did so by chance, at twice the price."""
 
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
-STRETCH = 10
+STRETCH = 8
 """Revolutions between two looks at an ensemble, and those that its peaks are told for."""
 
-FIRST = 4
+FIRST = 3
 """Stretches before the first look at an ensemble."""
 
-LASTING = 16
+LASTING = 20
 """Stretches before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
+
+APPROACH = 0.85
+"""Revolutions until the next look over those that seem to be needed: limits scatter, and what is too much is not undone."""
+
+LEAST = 0.08
+"""Revolutions until the next look over those so far, at least: each look is another chance to stop too early."""
 
 RESTLESS = 4
 """Doublings in a row over which the average moved no less than before, after which there is no steady mean."""
@@ -166,7 +172,9 @@ def _more(
     count = len(copies.start)
     left = max(effort.budget - effort.revolutions, 0)
     if seen.copies_count:
-        wanted = min(int(count * (1.1 * missing - 1.0)), 3 * count, left // (STRETCH * total))
+        wanted = min(
+            int(count * max(APPROACH * missing - 1.0, LEAST)), 3 * count, left // (STRETCH * total)
+        )
         wanted = max(wanted - wanted % 2, 2)
         new = _new_copies(effort, wanted)
         yield from _extend(effort, new, rtol, total)
@@ -174,7 +182,7 @@ def _more(
             _join(copies, new)
         return 0
     affordable = -(-left // (STRETCH * count))
-    wanted = int(np.ceil(used * (1.1 * missing - 1.0)))
+    wanted = int(np.ceil(used * max(APPROACH * missing - 1.0, LEAST)))
     return int(np.clip(wanted, 1, min(3 * total, max(affordable, 1))))
 
 
@@ -214,7 +222,8 @@ def _limits(copies: _Copies, speeds: Array | None) -> _Limits:
         limit = judging.student(kept.mean(axis=1))[2]
     several = bool(len(kept) > 1 and apart > 4.0 * within / len(kept))
     regime = Regime.SEVERAL if several else Regime.CHAOTIC
-    limit = float(np.hypot(limit, 0.5 * bias))  # chance, or half of a bias that is none
+    excess = max(bias**2 - doubt**2, 0.0)  # over what chance alone makes of a bias that is none
+    limit = float(np.hypot(limit, 0.5 * excess**0.5))
     if coherent or max(apart, within if np.isfinite(within) else 0.0) < (1e-5 * mean) ** 2:
         regime = Regime.REGULAR
         limit += 0.5 * abs(bias)  # nothing else shows what tolerances do
