@@ -92,7 +92,7 @@ class Books:
 
     def open(self) -> None:
         """Watch from now on."""
-        from hpcclear.ensemble.bundles import RawFiles
+        from hpcclear.ensemble.raw import RawFiles
         from hpcclear.ranks.leading import RootLead
         from hpcclear.ranks.mailbox import Mail
         from hpcclear.ranks.schedule import HandOut

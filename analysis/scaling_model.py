@@ -300,17 +300,27 @@ def simulate_shared(
 
     A node is a root and few ranks that never have more than two bundles in stock; to root it is one rank, that takes bundles.
     Root itself simulates nothing. What a node loses at its end and what nodes lose waiting for root is multiplied: the worst of
-    both. `keeps`: leaders write all samples.
+    both. `keeps`: all samples are written, by leaders, or by ranks that make a block in time.
     """
     nodes, size = max((ranks - 1) // NODE, 1), min(ranks - 1, NODE)
     total = max(round(nodes * size * work / costs.mean), nodes)
     length = bundle_length(total, nodes, ranks, costs.mean, keeps)
 
-    def stocked(remaining: int, members: int, need: Need) -> Allotment:
-        return policy(min(remaining, 2 * length), members, need)
+    by_block = keeps and part_length(total, ranks, BLOCK, costs.mean) == BLOCK
+    item = BLOCK if by_block else 1  # samples that the leader hands out at once
 
-    inside = costs._replace(record=costs.record + keeps * costs.written)
-    node = _run(_Root(inside, _Team(inside, size, LANES, seed), total // nodes, stocked))
+    def stocked(remaining: int, members: int, need: Need) -> Allotment:
+        return policy(min(remaining, 2 * length // item), members, need)
+
+    if by_block:
+        each = np.array([BLOCK * (costs.mean + costs.written)])
+        inside = costs._replace(samples=each, record=costs.partial, handed=0.0)
+        team = _Team(inside, size, 1, seed)
+        node = _run(_Root(inside, team, total // nodes // BLOCK, stocked), 0.5 * LANES / BLOCK)
+        node = node._replace(efficiency=node.efficiency * BLOCK * costs.mean / inside.mean)
+    else:
+        inside = costs._replace(record=costs.record + keeps * costs.written)
+        node = _run(_Root(inside, _Team(inside, size, LANES, seed), total // nodes, stocked))
     each = np.array([length * costs.mean / size])  # the sum of so many hardly varies
     bundles = costs._replace(samples=each, record=costs.partial, handed=0.0, batch=0.0)
     root = _Root(

@@ -102,6 +102,15 @@ def test_a_leader_that_writes_slowly_holds_up_its_node():
     assert simulate_shared(costs, 1000, PACKAGE, work=20.0).efficiency > 0.9
 
 
+def test_ranks_that_make_a_block_in_time_write_it_and_hold_nobody_up():
+    costs = FREE._replace(samples=FREE.samples / 8.0)
+    slow = costs._replace(written=2.0 * costs.mean / NODE)  # as above; of a rank's own time 3 %
+    found = simulate_shared(slow, 1000, PACKAGE, work=60.0, keeps=True)
+    free = simulate_shared(costs, 1000, PACKAGE, work=60.0, keeps=True)
+    assert free.efficiency > 0.93
+    assert found.efficiency == pytest.approx(free.efficiency / (1.0 + 2.0 / NODE), rel=0.01)
+
+
 def test_equal_seeds_give_equal_runs():
     first, again, other = (simulate(FREE, 50, PACKAGE, seed=seed) for seed in (1, 1, 2))
     assert first == again

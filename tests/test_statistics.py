@@ -12,7 +12,7 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.ensemble.bundles import Bundles
+from hpcclear.ensemble.bundles import BlockBundles, Bundles
 from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpacked
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
@@ -301,14 +301,15 @@ def written(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("keeps", [False, True])
+@pytest.mark.parametrize("keeps", ["nothing", "by leaders", "by ranks"])
 def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
     here, there, stopped = (tmp_path / name for name in ("here", "there", "stopped"))
     for place in (here, there, stopped):
         place.mkdir()
 
     def run(place: Path, ranks: int, *limit: float, shared: bool = True) -> int:
-        settings = {"RAW": str(place / "raw")} if keeps else {}
+        settings = {} if keeps == "nothing" else {"RAW": str(place / "raw")}
+        settings |= {"BLOCKS": "1"} if keeps == "by ranks" and ranks else {}
         settings |= {"SHARED": "1"} if shared else {}
         return launch(ranks, place / "out.nc", 120_000, *limit, **settings).returncode
 
@@ -320,7 +321,7 @@ def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
     assert run(stopped, 2, 0.5, shared=False) == 3
     assert run(stopped, 3) == 0
     assert written(there) == written(stopped) == written(here)
-    assert len(written(here)) == (1 + 30 + 1 if keeps else 1)
+    assert len(written(here)) == (1 if keeps == "nothing" else 1 + 30 + 1)
 
 
 @pytest.mark.mpi
@@ -373,6 +374,42 @@ def test_a_file_of_that_name_in_the_directory_is_not_lost(tmp_path, what):
     with pytest.raises(InputError, match="would be lost"):
         run_statistics(scene_of(100), tmp_path / "p.nc", alone(), raw=tmp_path, options=QUIET)
     assert other.read_bytes() == before
+
+
+def test_a_leader_merges_blocks_that_ranks_summed_up_and_wrote():
+    scene, total = scene_of(9000), 9000
+    worker, sums = MadeUp(), Accumulator(total)
+    points = MonteCarloPoints(scene, total)
+    worker.submit(np.arange(total), points[np.arange(total)])
+    sums.add(np.concatenate([worker.advance(1.0) for _ in range(9)]))
+    payload = {"design": scene.resolved(), "total": total, "edges": sums.edges, "block": 4096}
+    leader, wrote = BlockBundles(payload | {"raw": {"folder": "elsewhere"}}), {}
+    opened = leader.open(np.array([1, 2]), np.array([[0.0, 8192.0], [8192.0, 8192.0]]))
+    assert [blocks.tolist() for blocks in opened] == [[0, 1], [2]]
+    rank = Summariser(MadeUp(), points, sums.edges, wrote.__setitem__)
+    rank.submit(np.array([2, 1]), leader.points[np.array([2, 1])])
+    done = np.concatenate([rank.advance(1.0) for _ in range(20)])
+    assert sorted(done["sample"]) == [1, 2]
+    assert {number: len(records) for number, records in wrote.items()} == {1: 4096, 2: 808}
+    assert (wrote[2]["sample"] == np.arange(8192, 9000)).all()
+    leader.take(done)
+    (last,) = leader.finished()
+    assert (last["sample"], last["samples"]) == (2, 808)
+    (rest,) = leader.unfinished()
+    assert rest["first"].tolist() == [4096]
+
+
+@pytest.mark.mpi
+def test_ranks_write_the_samples_of_blocks_that_they_make_in_time(tmp_path):
+    for place in ("root", "ranks"):
+        (tmp_path / place).mkdir()
+        settings = {"BLOCKS": "1"} if place == "ranks" else {}
+        raw = str(tmp_path / place / "raw")
+        assert launch(2, tmp_path / place / "out.nc", 60_000, RAW=raw, **settings).returncode == 0
+    assert written(tmp_path / "ranks") == written(tmp_path / "root")
+    spent = {p: xr.load_dataset(tmp_path / p / "timing.nc")["write"] for p in ("root", "ranks")}
+    of_root = {p: float(s.sel(stage="statistics", rank=0)) for p, s in spent.items()}
+    assert of_root["ranks"] < 0.5 * of_root["root"]  # the first block and the checkpoint
 
 
 @pytest.mark.mpi

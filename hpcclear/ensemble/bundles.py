@@ -5,67 +5,22 @@ A bundle is a node of the tree over the design's samples (`hpcclear.statistics.s
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ensemble.parts import PARTIAL, packed, part_length
-from hpcclear.ensemble.session import samples_of
-from hpcclear.results import collection, dataset
+from hpcclear.ensemble.parts import PARTIAL, packed, part_length, take_parts
+from hpcclear.ensemble.raw import raw_files
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK
 
 if TYPE_CHECKING:
-    from hpcclear.base.objectives import Objective
-    from hpcclear.ranks.schedule import Worker
+    from hpcclear.ranks.schedule import Points, Worker
     from hpcclear.ranks.team import Ranks
-
-
-class RawFiles:
-    """Samples themselves, kept in a directory: a file of kind ``samples`` for each block, and one that shows all as one.
-
-    Parameters
-    ----------
-    folder : Path
-    points : MonteCarloPoints
-    attributes : mapping
-        Global attributes of the files.
-    objective : Objective
-    joints : sequence of str
-        Labels of the joints that records tell of.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        points: MonteCarloPoints,
-        attributes: Mapping[str, str],
-        objective: "Objective",
-        joints: Sequence[str],
-    ) -> None:
-        self._folder, self._points, self._attributes = folder, points, attributes
-        self._objective, self._joints = objective, joints
-
-    def write(self, number: int, records: np.ndarray) -> None:
-        """Write block `number`, all of its records in order, shape (m,)."""
-        content = samples_of(
-            self._points.page(number), records, self._attributes, self._objective, self._joints
-        )
-        dataset.write(content, self._folder / self._name(number))
-
-    def finish(self) -> None:
-        """All blocks are written: write the file that shows them as one."""
-        blocks = -(-len(self._points) // BLOCK)
-        collection.write(self._folder, [self._name(number) for number in range(blocks)])
-
-    @staticmethod
-    def _name(number: int) -> str:
-        return f"samples-{number:08d}.nc"
 
 
 def bundle_length(
@@ -88,26 +43,21 @@ def bundle_length(
 
 
 class Bundles:
-    """A leader's bundles; see `hpcclear.ranks.leading.Sharing`.
+    """A leader's bundles, shared out as samples; see `hpcclear.ranks.leading.Sharing`.
 
     Parameters
     ----------
     payload : mapping
         ``design`` and ``total``: a scene's content and its samples; ``edges``: of the histograms; ``block``: samples that are
-        summed up at once; ``raw``: None, or what `RawFiles` takes besides the points, by name.
+        summed up at once; ``raw``: as `raw_files` has it.
     """
 
     def __init__(self, payload: Mapping[str, Any]) -> None:
         scene = load_scene(payload["design"])
-        self.points = MonteCarloPoints(scene, payload["total"])
-        raw = payload["raw"]
-        self._keeps = raw is not None
-        files = None
-        if raw is not None:
-            objective = scene.objective_named(raw["objective"])
-            files = RawFiles(
-                Path(raw["folder"]), self.points, raw["attributes"], objective, raw["joints"]
-            )
+        points = MonteCarloPoints(scene, payload["total"])
+        self.points: Points = points
+        files = raw_files(payload["raw"], scene, points)
+        self._keeps = files is not None
         self._sums = Accumulator(
             payload["total"],
             block=payload["block"],
@@ -119,11 +69,15 @@ class Bundles:
 
     def open(self, index: Integers, rows: Array) -> list[Integers]:
         """Begin bundles: numbers (m,), rows of first sample and length (m, 2); the numbers of the samples of each."""
-        spans = rows.astype(np.int64).tolist()
-        self._numbers |= {first: k for k, (first, _) in zip(index.tolist(), spans, strict=True)}
-        self._sums.whole |= {(first, length) for first, length in spans}
         total = self._sums.total
-        return [np.arange(a, min(a + length, total)) for a, length in spans]
+        return [np.arange(a, min(a + n, total)) for a, n in self._begin(index, rows)]
+
+    def _begin(self, index: Integers, rows: Array) -> list[tuple[int, int]]:
+        """Begin bundles; first sample and length of each."""
+        spans = [(first, length) for first, length in rows.astype(np.int64).tolist()]
+        self._numbers |= {first: k for k, (first, _) in zip(index.tolist(), spans, strict=True)}
+        self._sums.whole |= set(spans)
+        return spans
 
     def take(self, records: np.ndarray) -> None:
         """Take finished samples, records of `OUTCOME` (m,)."""
@@ -145,6 +99,36 @@ class Bundles:
             for first, length, summary in nodes
         ]
         return np.concatenate(found) if found else np.zeros(0, PARTIAL)
+
+
+class BlockBundles(Bundles):
+    """A leader's bundles, shared out block by block: ranks sum these up, and write them where samples are kept."""
+
+    def __init__(self, payload: Mapping[str, Any]) -> None:
+        super().__init__({**payload, "raw": None})
+        self.points = BlockRows()
+
+    def open(self, index: Integers, rows: Array) -> list[Integers]:
+        """Begin bundles, as `Bundles` does; the numbers of the blocks of each."""
+        total, block = self._sums.total, self._sums.block
+        return [
+            np.arange(a // block, -(-min(a + n, total) // block))
+            for a, n in self._begin(index, rows)
+        ]
+
+    def take(self, records: np.ndarray) -> None:
+        """Take the summaries of blocks, records of `PARTIAL` (m,)."""
+        take_parts(self._sums, records)
+
+
+class BlockRows:
+    """Blocks by their numbers, as rows of first sample and length: all that there may be."""
+
+    def __len__(self) -> int:
+        return np.iinfo(np.int64).max // BLOCK
+
+    def __getitem__(self, index: Integers) -> Array:
+        return np.column_stack([index * BLOCK, np.full(len(index), BLOCK)]).astype(float)
 
 
 def make_simulator(payload: Mapping[str, Any], ranks: "Ranks") -> "Worker":

@@ -4,7 +4,7 @@ A part is a run of sample numbers that is a node of its block's tree (`statistic
 to a single bit how long parts are, who sums them up and in which order they come in.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +78,12 @@ def unpacked(record: np.void) -> Summary:
     return Summary(**row)
 
 
+def take_parts(sums: Accumulator, records: np.ndarray) -> None:
+    """Let an accumulator take summaries, records of `PARTIAL` (m,)."""
+    for record in records:
+        sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+
+
 class Parts:
     """What is left of a design, as parts: rows of first sample and length, made when they are asked for.
 
@@ -110,12 +116,21 @@ class Summariser:
         Makes the design's points by sample number.
     edges : ndarray, shape (rows, bins + 1)
         Of the histograms.
+    on_block : callable, optional
+        Gets number and records (in index order) of every part, which is a block then; it may keep raw samples.
     """
 
     lanes = 1  # parts at once: one is worked on while the next fills lanes that it leaves
 
-    def __init__(self, worker: "Worker", points: "Points", edges: Array) -> None:
+    def __init__(
+        self,
+        worker: "Worker",
+        points: "Points",
+        edges: Array,
+        on_block: Callable[[int, np.ndarray], object] | None = None,
+    ) -> None:
         self._worker, self._points, self._edges = worker, points, edges
+        self._on_block = on_block
         self._open: dict[int, np.ndarray] = {}  # records by part; sample -1: not here yet
         self._places: dict[int, tuple[int, int]] = {}  # first sample and length of each part
         self._missing: dict[int, int] = {}
@@ -165,17 +180,23 @@ class Summariser:
         records = self._open.pop(part)
         first, length = self._places.pop(part)
         del self._missing[part]
+        if self._on_block is not None:
+            self._on_block(first // length, records)
         return packed(part, first, length, records.size, summarise(records, self._edges, length))
 
 
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
-    """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated."""
+    """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated, and written
+    there if `payload["raw"]` says where (`hpcclear.ensemble.raw.raw_files`)."""
+    from hpcclear.ensemble.raw import raw_files
     from hpcclear.scene import load_scene
     from hpcclear.scene.sampling import MonteCarloPoints
 
     worker = payload["make"](payload["samples"], ranks)
-    points = MonteCarloPoints(load_scene(payload["design"]), payload["total"])
-    return Summariser(worker, points, payload["edges"])
+    scene = load_scene(payload["design"])
+    points = MonteCarloPoints(scene, payload["total"])
+    files = raw_files(payload["raw"], scene, points)
+    return Summariser(worker, points, payload["edges"], None if files is None else files.write)
 
 
 class PartsProgress(Progress):

@@ -12,7 +12,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
-from hpcclear.ensemble.bundles import Bundles, RawFiles, bundle_length, make_simulator
+from hpcclear.ensemble.bundles import BlockBundles, Bundles, bundle_length, make_simulator
 from hpcclear.ensemble.identity import statistics_key
 from hpcclear.ensemble.parts import (
     PARTIAL,
@@ -20,8 +20,9 @@ from hpcclear.ensemble.parts import (
     PartsProgress,
     make_summariser,
     part_length,
-    unpacked,
+    take_parts,
 )
+from hpcclear.ensemble.raw import raw_files
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
@@ -31,7 +32,7 @@ from hpcclear.results import collection, dataset, files
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
-from hpcclear.statistics.streams.summary import ROWS, Summary
+from hpcclear.statistics.streams.summary import BLOCK, ROWS, Summary
 
 STAGE = "statistics"
 
@@ -134,7 +135,6 @@ class _Streaming:
         self._session = session
         self._raw = None
         self._checkpoint = session.opened()
-        self._files = None
         if raw is not None:
             files.make_directory(raw)
             self._raw = {
@@ -143,7 +143,7 @@ class _Streaming:
                 "objective": scene.objective.name,
                 "joints": session.joints,
             }
-            self._files = RawFiles(raw, points, session.attributes, scene.objective, session.joints)
+        self._files = raw_files(self._raw, scene, points)
         leaders = session.ranks.mail.leaders
         self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
         self._sums = Accumulator(len(points), on_block=self._files.write if self._files else None)
@@ -158,13 +158,31 @@ class _Streaming:
     def run(self) -> xr.Dataset:
         """Simulate, and write the statistics."""
         with saving(self._save):
-            seconds = self._run_samples()
+            if self._raw is not None:
+                self._sums.forget_parts()
+            left = self._sums.remaining().begun(self._raw is not None or self._sums.edges is None)
+            seconds = self._run_samples(left)
             if not self._sums.complete:
-                (self._run_bundles if self._leaders else self._run_parts)(seconds)
+                self._run_rest(seconds)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
                     self._files.finish()
         return self._session.write(self._dataset())
+
+    def _run_rest(self, seconds: float) -> None:
+        """What is left in whole blocks; `seconds` of a rank for a sample, 0 if not known.
+
+        Where samples are kept, who sums up a block writes it: a rank where it makes one in time, else a leader or root.
+        """
+        length = part_length(
+            self._sums.total - self._sums.taken, self._session.ranks.size, BLOCK, seconds
+        )
+        if self._leaders:
+            self._run_bundles(seconds, by_block=self._raw is not None and length == BLOCK)
+        elif self._raw is None or length == BLOCK:
+            self._run_sums(Task(STAGE, make_summariser, self._summing(), PARTIAL), length)
+        else:
+            self._run_samples(self._sums.remaining())
 
     def _dataset(self) -> xr.Dataset:
         return statistics_dataset(
@@ -188,14 +206,9 @@ class _Streaming:
             task, points, on_records=take, save=self._save_when_due, progress=progress, keep=False
         )
 
-    def _run_samples(self) -> float:
-        """Let ranks send samples: all of them if root keeps them, else those of the first block, which decides the
-        histograms, and of blocks that an earlier run left with samples. Returns seconds of a rank for one; 0: none was made."""
-        if self._raw is not None:
-            self._sums.forget_parts()
-        left = self._sums.remaining()
-        if self._raw is None or self._leaders:
-            left = left.begun(self._sums.edges is None)
+    def _run_samples(self, left: Remaining) -> float:
+        """Let ranks send samples: those of the first block, which decides the histograms, of blocks that an earlier run left
+        with samples, of one that tells what a sample costs; or all, if root keeps them. Returns seconds of a rank for one."""
         if len(left) == 0:
             return 0.0
 
@@ -210,20 +223,16 @@ class _Streaming:
         busy = self._session.ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
         return float(busy) / len(left)
 
-    def _run_parts(self, seconds: float) -> None:
-        """Let ranks sum up what they simulate, so that root's work does not grow with the samples."""
-        left = self._sums.total - self._sums.taken
-        length = part_length(left, self._session.ranks.size, self._sums.block, seconds)
-        self._run_sums(Task(STAGE, make_summariser, self._summing(), PARTIAL), length)
-
-    def _run_bundles(self, seconds: float) -> None:
-        """Let the leaders of nodes share samples out and sum them up, so that root's work does not grow with the ranks."""
+    def _run_bundles(self, seconds: float, by_block: bool) -> None:
+        """Let the leaders of nodes share samples, or blocks, out and sum them up, so that root's work does not grow with the
+        ranks."""
         left, ranks = self._sums.total - self._sums.taken, self._session.ranks.size
         length = bundle_length(left, self._leaders, ranks, seconds, self._raw is not None)
-        block = min(length, self._sums.block)
+        block = min(length, BLOCK)
         self._sums.forget_parts(block)
-        payload = self._summing() | {"block": block, "raw": self._raw}
-        self._run_sums(Task(STAGE, make_simulator, payload, PARTIAL, share=Bundles), length)
+        payload = self._summing() | {"block": block}
+        make, share = (make_summariser, BlockBundles) if by_block else (make_simulator, Bundles)
+        self._run_sums(Task(STAGE, make, payload, PARTIAL, share=share), length)
 
     def _summing(self) -> dict[str, Any]:
         """What those who sum up need to know."""
@@ -233,6 +242,7 @@ class _Streaming:
             "design": self._design,
             "total": len(self._points),
             "edges": self._sums.edges,
+            "raw": self._raw,
         }
 
     def _run_sums(self, task: Task, length: int) -> None:
@@ -246,8 +256,7 @@ class _Streaming:
         if records.dtype != PARTIAL:
             self._sums.add(records)
             return
-        for record in records:
-            self._sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+        take_parts(self._sums, records)
 
 
 def statistics_dataset(

@@ -1,7 +1,7 @@
 """Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT].
 
-SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept.
-FAILS=rank: its worker raises once it has finished some thousand samples.
+SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept. BLOCKS=1: by the
+ranks that make them, however few blocks each gets. FAILS=rank: its worker raises once it has finished some thousand samples.
 """
 
 import os
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
-from hpcclear.ensemble import statistics
+from hpcclear.ensemble import parts, statistics
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks import launcher
@@ -90,6 +90,8 @@ def main(output: str, samples: str, limit: str = "") -> int:
     statistics.make_evaluator = make_made_up  # type: ignore[assignment]
     if "SHARED" in os.environ:
         statistics.SHARED_FROM = 2
+    if "BLOCKS" in os.environ:
+        parts.PARTS_A_RANK = 1
     with StopSwitch(ends_process=True) as stop:
         if limit:
             stop.limit_time(float(limit))

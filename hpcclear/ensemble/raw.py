@@ -1,0 +1,76 @@
+"""Samples themselves of a run of statistics, kept in files by whoever has all samples of a block: root, a leader, a rank."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcclear.ensemble.session import samples_of
+from hpcclear.results import collection, dataset
+from hpcclear.scene import Scene
+from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.statistics.streams.summary import BLOCK
+
+if TYPE_CHECKING:
+    from hpcclear.base.objectives import Objective
+
+
+class RawFiles:
+    """Samples themselves, kept in a directory: a file of kind ``samples`` for each block, and one that shows all as one.
+
+    Parameters
+    ----------
+    folder : Path
+    points : MonteCarloPoints
+    attributes : mapping
+        Global attributes of the files.
+    objective : Objective
+    joints : sequence of str
+        Labels of the joints that records tell of.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        points: MonteCarloPoints,
+        attributes: Mapping[str, str],
+        objective: "Objective",
+        joints: Sequence[str],
+    ) -> None:
+        self._folder, self._points, self._attributes = folder, points, attributes
+        self._objective, self._joints = objective, joints
+
+    def write(self, number: int, records: np.ndarray) -> None:
+        """Write block `number`, all of its records in order, shape (m,)."""
+        content = samples_of(
+            self._points.page(number), records, self._attributes, self._objective, self._joints
+        )
+        dataset.write(content, self._folder / self._name(number))
+
+    def finish(self) -> None:
+        """All blocks are written: write the file that shows them as one."""
+        blocks = -(-len(self._points) // BLOCK)
+        collection.write(self._folder, [self._name(number) for number in range(blocks)])
+
+    @staticmethod
+    def _name(number: int) -> str:
+        return f"samples-{number:08d}.nc"
+
+
+def raw_files(
+    raw: Mapping[str, Any] | None, scene: Scene, points: MonteCarloPoints
+) -> RawFiles | None:
+    """What writes the samples of a scene's points, from what travels to ranks; None if they are not kept.
+
+    Parameters
+    ----------
+    raw : mapping or None
+        ``folder``, ``attributes``, ``objective`` (its name) and ``joints``; see `RawFiles`.
+    scene : Scene
+    points : MonteCarloPoints
+    """
+    if raw is None:
+        return None
+    objective = scene.objective_named(raw["objective"])
+    return RawFiles(Path(raw["folder"]), points, raw["attributes"], objective, raw["joints"])
