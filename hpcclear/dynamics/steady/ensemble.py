@@ -22,7 +22,7 @@ POOLED = 2.0
 """Standard errors that the means at both tolerances may differ by for both to be used."""
 
 DOUBTED = 3.5
-"""Those from which on the looser tolerance is given up: at 2.5 every fifth ensemble did so by chance, at twice the price."""
+"""Those from which on the looser tolerance is given up: at 2.5 more of them did so by chance, at twice the price."""
 
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
