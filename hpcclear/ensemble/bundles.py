@@ -109,7 +109,7 @@ class BlockBundles(Bundles):
         self.points = BlockRows()
 
     def open(self, index: Integers, rows: Array) -> list[Integers]:
-        """Begin bundles, as `Bundles` does; the numbers of the blocks of each."""
+        """Begin bundles: numbers (m,), rows of first sample and length (m, 2); the numbers of the blocks of each."""
         total, block = self._sums.total, self._sums.block
         return [
             np.arange(a // block, -(-min(a + n, total) // block))

@@ -31,18 +31,24 @@ def request(
     return connection
 
 
+def tell(connection: socket.socket, number: int) -> None:
+    """Tell a signal to the program behind a connection; one that has ended needs none."""
+    try:  # noqa: SIM105 - contextlib would have to be loaded
+        connection.send(str(number).encode())
+    except OSError:
+        pass
+
+
 if __name__ == "__main__":
     signals = [signal.Signals[n] for n in ("SIGINT", "SIGTERM", "SIGUSR1", "SIGUSR2", "SIGHUP")]
     numbers = [0, 1, 2, *(int(os.environ[name]) for name in ("PMI_FD",) if name in os.environ)]
     with request(sys.argv[1], sys.argv[2:], {number: number for number in numbers}) as answer:
         for one in signals:
-            signal.signal(one, lambda number, _: answer.send(str(number).encode()))
+            signal.signal(one, lambda number, _: tell(answer, number))
         for number in numbers[3:]:
             os.close(number)  # the launcher waits for its end
         code = int(answer.recv(16) or b"70")
-        for (
-            one
-        ) in signals:  # as the program itself at its end: one that comes too late ends nothing
+        for one in signals:  # as the program itself at its end: what comes too late ends nothing
             signal.signal(one, signal.SIG_IGN)
     if code < 0:
         if -code != signal.SIGKILL:
