@@ -172,14 +172,16 @@ class _Streaming:
     def _run_rest(self, seconds: float) -> None:
         """What is left in whole blocks; `seconds` of a rank for a sample, 0 if not known.
 
-        Where samples are kept, who sums up a block writes it: a rank where it makes one in time, else a leader or root.
+        Where samples are kept, who sums up a block writes it: a rank where it makes one in time, else a leader or root. Without
+        leaders ranks on other nodes write nothing: they may not see root's files.
         """
+        mail = self._session.ranks.mail
         length = part_length(
             self._sums.total - self._sums.taken, self._session.ranks.size, BLOCK, seconds
         )
         if self._leaders:
             self._run_bundles(seconds, by_block=self._raw is not None and length == BLOCK)
-        elif self._raw is None or length == BLOCK:
+        elif self._raw is None or (length == BLOCK and mail.node_size == mail.size):
             self._run_sums(Task(STAGE, make_summariser, self._summing(), PARTIAL), length)
         else:
             self._run_samples(self._sums.remaining())
