@@ -17,7 +17,7 @@ from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpa
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
+from hpcclear.results import collection, dataset
 from hpcclear.scene.sampling import MonteCarloPoints, monte_carlo
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import ROWS, Summary, columns, empty, merge, summarise
@@ -355,6 +355,19 @@ def test_many_files_of_samples_open_as_one(tmp_path):
     assert left.isel(sample=slice(8192, None)).equals(expected.isel(sample=slice(8192, None)))
 
 
+def test_of_too_many_files_none_shows_all_as_one_and_that_is_said(tmp_path, monkeypatch, capsys):
+    scene, output, raw = scene_of(9000), tmp_path / "out.nc", tmp_path / "raw"
+    run_statistics(scene_of(100), tmp_path / "earlier.nc", alone(), raw=raw, options=QUIET)
+    assert (raw / "samples.nc").exists()
+    monkeypatch.setattr(collection, "LISTED", 2)
+    for _ in range(2):  # a finished run is found, with its samples
+        run_statistics(scene, output, alone(), raw=raw, options=QUIET)
+    assert "3 files of samples" in capsys.readouterr().err
+    assert sorted(path.name for path in raw.iterdir()) == [
+        f"samples-{number:08d}.nc" for number in range(3)
+    ]
+
+
 def test_samples_that_were_not_kept_are_not_promised(tmp_path):
     scene, output, raw = scene_of(9000), tmp_path / "out.nc", tmp_path / "raw"
     run_statistics(scene, output, alone(), options=QUIET)
@@ -401,12 +414,14 @@ def test_a_leader_merges_blocks_that_ranks_summed_up_and_wrote():
 
 @pytest.mark.mpi
 def test_ranks_write_the_samples_of_blocks_that_they_make_in_time(tmp_path):
-    for place in ("root", "ranks"):
+    places = {"root": {}, "ranks": {"BLOCKS": "1"}, "apart": {"BLOCKS": "1", "APART": "1"}}
+    for place, settings in places.items():
         (tmp_path / place).mkdir()
-        settings = {"BLOCKS": "1"} if place == "ranks" else {}
         raw = str(tmp_path / place / "raw")
-        assert launch(2, tmp_path / place / "out.nc", 60_000, RAW=raw, **settings).returncode == 0
+        done = launch(2, tmp_path / place / "out.nc", 60_000, RAW=raw, **settings)
+        assert done.returncode == 0, done.stderr
     assert written(tmp_path / "ranks") == written(tmp_path / "root")
+    assert written(tmp_path / "apart") == written(tmp_path / "root")  # others do not see its files
     spent = {p: xr.load_dataset(tmp_path / p / "timing.nc")["write"] for p in ("root", "ranks")}
     of_root = {p: float(s.sel(stage="statistics", rank=0)) for p, s in spent.items()}
     assert of_root["ranks"] < 0.5 * of_root["root"]  # the first block and the checkpoint

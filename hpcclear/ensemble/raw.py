@@ -48,10 +48,22 @@ class RawFiles:
         )
         dataset.write(content, self._folder / self._name(number))
 
-    def finish(self) -> None:
-        """All blocks are written: write the file that shows them as one."""
+    def finish(self) -> str:
+        """All blocks are written: write the file that shows them as one; a line for the user if they are too many for that."""
         blocks = -(-len(self._points) // BLOCK)
-        collection.write(self._folder, [self._name(number) for number in range(blocks)])
+        if blocks <= collection.LISTED:
+            collection.write(self._folder, [self._name(number) for number in range(blocks)])
+            return ""
+        (self._folder / collection.NAME).unlink(missing_ok=True)  # of an earlier run
+        return (
+            f"{blocks} files of samples are in {self._folder}, sample k in number k // {BLOCK}; "
+            f"{collection.NAME} shows at most {collection.LISTED} as one and was not written"
+        )
+
+    @staticmethod
+    def has_samples(folder: Path) -> bool:
+        """Whether samples have been written into a directory."""
+        return (folder / RawFiles._name(0)).exists()
 
     @staticmethod
     def _name(number: int) -> str:

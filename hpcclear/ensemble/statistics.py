@@ -22,7 +22,7 @@ from hpcclear.ensemble.parts import (
     part_length,
     take_parts,
 )
-from hpcclear.ensemble.raw import raw_files
+from hpcclear.ensemble.raw import RawFiles, raw_files
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
@@ -74,7 +74,8 @@ def run_statistics(
     samples : int, optional
         Number of samples, the study's by default.
     raw : Path, optional
-        Directory for the samples themselves, a file of kind ``samples`` for every 4096, and samples.nc, which shows all as one.
+        Directory for the samples themselves, a file of kind ``samples`` for every 4096, and samples.nc, which shows all as one
+        (of up to `collection.LISTED` files).
     options : Options
 
     Returns
@@ -101,7 +102,7 @@ def run_statistics(
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     with Session(place, statistics_key(scene, len(points)), ranks, options) as session:
         content = session.found("statistics")
-        if content is not None and raw is not None and not (raw / collection.NAME).exists():
+        if content is not None and raw is not None and not RawFiles.has_samples(raw):
             reason = f"the statistics are there, in {output}, and the samples were not kept"
             raise InputError("--raw", str(raw), reason, "Choose another output, or add --fresh")
         if content is None:
@@ -166,7 +167,9 @@ class _Streaming:
                 self._run_rest(seconds)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
-                    self._files.finish()
+                    told = self._files.finish()
+                if told:
+                    self._session.tell(told)
         return self._session.write(self._dataset())
 
     def _run_rest(self, seconds: float) -> None:

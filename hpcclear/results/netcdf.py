@@ -135,20 +135,30 @@ def encode(dataset: xr.Dataset) -> bytes:
 def _image(dataset: xr.Dataset, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
     """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
+    apart = [name for name in dataset.data_vars if name in elsewhere]
     with h5py.File(buffer, "w", track_order=True) as file:
-        scales = {
-            name: _encode_dimension(file, str(name), number, dataset, elsewhere)
-            for number, name in enumerate(dataset.sizes)
-        }
+        for number, name in enumerate(dataset.sizes):
+            _encode_dimension(file, str(name), number, dataset, elsewhere)
         for name in dataset.data_vars:
-            if name in scales:
+            if name in dataset.sizes:
                 raise ValueError(f"{name!r} names a dimension and a data variable")
-            variable = dataset[name]
-            target = _encode_variable(file, str(name), variable, elsewhere, filled=True)
-            for axis, dimension in enumerate(variable.dims):
-                target.dims[axis].attach_scale(scales[dimension])
+            if name not in elsewhere:
+                _encode_data(file, str(name), dataset[name], elsewhere)
         _encode_attributes(file, dataset.attrs)
+    for (
+        name
+    ) in apart:  # HDF5 keeps what it knows of variables until a file is closed: 4 kB of each piece
+        with h5py.File(buffer, "r+", track_order=True) as file:
+            _encode_data(file, str(name), dataset[name], elsewhere)
     return buffer
+
+
+def _encode_data(
+    file: h5py.File, name: str, variable: xr.DataArray, elsewhere: Mapping[str, Elsewhere]
+) -> None:
+    target = _encode_variable(file, name, variable, elsewhere, filled=True)
+    for axis, dimension in enumerate(variable.dims):
+        target.dims[axis].attach_scale(file[str(dimension)])
 
 
 def _encode_dimension(
@@ -157,7 +167,7 @@ def _encode_dimension(
     number: int,
     dataset: xr.Dataset,
     elsewhere: Mapping[str, Elsewhere],
-) -> h5py.Dataset:
+) -> None:
     if name in dataset.coords:
         scale = _encode_variable(file, name, dataset[name], elsewhere, filled=False)
         scale.make_scale(name)
@@ -167,7 +177,6 @@ def _encode_dimension(
         )
         scale.make_scale(_NO_VARIABLE % dataset.sizes[name])
     scale.attrs["_Netcdf4Dimid"] = np.int32(number)
-    return scale
 
 
 def _encode_variable(

@@ -1,7 +1,8 @@
 """Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT].
 
 SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept. BLOCKS=1: by the
-ranks that make them, however few blocks each gets. FAILS=rank: its worker raises once it has finished some thousand samples.
+ranks that make them, however few blocks each gets. APART=1: every rank on a node of its own, where only root sees the directory
+of samples. FAILS=rank: its worker raises once it has finished some thousand samples.
 """
 
 import os
@@ -14,6 +15,7 @@ import numpy as np
 
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.ensemble import parts, statistics
+from hpcclear.ensemble.raw import RawFiles
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks import launcher
@@ -80,8 +82,14 @@ def scene_of(samples: int):
     return load_scene(SCENE, ['study.method="monte-carlo"', f"study.samples={samples}"])
 
 
+def refused(*arguments: object) -> None:
+    raise PermissionError("this node has no such directory")
+
+
 def main(output: str, samples: str, limit: str = "") -> int:
     def program(ranks: Ranks) -> None:
+        if "APART" in os.environ:
+            ranks.mail.node_size = 1
         options = Options(style="quiet")
         raw = Path(os.environ["RAW"]) if "RAW" in os.environ else None
         run_statistics(scene_of(int(samples)), Path(output), ranks, raw=raw, options=options)
@@ -90,6 +98,8 @@ def main(output: str, samples: str, limit: str = "") -> int:
     statistics.make_evaluator = make_made_up  # type: ignore[assignment]
     if "SHARED" in os.environ:
         statistics.SHARED_FROM = 2
+    if "APART" in os.environ and launcher.launched_rank() != 0:
+        RawFiles.write = refused  # type: ignore[assignment]
     if "BLOCKS" in os.environ:
         parts.PARTS_A_RANK = 1
     with StopSwitch(ends_process=True) as stop:
