@@ -5,8 +5,9 @@
 
 No kernel: a rank's samples take as long as they would, asleep, so that as many ranks fit on few cores as sleep there.
 Root's seconds are those of its own thread, so that others on its core do not count. A line is fitted to what messages took
-with 2 ranks against how many samples came and went with each; it says what those of 64 ranks should have taken together,
-and that is set against what they took. So are samples written by root.
+with 8 ranks against how many samples came and went with each; it says what those of 64 ranks should have taken together,
+and that is set against what they took. So are samples written by root. With 2 ranks a message takes a quarter more: root
+sleeps between them, and finds its caches cold.
 
 Then samples that root makes at once, so that only what is done with them counts: `sample`, which keeps them all, and
 `sample --statistics --raw`, which writes them as they come, with memory of root, time to write and time to open.
@@ -30,6 +31,7 @@ import numpy as np
 
 MILLISECONDS = 3.3  # a sample takes, asleep
 SECONDS = 20.0  # of the trial
+FITTED = 8  # ranks that the line is fitted to
 
 
 # ---- on the ranks ----------------------------------------------------------------------------------
@@ -202,8 +204,8 @@ def trial(ranks: int, rate: float, seconds: float) -> dict[str, Any]:
 
 
 def fitted(seconds: float = SECONDS) -> Line:
-    """The line of 2 ranks, from short and long samples: least squares, a tenth of the messages that took longest left out."""
-    trials = [trial(2, rate, seconds) for rate in (100.0, 1e3 / MILLISECONDS, 3000.0)]
+    """The line of `FITTED` ranks, from short and long samples: least squares, a tenth of the messages that took longest left out."""
+    trials = [trial(FITTED, rate, seconds) for rate in (100.0, 1e3 / MILLISECONDS, 3000.0)]
     rows = np.array([row for one in trials for row in one["messages"]])
     size = 0.5 * (rows[:, 1] + rows[:, 2])
     kept = np.full(len(rows), True)
@@ -228,7 +230,7 @@ def confirmed(line: Line, ranks: int) -> str:
     files = float(np.median(written[:, 0] / written[:, 1]))
     return "\n".join(
         [
-            f"2 ranks: {line.message * 1e6:.3g} us a message, {line.sample * 1e6:.3g} us a sample handed out and taken in, "
+            f"{FITTED} ranks: {line.message * 1e6:.3g} us a message, {line.sample * 1e6:.3g} us a sample handed out and taken in, "
             f"{line.written * 1e6:.3g} us one written",
             f"{ranks} ranks, {found['seconds']:.0f} s: {len(rows)} messages, {rows[:, 1].sum():.0f} records of others",
             f"  messages: {expected:.3f} s expected, {spent:.3f} s spent: ratio {spent / expected:.2f}",
