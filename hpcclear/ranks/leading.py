@@ -15,7 +15,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, Desk, HandOut, Kept, Need, Points
+from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Desk, HandOut, Kept, Need, Points
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
@@ -84,6 +84,7 @@ class Lead:
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
         self._present = set(members)  # ranks that will still say DONE
+        self._new = dict.fromkeys(self._present, 2)  # asks until their pace is known
         self._closing = False
         self.book = book
 
@@ -107,6 +108,10 @@ class Lead:
 
     def _give(self, source: int, need: Need) -> None:
         """Send a rank samples."""
+        if source in self._new:
+            self._new[source] -= 1 + (need.rate > 0.0)
+            if self._new[source] <= 0:
+                del self._new[source]
         index, ask_below = self.book.grant(need)
         self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
 
@@ -118,7 +123,8 @@ class Lead:
         if desk.idle:
             nap.take()
         else:
-            self._accept(desk.work())
+            soon = self._present and (self._new or self.book.ending)
+            self._accept(desk.work(GLANCE if soon else QUANTUM))
 
     @property
     def _can_answer(self) -> bool:

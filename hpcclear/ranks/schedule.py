@@ -13,6 +13,12 @@ import numpy as np
 QUANTUM = 0.03
 """Seconds of work between two looks into the mailbox; the longest a request waits at root."""
 
+GLANCE = 0.005
+"""The same while ranks wait for their first samples, or share the last: nobody should wait for long then."""
+
+ENDING = 0.3
+"""Seconds of work that are left to hand out when these are the last."""
+
 TAIL = 2.0
 """A block is at most 1/TAIL of a rank's fair share of what is left (guided self-scheduling)."""
 
@@ -136,6 +142,7 @@ class HandOut:
             waiting[completed] = False
             self._queue = np.flatnonzero(waiting)
         self._next = 0
+        self._rate = 0.0  # of who asked last
         self.outstanding = 0
 
     @property
@@ -148,8 +155,14 @@ class HandOut:
         """Whether every sample is finished."""
         return self.remaining == 0 and self.outstanding == 0
 
+    @property
+    def ending(self) -> bool:
+        """Whether what is left keeps the ranks busy for a moment only."""
+        return self.remaining <= ENDING * self._rate * self._ranks
+
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
         """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
+        self._rate = need.rate
         size, ask_below = allot(self.remaining, self._ranks, need)
         index = self._waiting(self._next, self._next + size)
         self._next += size
@@ -204,13 +217,20 @@ class Desk:
         The simulations of this rank.
     clock : callable
         Seconds; replaced by tests.
+    recent : ndarray, shape (2,), optional
+        Finished samples and busy seconds, the older the less weight: of such a worker before, and kept up.
     """
 
-    def __init__(self, worker: Worker, clock: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(
+        self,
+        worker: Worker,
+        clock: Callable[[], float] = time.perf_counter,
+        recent: np.ndarray | None = None,
+    ) -> None:
         self._worker = worker
         self._clock = clock
         self._in_hand: set[int] = set()
-        self._recent = np.zeros(2)  # finished samples and busy seconds, the older the less weight
+        self._recent = np.zeros(2) if recent is None else recent
         self._ask_below = 1
         self._inside = False
         self.busy = 0.0
@@ -227,6 +247,12 @@ class Desk:
     def hungry(self) -> bool:
         """Whether it is time to ask for more."""
         return not self.exhausted and self._worker.pending < self._ask_below
+
+    @property
+    def soon_hungry(self) -> bool:
+        """Whether it may be, within the next `QUANTUM`."""
+        need = self.need
+        return not self.exhausted and need.pending < self._ask_below + 2.0 * QUANTUM * need.rate
 
     @property
     def idle(self) -> bool:

@@ -6,6 +6,7 @@ poll with short sleeps, so that waiting costs nothing and errors and stops are h
 """
 
 import contextlib
+import pickle
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,7 +19,16 @@ from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, Desk, HandOut, Kept, Points, Worker
+from hpcclear.ranks.schedule import (
+    COLUMNS,
+    GLANCE,
+    QUANTUM,
+    Desk,
+    HandOut,
+    Kept,
+    Points,
+    Worker,
+)
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 FLUSH_INTERVAL = 1.0
@@ -82,6 +92,7 @@ class Ranks:
         self._write = 0.0  # seconds of output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
+        self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (see `Desk`)
         self.rank = mail.rank
         self.size = mail.size
         self.is_root = mail.rank == 0
@@ -271,7 +282,10 @@ class Ranks:
     def make_desk(self, task: Task) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
-        self._desk = Desk(task.make(task.payload, self))
+        mark = pickle.dumps((task.make, task.payload))
+        if mark != self._known:  # of a stage like the last one it is known how long samples take
+            self._known, self._recent = mark, np.zeros(2)
+        self._desk = Desk(task.make(task.payload, self), recent=self._recent)
         working = self.size if task.workers is None else task.workers
         self._desk.exhausted = self.rank >= working or (task.share is not None and self.is_root)
         return self._desk, time.perf_counter() - started
@@ -324,7 +338,7 @@ class Ranks:
             if desk.idle:
                 nap.take()
             else:
-                self._unsent.append(desk.work())
+                self._unsent.append(desk.work(GLANCE if desk.soon_hungry else QUANTUM))
         self.mail.send(leader, Tag.DONE, (self.outbox(), [(self.rank, desk.busy, setup)]))
 
     def outbox(self) -> np.ndarray | None:
