@@ -128,14 +128,24 @@ def is_root() -> bool:
     return launched_rank() in (0, None)
 
 
-def on_ranks(program: "Callable[[Ranks], int | None]", time_limit: float | None = None) -> int:
-    """Run a command that uses every rank."""
+SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")
+"""What every rank of every such command loads, in pieces: between two it hears what root says."""
+
+STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling")
+
+
+def on_ranks(
+    program: "Callable[[Ranks], int | None]",
+    time_limit: float | None = None,
+    ahead: tuple[str, ...] = SIMULATING,
+) -> int:
+    """Run a command that uses every rank; `ahead`: what the others load meanwhile."""
     from hpcclear.ranks.boundary import run_on_ranks
 
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
         stop.limit_time(time_limit)
-    return run_on_ranks(program, stop)
+    return run_on_ranks(program, stop, ahead)
 
 
 def say(text: str) -> None:

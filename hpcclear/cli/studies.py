@@ -11,6 +11,7 @@ from hpcclear.cli.options import (
     LIMIT,
     PROGRESS,
     SET,
+    STUDYING,
     on_ranks,
     output_option,
     place_of,
@@ -56,7 +57,7 @@ def run(
         )
         describe_study(place)
 
-    return on_ranks(program, time_limit)
+    return on_ranks(program, time_limit, STUDYING)
 
 
 @click.command(short_help="Show what accuracy costs in time.")

@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from hpcclear.base.cores import among_ranks
@@ -40,7 +40,11 @@ COMPLAINT_PATIENCE = 30.0
 """Seconds that a rank which cannot begin waits for them: they may be at something that needs no MPI."""
 
 
-def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None = None) -> int:
+def run_on_ranks(
+    program: Callable[[Ranks], int | None],
+    stop: StopSwitch | None = None,
+    ahead: Sequence[str] = (),
+) -> int:
     """Run `program` on root while the other ranks work for it: the boundary no error crosses.
 
     Parameters
@@ -49,6 +53,8 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
         Gets the `Ranks`; its return value is the exit code (None is 0).
     stop : StopSwitch, optional
         Entered already, to hear signals from early on; by default one without a time limit.
+    ahead : sequence of str
+        Modules that the other ranks load while root reads what is to be done.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def run_on_ranks(program: Callable[[Ranks], int | None], stop: StopSwitch | None
         if ranks.size > 1:
             among_ranks()
         with _watch(ranks):
-            code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks)
+            code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks, ahead)
         if ranks.size > 1:
             stop.leave_within(LAST_WAIT, code)  # for others that died on their way out
         mail.finalize()
@@ -260,10 +266,10 @@ def _dismiss(ranks: Ranks, code: int) -> int:
     return code
 
 
-def _as_worker(ranks: Ranks) -> int:
+def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
     """Work for root; an error goes to root, which reports it and ends the job."""
     try:
-        ranks.serve()
+        ranks.serve(ahead)
     except Leave as leave:
         code = leave.code
     except BaseException as error:  # noqa: BLE001 - the rank boundary

@@ -6,9 +6,10 @@ poll with short sleeps, so that waiting costs nothing and errors and stops are h
 """
 
 import contextlib
+import importlib
 import pickle
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -290,13 +291,15 @@ class Ranks:
         self._desk.exhausted = self.rank >= working or (task.share is not None and self.is_root)
         return self._desk, time.perf_counter() - started
 
-    def serve(self) -> NoReturn:
-        """Work for root, stage after stage, until it says to leave."""
-        nap = Nap(0.02)
+    def serve(self, ahead: Sequence[str] = ()) -> NoReturn:
+        """Work for root, stage after stage, until it says to leave; load the modules `ahead` while it says nothing yet."""
+        nap, waiting = Nap(0.02), list(ahead)
         while True:
             message = self.mail.poll()
             self.pass_on_stop()
-            if message is None:
+            if message is None and waiting:
+                importlib.import_module(waiting.pop(0))
+            elif message is None:
                 nap.take()
             elif message.tag == Tag.LEAVE:
                 raise Leave(message.body)

@@ -1,6 +1,7 @@
 """Responses of the original and the optimised designs, side by side (the paper's Fig. 10)."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -8,6 +9,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.responses import responses_of
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study
@@ -36,9 +38,13 @@ def simulations(study: Study) -> int:
 
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
     """The scene of one design, at the clearance of the comparison if the study names one, without a study."""
+    return run.scene.with_({"study": None, **_changes(run, choice, revolutions)})
+
+
+def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, object]:
+    """Entries of the scene of one design that are other ones."""
     settings = run.study.verification
     changes: dict[str, object] = {
-        "study": None,
         "numerics.averaged_revolutions": revolutions,
         "numerics.responses": run.scene.responses_asked(),
     }
@@ -47,7 +53,7 @@ def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
             changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance
-    return run.scene.with_(changes)
+    return changes
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
@@ -64,16 +70,17 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """
     settings = run.study.verification
     chosen = compared(run, designs)
-    table = []
-    for _, choice in chosen:
-        scene = scene_of(run, choice, settings.response_revolutions * settings.response_windows)
-        copies = []
-        for copy in range(settings.response_copies):
-            run.ranks.raise_if_stopped()
-            response = simulate(scene, run.scene.objective, copy)
-            copies.append(_statistics(scene, response, settings.response_windows))
-        table.append(copies)
-    return {"names": np.array([name for name, _ in chosen]), "statistics": np.array(table)}
+    revolutions = settings.response_revolutions * settings.response_windows
+    table = responses_of(
+        run.scene,
+        [_changes(run, choice, revolutions) for _, choice in chosen],
+        partial(_statistics, windows=settings.response_windows),
+        (settings.response_windows, len(STATISTICS), _quantities(run.scene)),
+        run.ranks,
+        "responses: simulations",
+        copies=settings.response_copies,
+    )
+    return {"names": np.array([name for name, _ in chosen]), "statistics": table}
 
 
 def write(run: StudyRun, designs: Sequence[Choice]) -> None:
@@ -105,14 +112,17 @@ def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
     """Statistics of each stretch of a steady response, (windows, statistics, quantities); NaN if it failed."""
-    # a linkage may have other joints, and no slider
-    told = ("contact_force", "crank_moment", "slider_acceleration")
-    names = [name for name in told if name in response]
+    shape = (windows, len(STATISTICS), _quantities(scene))
     if response["status"] != Status.OK:
-        quantities = np.column_stack([response[name].to_numpy() for name in names]).shape[1]
-        return np.full((windows, len(STATISTICS), quantities), np.nan)
+        return np.full(shape, np.nan)
     steady = _steady(scene, response)
-    parts = np.array_split(np.column_stack([steady[name].to_numpy() for name in names]), windows)
-    return np.array(
-        [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
-    )
+    missing = np.full(steady.sizes["time"], np.nan)  # a linkage may have no slider
+    told = ("contact_force", "crank_moment", "slider_acceleration")
+    columns = [steady[name].to_numpy() if name in steady else missing for name in told]
+    parts = np.array_split(np.column_stack(columns), windows)
+    found = [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
+    return np.array(found).reshape(shape)
+
+
+def _quantities(scene: Scene) -> int:
+    return len(scene.joint_labels) + 2

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
-from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.responses import responses_of
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
@@ -122,9 +123,8 @@ def write(run: StudyRun, result: Result) -> None:
 def _row(run: StudyRun, reading: Reading) -> dict[str, Array]:
     """Moments and f at the smallest clearance of all printed designs in one reading."""
     designs = printed_designs(run.scene)
-    if reading.over_steps:
-        return {"row": np.array([_over_steps(run, reading, one) for one in designs])}
-    return {"row": np.array(_over_time(run, reading, designs))}
+    found = (_over_steps if reading.over_steps else _over_time)(run, reading, designs)
+    return {"row": np.array(found)}
 
 
 def _over_time(
@@ -153,14 +153,31 @@ def _over_time(
     ]
 
 
-def _over_steps(run: StudyRun, reading: Reading, choice: Choice) -> tuple[float, ...]:
-    sampled = samples_of(run, choice, STEP_SAMPLES)
-    scene = _scene(run, reading)
-    values = [
-        _mean_over_steps(run, scene, sampled.names, row)
-        for row in np.vstack([sampled.values, _smallest(run, choice).values])
+def _over_steps(
+    run: StudyRun, reading: Reading, designs: Sequence[Choice]
+) -> list[tuple[float, ...]]:
+    """The same, a response each."""
+    rows = [
+        (batch.names, row)
+        for one in designs
+        for batch in (samples_of(run, one, STEP_SAMPLES), _smallest(run, one))
+        for row in batch.values
     ]
-    return (*_moments(np.array(values[:-1])[:, None]), values[-1])
+    variants: list[dict[str, object]] = []
+    for names, row in rows:
+        variants.append({"output.instants_per_revolution": 0})
+        for name, value in zip(names, row, strict=True):
+            variants[-1] |= dict.fromkeys(run.study.variable(name).paths, float(value))
+    f = responses_of(
+        _scene(run, reading),
+        variants,
+        _mean_over_steps,
+        (),
+        run.ranks,
+        f"{STAGE}: simulations",
+    )
+    parts = f.reshape(len(designs), -1)
+    return [(*_moments(part[:-1, None]), float(part[-1])) for part in parts]
 
 
 def _moments(values: Array) -> tuple[float, ...]:
@@ -170,22 +187,17 @@ def _moments(values: Array) -> tuple[float, ...]:
     return mean.value, mean.error, deviation.value, deviation.error, failed
 
 
-def _mean_over_steps(run: StudyRun, scene: Scene, names: Sequence[str], row: Array) -> float:
+def _mean_over_steps(scene: Scene, response: xr.Dataset) -> Array:
     """f of one sample, the mean of eq. 13 taken over the accepted steps; NaN if it failed."""
-    run.ranks.raise_if_stopped()
-    changes: dict[str, object] = {"output.instants_per_revolution": 0}
-    for name, value in zip(names, row, strict=True):
-        changes |= dict.fromkeys(run.study.variable(name).paths, float(value))
-    response = simulate(scene.with_(changes))
     if int(response["status"]) != Status.OK:
-        return float("nan")
+        return np.array(np.nan)
     turn = 2.0 * np.pi * scene.numerics.transient_revolutions
     steady = response["crank_angle"].to_numpy() >= turn
     distance = np.hypot(
         response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy()
     )[steady]
-    clearance = [row[list(names).index(_clearance(run))]] * len(JOINTS)
-    return float(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
+    clearance = [scene.number(f"joints.{joint}.clearance") for joint in JOINTS]
+    return np.array(np.sqrt(np.sum(abs(distance - clearance).mean(axis=0) ** 2)))
 
 
 def _smallest(run: StudyRun, choice: Choice) -> Points:

@@ -1,0 +1,93 @@
+"""Single responses of variants of a scene, on all ranks: of each what it boils down to."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Integers
+from hpcclear.ranks.team import Ranks, Task
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from hpcclear.scene import Scene
+
+
+def responses_of(
+    scene: "Scene",
+    variants: Sequence[Mapping[str, Any]],
+    told: Callable[["Scene", "xr.Dataset"], Array],
+    shape: tuple[int, ...],
+    ranks: Ranks,
+    stage: str,
+    copies: int = 1,
+) -> Array:
+    """What each response comes to, NaN where `told` says so; call it on root.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its study is left out; the objective is its own.
+    variants : sequence of mapping
+        Entries that are other ones, by their paths.
+    told : callable
+        A function of a module, of a variant and its response: values of `shape`.
+    shape : tuple of int
+    ranks : Ranks
+    stage : str
+        Name for reports and timing.
+    copies : int
+        Starts of each variant; all but the first are kicked.
+
+    Returns
+    -------
+    ndarray, shape (variants, copies, *shape)
+
+    Raises
+    ------
+    Stopped, RankFailed, InputError
+    """
+    content = scene.resolved()
+    content.pop("study", None)
+    payload = {"scene": content, "objective": scene.objective.name, "variants": list(variants), "told": told}  # fmt: skip
+    dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
+    rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
+    records = ranks.run_points(Task(stage, _Responses, payload | {"dtype": dtype}, dtype), rows)
+    return records["values"].reshape(len(variants), copies, *shape)
+
+
+class _Responses:
+    """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
+
+    lanes = 1
+
+    def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
+        from hpcclear.scene import load_scene
+
+        self._scene = load_scene(payload["scene"])
+        self._objective = self._scene.objective_named(payload["objective"])
+        self._variants, self._told = payload["variants"], payload["told"]
+        self._dtype = payload["dtype"]
+        self._queue: list[tuple[int, int, int]] = []
+
+    @property
+    def pending(self) -> int:
+        """Responses submitted and not finished."""
+        return len(self._queue)
+
+    def submit(self, index: Integers, points: Array) -> None:
+        """Queue responses (m,), rows of variant and copy (m, 2)."""
+        variants, copies = points.astype(int).T.tolist()
+        self._queue += zip(index.tolist(), variants, copies, strict=True)
+
+    def advance(self, seconds: float) -> np.ndarray:
+        """The next one, however long it takes."""
+        from hpcclear.dynamics.response import simulate
+
+        records = np.zeros(min(len(self._queue), 1), self._dtype)
+        for record in records:
+            record["sample"], variant, copy = self._queue.pop(0)
+            scene = self._scene.with_(self._variants[variant])
+            record["values"] = self._told(scene, simulate(scene, self._objective, copy)).ravel()
+        return records
