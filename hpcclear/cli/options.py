@@ -131,7 +131,7 @@ def is_root() -> bool:
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")
 """What every rank of every such command loads, in pieces: between two it hears what root says."""
 
-STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling")
+STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling", "hpcclear.study")
 
 
 def on_ranks(

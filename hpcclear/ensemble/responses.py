@@ -60,7 +60,7 @@ def responses_of(
 class _Responses:
     """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
 
-    lanes = 1
+    lanes = 2  # one under way, one in stock: who hands out may be at one of its own
 
     def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
         from hpcclear.scene import load_scene
