@@ -204,7 +204,7 @@ def trial(ranks: int, rate: float, seconds: float) -> dict[str, Any]:
 
 
 def fitted(seconds: float = SECONDS) -> Line:
-    """The line of `FITTED` ranks, from short and long samples: least squares, a tenth of the messages that took longest left out."""
+    """The line of `FITTED` ranks, from short and long samples: least squares; a tenth of the messages, the longest, is left out."""
     trials = [trial(FITTED, rate, seconds) for rate in (100.0, 1e3 / MILLISECONDS, 3000.0)]
     rows = np.array([row for one in trials for row in one["messages"]])
     size = 0.5 * (rows[:, 1] + rows[:, 2])
@@ -230,7 +230,7 @@ def confirmed(line: Line, ranks: int) -> str:
     files = float(np.median(written[:, 0] / written[:, 1]))
     return "\n".join(
         [
-            f"{FITTED} ranks: {line.message * 1e6:.3g} us a message, {line.sample * 1e6:.3g} us a sample handed out and taken in, "
+            f"{FITTED} ranks: {line.message * 1e6:.3g} us a message, {line.sample * 1e6:.3g} us a sample handed out and taken, "
             f"{line.written * 1e6:.3g} us one written",
             f"{ranks} ranks, {found['seconds']:.0f} s: {len(rows)} messages, {rows[:, 1].sum():.0f} records of others",
             f"  messages: {expected:.3f} s expected, {spent:.3f} s spent: ratio {spent / expected:.2f}",
