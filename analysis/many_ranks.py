@@ -204,7 +204,7 @@ def trial(ranks: int, rate: float, seconds: float) -> dict[str, Any]:
 
 
 def fitted(seconds: float = SECONDS) -> Line:
-    """The line of `FITTED` ranks, from short and long samples: least squares; a tenth of the messages, the longest, is left out."""
+    """The line of `FITTED` ranks, from short and long samples: least squares without the longest tenth of the messages."""
     trials = [trial(FITTED, rate, seconds) for rate in (100.0, 1e3 / MILLISECONDS, 3000.0)]
     rows = np.array([row for one in trials for row in one["messages"]])
     size = 0.5 * (rows[:, 1] + rows[:, 2])

@@ -283,7 +283,7 @@ class Ranks:
     def make_desk(self, task: Task) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
-        mark = pickle.dumps((task.make, task.payload))
+        mark = pickle.dumps((task.make, task.payload)) if self.size > 1 else b""
         if mark != self._known:  # of a stage like the last one it is known how long samples take
             self._known, self._recent = mark, np.zeros(2)
         self._desk = Desk(task.make(task.payload, self), recent=self._recent)

@@ -9,7 +9,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.responses import responses_of
+from hpcclear.ensemble.single import responses_of
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study

@@ -13,13 +13,12 @@ import numpy as np
 
 from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, asked
 from hpcclear.base.outcome import OUTCOME, Status, failed
-from hpcclear.ensemble import compiling, simulate
+from hpcclear.ensemble import compiling, simulate, single
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.study import responses, run_study
-from hpcclear.study.paper import readings
 from hpcclear.study.run import StudyRun
 
 JOINT = """\
@@ -186,7 +185,7 @@ def replace_dynamics(set_attribute: Callable[[object, str, object], None] = seta
     set_attribute(simulate, "make_evaluator", make_formula)
     set_attribute(compiling, "compile_share", compile_nothing)
     set_attribute(responses, "simulate", respond)
-    set_attribute(readings, "simulate", respond)
+    set_attribute(single, "simulate", respond)
 
 
 def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:

@@ -15,8 +15,8 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
-from hpcclear.ensemble.responses import responses_of
 from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.single import responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene

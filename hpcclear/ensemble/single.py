@@ -1,23 +1,21 @@
 """Single responses of variants of a scene, on all ranks: of each what it boils down to."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.dynamics.response import simulate
 from hpcclear.ranks.team import Ranks, Task
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from hpcclear.scene import Scene
+from hpcclear.scene import Scene, load_scene
 
 
 def responses_of(
-    scene: "Scene",
+    scene: Scene,
     variants: Sequence[Mapping[str, Any]],
-    told: Callable[["Scene", "xr.Dataset"], Array],
+    told: Callable[[Scene, xr.Dataset], Array],
     shape: tuple[int, ...],
     ranks: Ranks,
     stage: str,
@@ -53,18 +51,16 @@ def responses_of(
     payload = {"scene": content, "objective": scene.objective.name, "variants": list(variants), "told": told}  # fmt: skip
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
-    records = ranks.run_points(Task(stage, _Responses, payload | {"dtype": dtype}, dtype), rows)
+    records = ranks.run_points(Task(stage, Responses, payload | {"dtype": dtype}, dtype), rows)
     return records["values"].reshape(len(variants), copies, *shape)
 
 
-class _Responses:
+class Responses:
     """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
 
     lanes = 2  # one under way, one in stock: who hands out may be at one of its own
 
     def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
-        from hpcclear.scene import load_scene
-
         self._scene = load_scene(payload["scene"])
         self._objective = self._scene.objective_named(payload["objective"])
         self._variants, self._told = payload["variants"], payload["told"]
@@ -83,8 +79,6 @@ class _Responses:
 
     def advance(self, seconds: float) -> np.ndarray:
         """The next one, however long it takes."""
-        from hpcclear.dynamics.response import simulate
-
         records = np.zeros(min(len(self._queue), 1), self._dtype)
         for record in records:
             record["sample"], variant, copy = self._queue.pop(0)
