@@ -148,6 +148,29 @@ def test_hand_out_leaves_out_what_is_completed_and_ends_when_all_is_back():
     assert book.done
 
 
+def test_who_hands_out_knows_that_the_end_is_near():
+    book = HandOut(1000, np.empty(0, np.int64), 2)
+    near = []
+    while book.remaining:
+        book.grant(Need(4, 0, 500.0))
+        near.append((book.remaining, book.ending))
+    assert [ending for left, ending in near] == [0 < left <= 300 for left, _ in near]
+    assert 0.2 < np.mean([ending for _, ending in near]) < 1.0
+    unknown = HandOut(1000, np.empty(0, np.int64), 2)
+    assert not unknown.ending
+
+
+def test_the_pace_of_a_stage_is_known_to_the_next_like_it():
+    recent = np.zeros(2)
+    for expected in (0.0, 10.0):
+        worker = SimulatedWorker(1)
+        desk = Desk(worker, lambda worker=worker: worker.now, recent)
+        assert desk.need.rate == pytest.approx(expected)
+        desk.take(np.arange(20), np.column_stack([np.full(20, 0.1)]).ravel(), 1)
+        while not desk.idle:
+            desk.work(1.0)
+
+
 @pytest.mark.parametrize("completed", [[3], [-1], [1, 1]])
 def test_completed_samples_that_do_not_fit_the_design_are_refused(completed):
     with pytest.raises(ValueError, match="complet"):

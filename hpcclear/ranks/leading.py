@@ -18,6 +18,9 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Desk, HandOut, Kept, Need, Points
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
+EARLY = 1.0
+"""Seconds from the beginning of a stage in which the first samples are waited for."""
+
 _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
 _NONE = np.empty(0, np.int64)
 
@@ -85,6 +88,7 @@ class Lead:
         self._points = points
         self._present = set(members)  # ranks that will still say DONE
         self._new = dict.fromkeys(self._present, 2)  # asks until their pace is known
+        self._early = time.monotonic() + EARLY
         self._closing = False
         self.book = book
 
@@ -123,8 +127,13 @@ class Lead:
         if desk.idle:
             nap.take()
         else:
-            soon = self._present and (self._new or self.book.ending)
-            self._accept(desk.work(GLANCE if soon else QUANTUM))
+            self._accept(desk.work(GLANCE if self._awaited else QUANTUM))
+
+    @property
+    def _awaited(self) -> bool:
+        """Whether others wait for their first samples or share the last; some may have a kernel to compile, or none to get."""
+        early = bool(self._new) and time.monotonic() < self._early
+        return bool(self._present) and (early or self.book.ending)
 
     @property
     def _can_answer(self) -> bool:

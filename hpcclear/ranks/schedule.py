@@ -157,8 +157,8 @@ class HandOut:
 
     @property
     def ending(self) -> bool:
-        """Whether what is left keeps the ranks busy for a moment only."""
-        return self.remaining <= ENDING * self._rate * self._ranks
+        """Whether something is left to hand out, which keeps the ranks busy for a moment only."""
+        return 0 < self.remaining <= ENDING * self._rate * self._ranks
 
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
         """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
