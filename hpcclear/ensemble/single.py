@@ -48,10 +48,16 @@ def responses_of(
     """
     content = scene.resolved()
     content.pop("study", None)
-    payload = {"scene": content, "objective": scene.objective.name, "variants": list(variants), "told": told}  # fmt: skip
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
+    payload = {
+        "scene": content,
+        "objective": scene.objective.name,
+        "variants": list(variants),
+        "told": told,
+        "dtype": dtype,
+    }
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
-    records = ranks.run_points(Task(stage, Responses, payload | {"dtype": dtype}, dtype), rows)
+    records = ranks.run_points(Task(stage, Responses, payload, dtype), rows)
     return records["values"].reshape(len(variants), copies, *shape)
 
 
@@ -78,7 +84,7 @@ class Responses:
         self._queue += zip(index.tolist(), variants, copies, strict=True)
 
     def advance(self, seconds: float) -> np.ndarray:
-        """The next one, however long it takes."""
+        """The record of the next one, shape (1,), however long it takes; (0,) if there is none."""
         records = np.zeros(min(len(self._queue), 1), self._dtype)
         for record in records:
             record["sample"], variant, copy = self._queue.pop(0)
