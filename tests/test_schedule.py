@@ -171,6 +171,18 @@ def test_the_pace_of_a_stage_is_known_to_the_next_like_it():
             desk.work(1.0)
 
 
+def test_a_rank_looks_out_before_it_is_hungry():
+    worker = SimulatedWorker(1)
+    desk = Desk(worker, lambda: worker.now, np.array([1000.0, 1.0]))  # a thousand a second
+    desk.take(np.arange(200), np.full(200, 1e-3), 10)
+    assert not desk.soon_hungry
+    desk.work(0.15)  # 50 are left, which it finishes within two quanta
+    assert not desk.hungry
+    assert desk.soon_hungry
+    desk.exhausted = True
+    assert not desk.soon_hungry
+
+
 @pytest.mark.parametrize("completed", [[3], [-1], [1, 1]])
 def test_completed_samples_that_do_not_fit_the_design_are_refused(completed):
     with pytest.raises(ValueError, match="complet"):

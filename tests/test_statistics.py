@@ -368,11 +368,18 @@ def test_of_too_many_files_none_shows_all_as_one_and_that_is_said(tmp_path, monk
     ]
 
 
-def test_samples_that_were_not_kept_are_not_promised(tmp_path):
+def test_samples_that_were_not_kept_are_not_promised(tmp_path, monkeypatch):
     scene, output, raw = scene_of(9000), tmp_path / "out.nc", tmp_path / "raw"
     run_statistics(scene, output, alone(), options=QUIET)
     with pytest.raises(InputError, match="were not kept"):
         run_statistics(scene, output, alone(), raw=raw, options=QUIET)
+    run_statistics(scene, tmp_path / "other.nc", alone(), raw=raw, options=QUIET)
+    run_statistics(scene, output, alone(), raw=raw, options=QUIET)  # all there
+    (raw / "samples-00000001.nc").unlink()  # as after a stop that left some
+    for listed in (collection.LISTED, 2):
+        monkeypatch.setattr(collection, "LISTED", listed)
+        with pytest.raises(InputError, match="were not kept"):
+            run_statistics(scene, output, alone(), raw=raw, options=QUIET)
 
 
 @pytest.mark.parametrize("what", ["samples", "foreign"])

@@ -37,7 +37,7 @@ def compile_share(payload: Mapping[str, Any], ranks: Ranks) -> None:
     if ranks.size > 1 and ranks.is_root:
         mine = mine[
             :2
-        ]  # the first takes as long as the others together; the second is there by then, and only loaded
+        ]  # the first takes as long as the others together; then the second is there to load
     elif ranks.size > 1:
         mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
     for part in mine:

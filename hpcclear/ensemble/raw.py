@@ -61,9 +61,13 @@ class RawFiles:
         )
 
     @staticmethod
-    def has_samples(folder: Path) -> bool:
-        """Whether samples have been written into a directory."""
-        return (folder / RawFiles._name(0)).exists()
+    def all_in(folder: Path, samples: int) -> bool:
+        """Whether a directory has the files of so many samples, and the one that shows them."""
+        blocks = -(-samples // BLOCK)
+        needed = {RawFiles._name(number) for number in range(blocks)}
+        if blocks <= collection.LISTED:
+            needed.add(collection.NAME)
+        return folder.is_dir() and needed <= {path.name for path in folder.iterdir()}
 
     @staticmethod
     def _name(number: int) -> str:

@@ -27,18 +27,23 @@ if TYPE_CHECKING:
 Compiled = TypeVar("Compiled", bound="Worker")
 
 
-def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
-    """What a rank needs to know before it gets points: plain content, small, the same everywhere.
+def content_of(scene: "Scene") -> dict[str, Any]:
+    """A scene as it travels to ranks. Its study is left out: they simulate, whatever for.
 
-    The study is left out: ranks simulate, whatever for. What it asks of each sample goes into the numerics.
+    What the study asks of each sample goes into the numerics.
     """
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES
-
     content = scene.resolved()
     content.pop("study", None)
     content["numerics"]["responses"] = scene.responses_asked()
+    return content
+
+
+def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
+    """What a rank needs to know before it gets points: plain content, small, the same everywhere."""
+    from hpcclear.dynamics.evaluator import DEFAULT_LANES
+
     return {
-        "scene": content,
+        "scene": content_of(scene),
         "objective": scene.objective.name,
         "names": points.names,
         "paths": points.paths,

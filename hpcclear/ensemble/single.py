@@ -8,6 +8,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene, load_scene
 
@@ -46,11 +47,9 @@ def responses_of(
     ------
     Stopped, RankFailed, InputError
     """
-    content = scene.resolved()
-    content.pop("study", None)
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
     payload = {
-        "scene": content,
+        "scene": content_of(scene),
         "objective": scene.objective.name,
         "variants": list(variants),
         "told": told,

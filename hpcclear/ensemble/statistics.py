@@ -102,7 +102,7 @@ def run_statistics(
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     with Session(place, statistics_key(scene, len(points)), ranks, options) as session:
         content = session.found("statistics")
-        if content is not None and raw is not None and not RawFiles.has_samples(raw):
+        if content is not None and raw is not None and not RawFiles.all_in(raw, len(points)):
             reason = f"the statistics are there, in {output}, and the samples were not kept"
             raise InputError("--raw", str(raw), reason, "Choose another output, or add --fresh")
         if content is None:

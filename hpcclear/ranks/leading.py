@@ -87,7 +87,6 @@ class Lead:
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
         self._present = set(members)  # ranks that will still say DONE
-        self._new = dict.fromkeys(self._present, 2)  # asks until their pace is known
         self._early = time.monotonic() + EARLY
         self._closing = False
         self.book = book
@@ -112,10 +111,6 @@ class Lead:
 
     def _give(self, source: int, need: Need) -> None:
         """Send a rank samples."""
-        if source in self._new:
-            self._new[source] -= 1 + (need.rate > 0.0)
-            if self._new[source] <= 0:
-                del self._new[source]
         index, ask_below = self.book.grant(need)
         self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
 
@@ -131,9 +126,8 @@ class Lead:
 
     @property
     def _awaited(self) -> bool:
-        """Whether others wait for their first samples or share the last; some may have a kernel to compile, or none to get."""
-        early = bool(self._new) and time.monotonic() < self._early
-        return bool(self._present) and (early or self.book.ending)
+        """Whether others wait for their first samples or share the last."""
+        return bool(self._present) and (time.monotonic() < self._early or self.book.ending)
 
     @property
     def _can_answer(self) -> bool:

@@ -145,9 +145,8 @@ def _image(dataset: xr.Dataset, elsewhere: Mapping[str, Elsewhere] = NOTHING) ->
             if name not in elsewhere:
                 _encode_data(file, str(name), dataset[name], elsewhere)
         _encode_attributes(file, dataset.attrs)
-    for (
-        name
-    ) in apart:  # HDF5 keeps what it knows of variables until a file is closed: 4 kB of each piece
+    # One at a time: HDF5 keeps what it knows of a variable until the file is closed, 4 kB of each piece.
+    for name in apart:
         with h5py.File(buffer, "r+", track_order=True) as file:
             _encode_data(file, str(name), dataset[name], elsewhere)
     return buffer

@@ -116,12 +116,16 @@ def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
     if response["status"] != Status.OK:
         return np.full(shape, np.nan)
     steady = _steady(scene, response)
-    missing = np.full(steady.sizes["time"], np.nan)  # a linkage may have no slider
-    told = ("contact_force", "crank_moment", "slider_acceleration")
-    columns = [steady[name].to_numpy() if name in steady else missing for name in told]
-    parts = np.array_split(np.column_stack(columns), windows)
+    widths = {"contact_force": len(scene.joint_labels), "crank_moment": 1, "slider_acceleration": 1}
+    columns = [
+        steady[name].to_numpy().reshape(-1, width)
+        if name in steady  # a linkage may have no slider
+        else np.full((steady.sizes["time"], width), np.nan)
+        for name, width in widths.items()
+    ]
+    parts = np.array_split(np.hstack(columns), windows)
     found = [[abs(part).mean(axis=0), part.std(axis=0), abs(part).max(axis=0)] for part in parts]
-    return np.array(found).reshape(shape)
+    return np.array(found)
 
 
 def _quantities(scene: Scene) -> int:
