@@ -80,16 +80,19 @@ def weigh_rates(effects, work, first, row, b, e, lanes, W):
 
     One loop over all gaps of all lanes, whose rows stand side by side: shorter ones the compiler unrolls instead of
     vectorising. One product a sum: of two it might fuse either, and lanes would differ from a single response in the last bit.
+    What has no weight, as one or two of the stages of every pair, is left out.
     """
     begin = place(effects.rules.begin)
-    for k in range(place(effects.rules.end - 1 - begin) * W + W):
-        i = begin * W + k
-        weigh_rate(work, at.GAP, first, row, b, i, W)
-        weigh_error(work, first, row, e, i, W)
-    for r in range(len(effects.measures)):
-        rate = measure(effects, r)
-        for i in range(lanes):
-            weigh_rate(work, rate, first, row, b, i, W)
+    if (b != 0.0) | (e != 0.0):
+        for k in range(place(effects.rules.end - 1 - begin) * W + W):
+            i = begin * W + k
+            weigh_rate(work, at.GAP, first, row, b, i, W)
+            weigh_error(work, first, row, e, i, W)
+    if b != 0.0:
+        for r in range(len(effects.measures)):
+            rate = measure(effects, r)
+            for i in range(lanes):
+                weigh_rate(work, rate, first, row, b, i, W)
 
 
 @lane_function

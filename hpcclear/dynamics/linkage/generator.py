@@ -177,12 +177,14 @@ class _Generator:
         (x, y), (bx, by) = kin.position(journal), kin.position(bearing)
         (vx, vy), (ux, uy) = kin.velocity(journal), kin.velocity(bearing)
         spins = [kin.end_spin(place) for place in joint.places]
-        relative = ", ".join(
-            write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)
-        )
+        relative = [write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)]
+        if not (self.on.friction or self.on.waves):  # which are no faster by it
+            relative[4:] = ["None" if spin is ZERO else write.text(spin) for spin in spins]
         turns = self._turns(joint) if self.on.waves else "None"
         made = [write.fresh(f"{name}_{joint.name}") for name in ("fx", "fy", "mb", "mj", "loss")]
-        call = f"joint_force(effects, work, par, joints[{k}], ({relative}), {turns}, i, W)"
+        call = (
+            f"joint_force(effects, work, par, joints[{k}], ({', '.join(relative)}), {turns}, i, W)"
+        )
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
         self.balance.pulls += [Pull(joint.journal, (-fx, -fy)), Pull(joint.bearing, (fx, fy))]

@@ -59,6 +59,15 @@ def either_product(flag, other, a, b):
 
 
 @lane_function
+def swept(spin, arm):
+    """Speed at the end of an arm, 0 of what never turns (None)."""
+    if spin is not None:
+        return spin * arm
+    else:
+        return 0.0
+
+
+@lane_function
 def gravity_of(gravity, par, i, W):
     """Gravity, m/s^2 against y."""
     if gravity is not None:
@@ -114,13 +123,14 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     """Contact, friction and film in one open joint.
 
     `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
-    velocities of journal and bearing; `turns`: cosines and sines of the angles of bearing and journal, for surfaces that
-    are out of round. Gap (|e| - c of round ones), normal force (with a film: the size of both forces) and gap rate go to
-    their rows.
+    velocities of journal and bearing, None of what never turns; `turns`: cosines and sines of the angles of bearing and
+    journal, for surfaces that are out of round. Gap (|e| - c of round ones), normal force (with a film: the size of both
+    forces) and gap rate go to their rows.
     Returns the force on the bearing (the journal gets the opposite), the moments of friction force, waves and film on
     bearing and journal about their own centres, and the dissipated power.
     """
     ex, ey, vx, vy, spin_journal, spin_bearing = relative
+    spins = swept(spin_journal, 1.0), swept(spin_bearing, 1.0)
     block = joint.block
     active = work[joint.active * W + i]
     inverse_impact = work[joint.inverse_impact * W + i]
@@ -129,7 +139,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     nx = ex * inverse
     ny = ey * inverse
     round_gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
-    here = waves_here(effects.waves, effects, par, joint, relative, (nx, ny, inverse), turns, i, W)
+    moving = (vx, vy, *spins)
+    here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
     depth = 0.5 * (gap + abs(gap))
@@ -148,7 +159,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     arm_bearing = radius + 0.5 * depth
     radius = less(effects.waves, par[(block + at.JOURNAL_RADIUS) * W + i], here.journal)
     arm_journal = radius - 0.5 * depth
-    sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
+    across = vy * nx - vx * ny
+    sliding = across + swept(spin_journal, arm_journal) - swept(spin_bearing, arm_bearing)
     coulomb = effects.coulomb
     other = effects.lugre if effects.ambrosio is None else effects.ambrosio
     ratio = ratio_of(effects, work, par, joint, sliding, i, W)
@@ -160,7 +172,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     side = tilted(effects.waves, here, (nx, ny, inverse), normal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, other, tangential, sliding)
-    oil = film_of(effects, par, joint, relative, (nx, ny, gap), i, W)
+    oil = film_of(effects, par, joint, (ex, ey, vx, vy, *spins), (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = pressed(
         effects.film, normal, nx, ny, oil[0], oil[1]
