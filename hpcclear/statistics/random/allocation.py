@@ -1,7 +1,7 @@
 """How an accuracy that is asked of mean and deviation is shared out, so that it costs least.
 
 A moment by n simulations at a tolerance is off by a bias, the tolerance's, and by the error of its samples:
-error^2 = (z bias(tolerance))^2 + reach(n)^2, with the normal z of the confidence, and costs n times what a simulation costs
+error^2 = (t bias(tolerance))^2 + reach(n)^2, with Student's t of the confidence, and costs n times what a simulation costs
 at that tolerance. A pilot tells both: the same points at several tolerances give biases in pairs, and replicates of a
 sequence the error of samples and how it falls with n. So every tolerance leaves the samples a share, and has a price.
 
@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.random.replicates import Estimate, moments, spread, student
@@ -68,9 +67,12 @@ class Evidence:
     confidence: float
 
     def tolerance_shares(self, doubtful: bool) -> Array:
-        """What tolerances take of an accuracy, (r - 1, 2), with or without what is not known about them."""
+        """What tolerances take of an accuracy, (r - 1, 2), with or without what is not known about them.
+
+        By Student's quantile: how biases scatter from design to design is known from a few, and is told of others.
+        """
         doubt = self.doubt if doubtful else 0.0
-        return float(ndtri(0.5 + self.confidence / 2.0)) * np.hypot(self.bias, doubt)
+        return student(self.confidence, len(self.reach)) * np.hypot(self.bias, doubt)
 
     def points_for(self, reach: Array, least: int, most: int) -> float:
         """Simulations of a design, on average over the pilot's, that limits of these half-widths (2,) take by doubling."""
