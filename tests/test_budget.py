@@ -257,6 +257,23 @@ def test_an_accuracy_below_all_tolerances_is_not_promised(tmp_path, monkeypatch)
     assert found.attrs["sure"] == "no"
 
 
+def test_a_tolerance_that_alpha_needs_tighter_than_the_pilot_is_taken(tmp_path, monkeypatch):
+    """Half of alpha's samples scatter beyond the largest m2, where f is ten times as wrong: the pilot's designs do not."""
+    monkeypatch.setattr(formula, "BEYOND", 10.0)
+    told: list[str] = []
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    assert any("simulated again at 1e-06" in text for text in told)
+    found = dataset.read(tmp_path / "it" / "budget.nc", "budget")
+    assert found["rtol"].to_numpy()[found["chosen"].to_numpy() == 1] == pytest.approx([1e-6])
+    assert found.attrs["searched_rtol"] == pytest.approx(1e-5)
+    alpha = dataset.read(tmp_path / "it" / "verification.nc").sel(design="play alpha")
+    assert float(alpha["m2"]) == pytest.approx(0.42, abs=1e-3)
+    # of the bias at 1e-5, 0.08 %, a half may be left
+    assert 0.0003 < float(alpha["mean_within"]) <= 0.001
+    assert formula.run_in_pieces(scene_of(), str(tmp_path / "out"), alone()) > 5
+    assert contents(tmp_path / "out") == contents(tmp_path / "it")
+
+
 def test_simulations_of_a_study_are_those_of_its_split():
     scene = scene_of()
     made = budget.spread(scene, lambda label, one, points: budget.simulated(alone(), one, points))

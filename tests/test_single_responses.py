@@ -13,7 +13,9 @@ VARIANTS = ({"mechanism.slider.mass": 0.1}, {"mechanism.slider.mass": 0.2}, {})
 def told(scene, response):
     """Two numbers of a response, and one of its scene."""
     gaps = response["eccentricity_x"].values
-    return np.array([[np.nanmax(gaps), np.nanmean(gaps)], [scene.number("mechanism.slider.mass"), np.nan]])
+    return np.array(
+        [[np.nanmax(gaps), np.nanmean(gaps)], [scene.number("mechanism.slider.mass"), np.nan]]
+    )
 
 
 def test_each_row_is_of_its_variant_and_its_copy():

@@ -198,7 +198,7 @@ BUDGET: Columns = {
     "bias": number(("rung", "moment"), "1",
         "relative error that the tolerance makes, root mean square over designs", required=True),
     "bias_error": number(("rung", "moment"), "1", "standard error of its mean", required=True),
-    "chosen": flag(("rung",), "whether the study is simulated at it", required=True),
+    "chosen": flag(("rung",), "whether verified designs are simulated at it", required=True),
     "reach": number(("design", "moment"), "1", "relative half-width of the limits by the pilot's points", required=True),
     "power": number(("moment",), "1", "power of the number of simulations that it falls by", required=True),
     "tolerance_share": number(("moment",), "1", "what the tolerance takes of the accuracy", required=True),

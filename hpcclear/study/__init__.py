@@ -161,8 +161,11 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
 
     designs = [*ends, *(finalists or between)]
     designs += [*verification.original(run), *paper.printed_designs(run.scene)]
-    true = run.stage("verification", truth.simulate, designs, "verification")
-    table = verification.named(run, designs, true)
+    if shared is None:
+        true = run.stage("verification", truth.simulate, designs, "verification")
+        table = verification.named(run, designs, true)
+    else:
+        run, shared, true, table = budget.verified(run, budget.asked(given.scene), shared, designs)
     true = {name: values[table.rows] for name, values in true.items()}
     remarks += verification.missed(run, table.choices, true, model)
     for text in remarks:

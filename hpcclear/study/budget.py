@@ -8,7 +8,7 @@ whatever the machine was doing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,10 +20,13 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.stages import SCRAMBLINGS
-from hpcclear.statistics.random.allocation import Evidence, Split, cheapest
-from hpcclear.study import extent, truth
+from hpcclear.statistics.random.allocation import FALL, Evidence, Split, biases, cheapest
+from hpcclear.statistics.random.replicates import student
+from hpcclear.study import extent, truth, verification
+from hpcclear.study.optimisation import Choice
 from hpcclear.study.pilot import LADDER, Pilot, Simulate
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.verification import Table
 
 TIGHTEST = 1e-10
 """Where the ladder ends, if it has to go on."""
@@ -55,13 +58,25 @@ class Budget:
     labels : list of str
         Of the pilot's designs.
     pilot : float
-        Evaluations of the equations of motion that it took.
+        Evaluations of the equations of motion that it took, and pairs on alpha and beta.
+    searched : float
+        Tolerance of the search; that of the split is verification's.
+    ends : array, shape (2,)
+        What the tolerance was found to take of alpha and beta, at worst; NaN before they are known.
     """
 
     split: Split
     found: Evidence
     labels: list[str]
     pilot: float
+    searched: float
+    ends: Array = field(default_factory=lambda: np.full(2, np.nan))
+
+    @property
+    def tolerance_share(self) -> Array:
+        """What the tolerance may take of an accuracy, (2,): by the pilot's designs, and by alpha and beta."""
+        shares = self.found.tolerance_shares(True)
+        return np.fmax(shares[min(self.split.rung, len(shares) - 1)], self.ends)
 
 
 def settled(scene: Scene, split: Split) -> Scene:
@@ -130,7 +145,7 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
         if few and pilot.price_of_doubling() <= min(saved / 2.0, share):
             pilot.longer()
             continue
-        return Budget(split, found, pilot.labels, pilot.spent)
+        return Budget(split, found, pilot.labels, pilot.spent, split.rtol)
 
 
 def _goes_on(pilot: Pilot, share: float) -> bool:
@@ -226,12 +241,73 @@ def _shares(values: Array) -> str:
     return f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the deviation"
 
 
+def verified(
+    run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice]
+) -> tuple[StudyRun, Budget, Result, Table]:
+    """The stage of verification, and again at a tighter tolerance where alpha and beta turn out to need one.
+
+    The pilot tells what tolerances do to other designs than these, and the least deviation has the largest relative errors:
+    so pairs on these two tell it, before anything is said of them. `wanted`: the accuracy asked, shape (2,).
+    """
+    true = run.stage("verification", truth.simulate, designs, "verification")
+    table = verification.named(run, designs, true)
+    made = _checked(run, wanted, made, table, true)
+    rtol = made.split.rtol
+    if rtol == run.scene.numerics.rtol:
+        return run, made, true, table
+    run.tell(
+        f"Pairs on alpha and beta show that rtol {run.scene.numerics.rtol:.0e} takes more of their accuracy than was "
+        f"asked: verified designs are simulated again at {rtol:.0e}."
+    )
+    run = run.of(run.scene.with_({"numerics.rtol": rtol}))
+    true = run.stage("verification-2", truth.simulate, designs, "verification")
+    return run, made, true, verification.named(run, designs, true)
+
+
+def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Result) -> Budget:
+    """At the loosest tolerance, from the split's on, that is good enough for alpha and beta; the tightest if none is."""
+    named = enumerate(zip(table.choices, table.rows, strict=True))
+    ends = {row: k for k, (one, row) in named if one.name in verification.ends_of(one.case)}
+    choices = [table.choices[k] for k in ends.values()]
+    rtol = made.found.rtol[made.split.rung :]
+    pairs, spent = _pairs(run, choices, rtol, made.found.pairs // SCRAMBLINGS)
+    bias, error = biases(rtol, pairs)
+    seen = abs(bias) > student(made.found.confidence, SCRAMBLINGS - 1) * error  # more than chance
+    known = np.sqrt(np.where(seen, bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
+    known = np.concatenate([known, FALL * known[-1:]])
+    good = (np.hypot(_reach(true)[list(ends)], known) <= wanted).all(axis=(1, 2))
+    further = int(good.argmax()) if good.any() else len(rtol) - 1
+    rung = made.split.rung + further
+    split = replace(made.split, rung=rung, rtol=float(rtol[further]))
+    return replace(
+        made, split=split, pilot=made.pilot + spent, ends=known[further].max(axis=0, initial=0.0)
+    )
+
+
+def _pairs(
+    run: StudyRun, choices: Sequence[Choice], rtol: Array, length: int
+) -> tuple[Array, float]:
+    """The same points of designs at several tolerances, (r, designs, scramblings, length), and what they took."""
+    each = [truth.scattered(run, choice, length, "budget") for choice in choices]
+    points = Points(each[0].names, np.concatenate([one.values for one in each]), each[0].paths)
+    values, spent = [], 0.0
+    for number, one in enumerate(rtol.tolist()):
+        scene = run.scene.with_({"numerics.rtol": one})
+        kept = run.part(f"ends-{number}", _simulated, scene, points)
+        values.append(kept["objective"].reshape(len(choices), SCRAMBLINGS, length))
+        spent += float(kept["evaluations"]) * len(points)
+    return np.stack(values), spent
+
+
 def within(made: Budget, true: Result) -> Array:
     """What each verified design reached, (n, 2): half-widths of its limits with what the tolerance may add, relative."""
-    share = made.found.tolerance_shares(True)[made.split.rung]
+    return np.hypot(_reach(true), made.tolerance_share)
+
+
+def _reach(true: Result) -> Array:
+    """Relative half-widths of the limits of mean and deviation of verified designs, (n, 2)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in MOMENTS])
-    return np.hypot(reach, share)
+        return np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in MOMENTS])
 
 
 def reached(run: StudyRun, scene: Scene, made: Budget, true: Result, names: Sequence[str]) -> None:
@@ -279,6 +355,7 @@ def write(run: StudyRun, made: Budget, worst: Array) -> None:
         "points": found.points,
         "verified_points": split.points,
         "pilot_evaluations": made.pilot,
+        "searched_rtol": made.searched,
         "study_evaluations": split.evaluations,
         "sure": "yes" if split.sure else "no",
     }

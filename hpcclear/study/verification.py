@@ -46,7 +46,7 @@ def missed(
 ) -> list[str]:
     """Where the surrogate of f is further from the truth than the study allows at alpha and beta, in words."""
     settings, texts = run.study.verification, []
-    rows = [k for k, choice in enumerate(choices) if choice.name in _ends(choice.case)]
+    rows = [k for k, choice in enumerate(choices) if choice.name in ends_of(choice.case)]
     surrogate = predicted(run, [choices[k] for k in rows], model)
     for k, guess in zip(rows, surrogate, strict=True):
         errors = guess / [true["mean"][k], true["deviation"][k]] - 1.0
@@ -59,7 +59,8 @@ def missed(
     return texts
 
 
-def _ends(case: str) -> tuple[str, str]:
+def ends_of(case: str) -> tuple[str, str]:
+    """Names of the designs that a case is about."""
     return f"{case} alpha", f"{case} beta"
 
 
@@ -122,7 +123,7 @@ def _name_case(
     inner = sorted(
         (ours[k] for k in front if ours[k] not in ends), key=lambda k: float(values[k, 0])
     )
-    named = [*zip(ends, _ends(case), strict=True)]
+    named = [*zip(ends, ends_of(case), strict=True)]
     named += [(k, f"{case} front {number + 1}") for number, k in enumerate(inner)]
     taken = {k for k, _ in named}
     left = [k for k in range(len(rows)) if k not in taken or choices[rows[k]].name]

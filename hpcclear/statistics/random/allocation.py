@@ -125,11 +125,9 @@ def evidence(
         Of one of them, m a multiple of 4.
     confidence : float
     """
-    known = [[_biases(one, best) for one, best in zip(row, pairs[-1], strict=True)] for row in pairs[:-1]]  # fmt: skip
-    bias, error = np.moveaxis(np.array(known), 2, 0)  # (r - 1, d, 2) each
+    bias, error = biases(rtol, pairs)
     square, chance = _mean(bias**2), _mean(error**2)
     designs = np.isfinite(bias).sum(axis=1)
-    whole = 1.0 / (1.0 - FALL ** np.log10(np.asarray(rtol)[:-1, None] / rtol[-1]))
     reach = np.array([_reach(one, confidence) for one in points])
     early = np.array([_reach(one[:, : one.shape[1] // 4], confidence) for one in points])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -138,9 +136,30 @@ def evidence(
     power = np.clip(np.nan_to_num(_mean(fall[None])[0], nan=SLOWEST), SLOWEST, FASTEST)
     return Evidence(
         np.asarray(rtol), np.asarray(evaluations),
-        whole * np.sqrt(np.maximum(square - chance, 0.0)), whole * np.sqrt(chance / np.maximum(designs, 1)),
+        np.sqrt(np.maximum(square - chance, 0.0)), np.sqrt(chance / np.maximum(designs, 1)),
         pairs[0, 0].size, points[0].size, reach, power, confidence,
     )  # fmt: skip
+
+
+def biases(rtol: Array, pairs: Array) -> tuple[Array, Array]:
+    """Relative biases of mean and deviation at all tolerances but the tightest, that of this one included (`FALL`), and
+    their standard errors.
+
+    Parameters
+    ----------
+    rtol : array, shape (r,)
+        Loosest first.
+    pairs : array, shape (r, d, replicates, n)
+        The same points of d designs at every tolerance; NaN where a simulation failed.
+
+    Returns
+    -------
+    tuple of arrays, shape (r - 1, d, 2) each
+    """
+    known = [[_biases(one, best) for one, best in zip(row, pairs[-1], strict=True)] for row in pairs[:-1]]  # fmt: skip
+    whole = 1.0 / (1.0 - FALL ** np.log10(np.asarray(rtol)[:-1] / rtol[-1]))
+    bias, error = np.moveaxis(np.array(known), 2, 0) * whole[:, None, None]
+    return bias, error
 
 
 def cheapest(
