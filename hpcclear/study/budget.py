@@ -21,7 +21,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.statistics.random.allocation import FALL, Evidence, Split, biases, cheapest
-from hpcclear.statistics.random.replicates import student
 from hpcclear.study import extent, truth, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.pilot import LADDER, Pilot, Simulate
@@ -272,9 +271,9 @@ def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Res
     rtol = made.found.rtol[made.split.rung :]
     pairs, spent = _pairs(run, choices, rtol, made.found.pairs // SCRAMBLINGS)
     bias, error = biases(rtol, pairs)
-    seen = abs(bias) > student(made.found.confidence, SCRAMBLINGS - 1) * error  # more than chance
-    known = np.sqrt(np.where(seen, bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
-    known = np.concatenate([known, FALL * known[-1:]])
+    # what chance may have made counts as a bias too: a needless tolerance is dear, a missed one makes the answer wrong
+    known = np.sqrt(np.maximum(bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
+    known = np.nan_to_num(np.concatenate([known, FALL * known[-1:]]))
     good = (np.hypot(_reach(true)[list(ends)], known) <= wanted).all(axis=(1, 2))
     further = int(good.argmax()) if good.any() else len(rtol) - 1
     rung = made.split.rung + further
