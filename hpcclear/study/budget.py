@@ -43,6 +43,9 @@ SEARCHED = 8
 """Verified designs get so many times the simulations of those that are searched: these meet the same scatter, and their
 differences are known better than they are."""
 
+HIDDEN = 0.25
+"""Standard error of a bias of alpha or beta, over the accuracy, that is small enough."""
+
 MOMENTS = ("mean", "deviation")
 
 
@@ -267,32 +270,51 @@ def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Res
     """At the loosest tolerance, from the split's on, that is good enough for alpha and beta; the tightest if none is."""
     named = enumerate(zip(table.choices, table.rows, strict=True))
     ends = {row: k for k, (one, row) in named if one.name in verification.ends_of(one.case)}
+    rows = list(ends)
     choices = [table.choices[k] for k in ends.values()]
     rtol = made.found.rtol[made.split.rung :]
-    pairs, spent = _pairs(run, choices, rtol, made.found.pairs // SCRAMBLINGS)
-    bias, error = biases(rtol, pairs)
+    longest = int(true["samples"][rows].max()) // SCRAMBLINGS
+    bias, error, spent = _biases(
+        run, choices, rtol, made.found.pairs // SCRAMBLINGS, longest, wanted
+    )
     # what chance may have made counts as a bias too: a needless tolerance is dear, a missed one makes the answer wrong
     known = np.sqrt(np.maximum(bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
     known = np.nan_to_num(np.concatenate([known, FALL * known[-1:]]))
-    good = (np.hypot(_reach(true)[list(ends)], known) <= wanted).all(axis=(1, 2))
+    good = (np.hypot(_reach(true)[rows], known) <= wanted).all(axis=(1, 2))
     further = int(good.argmax()) if good.any() else len(rtol) - 1
-    rung = made.split.rung + further
-    split = replace(made.split, rung=rung, rtol=float(rtol[further]))
-    return replace(
-        made, split=split, pilot=made.pilot + spent, ends=known[further].max(axis=0, initial=0.0)
-    )
+    split = replace(made.split, rung=made.split.rung + further, rtol=float(rtol[further]))
+    worst = known[further].max(axis=0, initial=0.0)
+    return replace(made, split=split, pilot=made.pilot + spent, ends=worst)
+
+
+def _biases(
+    run: StudyRun, choices: Sequence[Choice], rtol: Array, length: int, longest: int, wanted: Array
+) -> tuple[Array, Array, float]:
+    """Biases of designs at several tolerances with their errors, (r - 1, designs, 2), and what they took.
+
+    By `length` points of each scrambling, doubled until chance hides no more than a part of the accuracy at the loosest of
+    them, at most to the `longest`.
+    """
+    pairs, spent = np.empty((len(rtol), len(choices), SCRAMBLINGS, 0)), 0.0
+    while True:
+        first = pairs.shape[3]
+        fresh, evaluations = _pairs(run, choices, rtol, first, first or length)
+        pairs, spent = np.concatenate([pairs, fresh], axis=3), spent + evaluations
+        bias, error = biases(rtol, pairs)
+        if (error[0] <= HIDDEN * wanted).all() or 2 * pairs.shape[3] > longest:
+            return bias, error, spent
 
 
 def _pairs(
-    run: StudyRun, choices: Sequence[Choice], rtol: Array, length: int
+    run: StudyRun, choices: Sequence[Choice], rtol: Array, first: int, length: int
 ) -> tuple[Array, float]:
     """The same points of designs at several tolerances, (r, designs, scramblings, length), and what they took."""
-    each = [truth.scattered(run, choice, length, "budget") for choice in choices]
+    each = [truth.scattered(run, choice, length, "budget", first) for choice in choices]
     points = Points(each[0].names, np.concatenate([one.values for one in each]), each[0].paths)
     values, spent = [], 0.0
     for number, one in enumerate(rtol.tolist()):
         scene = run.scene.with_({"numerics.rtol": one})
-        kept = run.part(f"ends-{number}", _simulated, scene, points)
+        kept = run.part(f"ends-{first}-{number}", _simulated, scene, points)
         values.append(kept["objective"].reshape(len(choices), SCRAMBLINGS, length))
         spent += float(kept["evaluations"]) * len(points)
     return np.stack(values), spent
@@ -319,7 +341,9 @@ def reached(run: StudyRun, scene: Scene, made: Budget, true: Result, names: Sequ
     text = f"Reached at {run.study.verification.confidence:.0%}: {_shares(worst)}, at worst, of {_shares(wanted)}"
     if missed:
         text += f"; not by {len(missed)} of {len(names)} designs, {missed[0]} among them"
-        if made.split.sure:
+        if (made.ends > made.split.tolerance).any():
+            text += ": the tolerance takes more of alpha or beta than of the pilot's designs"
+        elif made.split.sure:
             text += ": study.verification.most_samples ended them"
     run.tell(f"{text}.")
     write(run, made, worst)
