@@ -76,8 +76,9 @@ class Budget:
 
     @property
     def tolerance_share(self) -> Array:
-        """What the tolerance may take of an accuracy, (2,): by the pilot's designs, and by alpha and beta."""
-        shares = self.found.tolerance_shares(True)
+        """What the tolerance may take of an accuracy, (2,): no more than looser ones of the pilot's designs, and of alpha and
+        beta what it was found to."""
+        shares = np.fmin.accumulate(self.found.tolerance_shares(True))
         return np.fmax(shares[min(self.split.rung, len(shares) - 1)], self.ends)
 
 
