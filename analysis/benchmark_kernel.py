@@ -98,7 +98,8 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
     for width in WIDTHS:
         repeat = _force_loop(width)
         work = np.zeros((at.BANK, width))
-        work[at.WORK :] = np.repeat(setup.par[:1].T, width, 1)
+        rows = setup.par.shape[1]  # only those that the scene has
+        work[at.WORK : at.WORK + rows] = np.repeat(setup.par[:1].T, width, 1)
         work[at.QS : at.QS + 4], work[at.VS : at.VS + 4] = q[:, None], v[:, None]
         work[[at.ACTIVE, at.ACTIVE + 1, at.INVERSE_IMPACT, at.INVERSE_IMPACT + 1]] = 1.0
         motion = motion_of(setup.problem.effects, width).address

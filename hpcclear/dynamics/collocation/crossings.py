@@ -1,6 +1,6 @@
 """Contacts that begin or end inside a step of collocation: found between its nodes, and the step cut to end there."""
 
-from hpcclear.base.jit import scalar_function
+from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.lobatto import STAGES
@@ -62,12 +62,37 @@ def contact_change(latched, work, m, p, settings):
     return kink_in(work, m, p, settings[GAP_TOLERANCE])
 
 
+@lane_function
+def range_of(work, m, rate):
+    """Least and greatest value of a rate at the start and at the nodes."""
+    low = work[at.RATE_OLD + rate]
+    high = low
+    for i in range(STAGES):
+        value = m[(at.RATE_NOW + rate) * STAGES + i]
+        low = min(low, value)
+        high = max(high, value)
+    return low, high
+
+
+@lane_function
+def may_change(latched, work, m, p, settings):
+    """Whether joint p's contact may begin or end in this step: for most steps its extremes at the nodes say that it does not."""
+    low, high = range_of(work, m, at.GAP + p)
+    flight = latched and work[at.ACTIVE + p] == 0.0
+    strikes = flight and high >= -settings[GAP_TOLERANCE]
+    if flight and not strikes:
+        slowest, fastest = range_of(work, m, at.GAP_RATE + p)
+        strikes = slowest < 0.0 and fastest > 0.0  # it may have touched between two nodes
+    return strikes or low * high < 0.0
+
+
 @scalar_function
 def stop_at_contacts(rules, work, m, settings):
     """Cut the step where a contact begins or ends inside it, and latch those that begin at its end."""
     first = 2.0
     for p in range(rules.begin, rules.end):
-        first = min(first, contact_change(rules.latched, work, m, p, settings))
+        if may_change(rules.latched, work, m, p, settings):
+            first = min(first, contact_change(rules.latched, work, m, p, settings))
     if first < 1.0:
         cut(0, 1, work, first)
     elif first == 1.0:

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import njit
 
-from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.bits import borrowed, rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -18,6 +18,7 @@ from hpcclear.dynamics.collocation import lobatto as lob
 from hpcclear.dynamics.collocation.crossings import stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -57,11 +58,12 @@ def replicate(par, m, settings):
 
 
 @lane_function
-def begin_contacts(work, m):
-    """Contact states of the step, for every stage."""
-    for row in range(at.ACTIVE, at.ACTIVE + 2 * at.MAX_JOINTS):  # and the impact speeds
+def begin_contacts(rules, work, m):
+    """Contact states and impact speeds of the step, for every stage."""
+    for p in range(rules.begin, rules.end):
         for i in range(STAGES):
-            m[row * STAGES + i] = work[row]
+            m[(at.ACTIVE + p) * STAGES + i] = work[at.ACTIVE + p]
+            m[(at.INVERSE_IMPACT + p) * STAGES + i] = work[at.INVERSE_IMPACT + p]
 
 
 @lane_function
@@ -128,7 +130,7 @@ def sweep(motion, work, m, tables, n):
 @lane_function
 def gap_tail(work, m, p, rtol):
     """Squares of the last two coefficients of joint p's gap and of the two before, scaled as its integral's error is."""
-    row = lob.GAP_COEFFICIENT + p
+    row = lob.GAP_COEFFICIENT  # the same for all joints: into one that goes by p the compiler would not store a vector
     lob.coefficients_of(m, at.RATE_NOW + at.GAP + p, work[at.RATE_OLD + at.GAP + p], row)
     clearance = lob.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
     scale = work[at.STEP] / (rtol * m[clearance * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
@@ -175,8 +177,31 @@ def quadratures(effects, work, m):
 
 
 @lane_function
-def end_of_step(work, m, n):
-    """Put the end of the step where the block stepper would leave them."""
+def rate_at_end(work, m, rate):
+    """Put a rate at the end of the step where the block stepper would leave it."""
+    work[at.RATE_NOW + rate] = m[(at.RATE_NOW + rate) * STAGES + STAGES - 1]
+
+
+@lane_function
+def rates_at_end(effects, work, m):
+    """Those that are read after a step, as each stands in a line of the cache of its own."""
+    for p in range(effects.rules.begin, effects.rules.end):
+        rate_at_end(work, m, at.GAP + p)
+        rate_at_end(work, m, at.FORCE + p)
+        rate_at_end(work, m, at.GAP_RATE + p)
+    for r in range(len(effects.measures)):
+        rate_at_end(work, m, effects.measures[r])
+    if effects.rules.responses:
+        rate_at_end(work, m, at.DRIVE_MOMENT)
+        rate_at_end(work, m, at.FOLLOWED_SQUARE)
+    if effects.rules.profile:
+        for rate in range(at.RATES):
+            rate_at_end(work, m, rate)
+
+
+@lane_function
+def end_of_step(effects, work, m, n):
+    """Put the end of the step where the block stepper would leave it."""
     last = STAGES - 1
     h = work[at.STEP]
     for k in range(n):
@@ -186,8 +211,7 @@ def end_of_step(work, m, n):
         work[at.VS + k] = v + h * lob.weighted(m, lob.MATRIX, start, a, last)
         work[at.QS + k] = work[at.Q + k] + h * (v + h * lob.weighted(m, lob.SQUARE, start, a, last))
         work[at.ACC + k] = a[7]
-    for r in range(at.RATES):
-        work[at.RATE_NOW + r] = m[(at.RATE_NOW + r) * STAGES + last]
+    rates_at_end(effects, work, m)
 
 
 @lane_function
@@ -237,7 +261,7 @@ def try_step(effects, motion, block, m, tables, settings, n):
     """One step to its end: stages, error, the step to try next, and whether this one is accepted."""
     work, stages, par = block.work, block.stages, block.par
     choose_step(work, par, effects.rules.free, 1)
-    begin_contacts(work, m)
+    begin_contacts(effects.rules, work, m)
     if work[at.FRESH] == 1.0:
         evaluate_start(motion, work, stages, m, tables, n)
     weigh(work, stages, m, settings, par[at.STRICTNESS], n)
@@ -262,7 +286,7 @@ def judge_end(effects, block, m, settings, n):
     if work[at.ACCEPT] == 0.0 or work[at.ATTEMPTS] >= settings[MAX_STEPS]:
         status = failure(0, 1, n, work, stages, settings)
     if status == OK and work[at.ACCEPT] == 1.0:
-        end_of_step(work, m, n)
+        end_of_step(effects, work, m, n)
         quadratures(effects, work, m)
         stop_at_contacts(rules, work, m, settings)
         if work[at.ACCEPT] == 1.0 and rules.free:
@@ -284,6 +308,8 @@ def next_sample(n, block, queue, settings, m):
 @lane_function
 def advance(n, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample."""
+    block, queue, method = borrowed_all(block, queue, method, 1)
+    m = borrowed(m)
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book

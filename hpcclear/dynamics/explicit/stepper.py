@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from hpcclear.base.bits import beyond, borrowed, call_at
+from hpcclear.base.bits import call_at
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.switching import settle_methods
 from hpcclear.dynamics.implicit.stiff import ask_implicit
 from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.record import record_step
 from hpcclear.dynamics.stepping.settings import CYCLE, GAP_TOLERANCE, PROFILE
@@ -56,25 +57,6 @@ def end_revolutions(special, numbers, block, queue, settings, W):
         if ends == 1.0:
             change += ask(special, END_OF_REVOLUTION, i, numbers, block, queue, settings)
     return change
-
-
-@lane_function
-def borrowed_all(block, queue, method, W):
-    """The same arrays without their counts of references, which functions that are not inlined would keep; what stands behind
-    `work` at distances from it."""
-    lent: Any = borrowed
-    work = lent(block.work)
-    return (
-        at.Block(work, beyond(work, at.STAGES * W), beyond(work, at.WORK * W), lent(block.book)),  # type: ignore[call-arg]
-        at.Queue(
-            lent(queue.par), lent(queue.start), lent(queue.out),
-            lent(queue.finished), lent(queue.counters),
-        ),
-        at.Method(
-            lent(method.settings), lent(method.weights), lent(method.tables), lent(method.measures),
-            lent(method.numbers),
-        ),
-    )  # fmt: skip
 
 
 @lane_function
