@@ -35,14 +35,19 @@ NODE = PAR + at.PARAMETERS  # where the stages stand in the step, 0 to 1
 MATRIX = NODE + 1  # velocities by accelerations: row l holds the weights of node l
 SQUARE = MATRIX + _ROWS  # coordinates by accelerations, likewise
 LEGENDRE = SQUARE + _ROWS  # coefficients of degree 1 to 8 by accelerations, likewise
-NODE_ACC = LEGENDRE + _ROWS  # accelerations that the stages were made from
-COEFFICIENT = NODE_ACC + MOST_COORDINATES  # of degree 1 to 8, of the accelerations
+NODE_ACC = LEGENDRE + _ROWS  # accelerations that the stages are made from
+CHANGE = NODE_ACC + MOST_COORDINATES  # by how much those that a sweep found differ from them
+LAST_CHANGE = CHANGE + MOST_COORDINATES  # the same of the sweep before
+LAST_ACC = LAST_CHANGE + MOST_COORDINATES  # what that found
+LAST_ONCE = LAST_ACC + MOST_COORDINATES  # its integrals from the start to the nodes, over h
+LAST_TWICE = LAST_ONCE + MOST_COORDINATES  # and theirs
+COEFFICIENT = LAST_TWICE + MOST_COORDINATES  # of degree 1 to 8, of the accelerations
 GAP_COEFFICIENT = COEFFICIENT + MOST_COORDINATES  # and of a gap
 BASE = GAP_COEFFICIENT + 1  # row: coefficient of degree 0, lane by lane a coordinate
 START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
 WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
-CHANGE = WEIGHT + 1  # square of the scaled change of the accelerations, by stage
-SCALARS = CHANGE + 1
+SQUARES = WEIGHT + 1  # rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
+SCALARS = SQUARES + 3
 (
     POLYNOMIAL_STEP,  # s, of the step whose coefficients are kept; 0 when there are none
     FOLLOWS,  # 1 where the step to come begins at that step's end, 0 where at its start
@@ -120,28 +125,44 @@ def weighted(m, matrix, start, a, i):
 
 
 @lane_function
-def stages_of(m, work, k, h):
-    """Stages of coordinate k from the accelerations at the nodes."""
+def mixed(m, row, new, back, i):
+    """What a row's new number becomes with acceleration: less a part of its change. The row keeps the new one itself."""
+    change = back * (new - m[row * STAGES + i])
+    m[row * STAGES + i] = new
+    return new - (change if back != 0.0 else 0.0)
+
+
+@lane_function
+def stages_of(m, work, k, h, found, back):
+    """Stages of coordinate k from the accelerations at the nodes that stand from row `found` on."""
     q, v = work[at.Q + k], work[at.V + k]
     start = m[START_ACC * STAGES + k]
-    a = row_of(m, NODE_ACC + k)
+    a = row_of(m, found + k)
     for i in range(STAGES):
-        dv = weighted(m, MATRIX, start, a, i)
-        dq = weighted(m, SQUARE, start, a, i)
+        # sums of what was found, mixed afterwards: they need not wait for `back`
+        dv = mixed(m, LAST_ONCE + k, weighted(m, MATRIX, start, a, i), back, i)
+        dq = mixed(m, LAST_TWICE + k, weighted(m, SQUARE, start, a, i), back, i)
+        new = m[(found + k) * STAGES + i]
+        m[(NODE_ACC + k) * STAGES + i] = mixed(m, LAST_ACC + k, new, back, i)
         m[(at.VS + k) * STAGES + i] = v + h * dv
         m[(at.QS + k) * STAGES + i] = q + h * (m[NODE * STAGES + i] * v + h * dq)
 
 
 @lane_function
 @unrolled
-def set_stages(m, work, n, h):
-    """Coordinates, velocities and times of all stages."""
+def set_stages(m, work, n, h, found, back):
+    """Coordinates and velocities of all stages, from the accelerations from row `found` on, with acceleration by `back`."""
+    for k in written_out(COORDINATES):
+        if k < n:
+            stages_of(m, work, k, h, found, back)
+
+
+@lane_function
+def set_times(m, work, h):
+    """Times of all stages."""
     t = work[at.TIME]
     for i in range(STAGES):
         m[at.STAGE_TIME * STAGES + i] = t + m[NODE * STAGES + i] * h
-    for k in written_out(COORDINATES):
-        if k < n:
-            stages_of(m, work, k, h)
 
 
 @lane_function
@@ -151,29 +172,63 @@ def accelerations_of_stages(motion, m, tables):
 
 
 @lane_function
-def change_of(m, k, first):
-    """Add the square of coordinate k's scaled change to every stage's, and keep the new accelerations."""
-    weight = m[WEIGHT * STAGES + k]
-    for i in range(STAGES):
-        new = m[(at.ACC + k) * STAGES + i]
-        change = new - m[(NODE_ACC + k) * STAGES + i]
-        m[(NODE_ACC + k) * STAGES + i] = new
-        sum_before = 0.0 if first else m[CHANGE * STAGES + i]
-        m[CHANGE * STAGES + i] = sum_before + weight * change * change
+def weight_of(k, n, m):
+    """Squared scale of coordinate k's acceleration."""
+    if k < n:
+        return m[WEIGHT * STAGES + k]
+    else:
+        return 0.0
 
 
 @lane_function
 @unrolled
-def take_accelerations(m, n):
-    """Take over what the sweep found; the largest scaled change of a stage (its root mean square over coordinates)."""
+def compare(m, n):
+    """By how much the accelerations found differ from those that the stages were made from, and the products of that."""
+    w: dict = {}
     for k in written_out(COORDINATES):
-        if k < n:
-            change_of(m, k, k == 0)
-    c = row_of(m, CHANGE)
-    total = c[0]
-    for s in written_out(range(1, STAGES)):
-        total += c[s]
-    return math.sqrt(total)
+        w[k] = weight_of(k, n, m)
+    for i in range(STAGES):
+        square, along, turn = 0.0, 0.0, 0.0
+        for k in written_out(COORDINATES):
+            if k < n:
+                change = m[(at.ACC + k) * STAGES + i] - m[(NODE_ACC + k) * STAGES + i]
+                bend = change - m[(LAST_CHANGE + k) * STAGES + i]
+                m[(CHANGE + k) * STAGES + i] = change
+                square += w[k] * change * change
+                along += w[k] * change * bend
+                turn += w[k] * bend * bend
+        m[SQUARES * STAGES + i] = square
+        m[(SQUARES + 1) * STAGES + i] = along
+        m[(SQUARES + 2) * STAGES + i] = turn
+
+
+@lane_function
+def sum_of(m, row):
+    """Sum over the stages."""
+    a = row_of(m, row)
+    return ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]))
+
+
+@lane_function
+@unrolled
+def keep_change(m, n):
+    """Keep the changes for the next sweep."""
+    for i in range(STAGES):
+        for k in written_out(COORDINATES):
+            if k < n:
+                m[(LAST_CHANGE + k) * STAGES + i] = m[(CHANGE + k) * STAGES + i]
+
+
+@lane_function
+def take_accelerations(m, work, n, h, first):
+    """Stages of the next sweep from what this one found, with Anderson's acceleration (1965, doi:10.1145/321296.321305) over two
+    sweeps: what changes along the change before falls to nothing. Returns the scaled size of the change."""
+    compare(m, n)
+    turn = sum_of(m, SQUARES + 2)
+    back = sum_of(m, SQUARES + 1) / (turn + 1e-300)
+    set_stages(m, work, n, h, at.ACC, 0.0 if first else back)
+    keep_change(m, n)
+    return math.sqrt(sum_of(m, SQUARES))
 
 
 # ---- the polynomial ---------------------------------------------------------------------------------

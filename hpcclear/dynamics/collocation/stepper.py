@@ -40,7 +40,8 @@ LOG_SAFETY = -0.32  # log2(0.8)
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
 UNTESTED = 0.5  # what one sweep leaves unmeasured is taken to have fallen so far, or steps might stay small for ever
-BEST_CONTRACTION = 0.18  # of a sweep: longer steps need more of them than they save
+PATIENCE = 2.0
+BEST_CONTRACTION = 0.15  # of a sweep: longer steps need more of them than they save
 
 
 @lane_function
@@ -104,23 +105,29 @@ def sweep(motion, work, m, tables, n):
     ratio = h / m[lob.CONTRACTION_STEP]
     # of forces that depend on positions it goes with the square of the step, of damping with the step
     rate = min(m[lob.CONTRACTION] * ratio * max(ratio, 1.0), 0.9)
-    before = 0.0
     found = UNTESTED * rate
+    log_first = 0.0
+    done = 0.0
     left = lob.MOST_SWEEPS
+    lob.set_times(m, work, h)
+    lob.set_stages(m, work, n, h, lob.NODE_ACC, 0.0)
     while left > 0.0:
-        left -= 1.0
-        lob.set_stages(m, work, n, h)
         lob.accelerations_of_stages(motion, m, tables)
-        change = lob.take_accelerations(m, n)
+        change = lob.take_accelerations(m, work, n, h, done == 0.0)
         work[at.EVALUATIONS] += STAGES
-        if before > 0.0:
-            rate = change / before
+        log_change = rough_log2(change)
+        if done > 0.0:
+            # with acceleration one sweep says little: the mean over them
+            rate = rough_exp2((log_change - log_first) / done)
             found = rate
-        before = change
+        else:
+            log_first = log_change
+        done += 1.0
+        left -= 1.0
         # what the stages still miss, and will miss after the last sweep, if the changes go on to fall at this rate
         if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
             left = -1.0
-        elif not rough_log2(rate) * left + rough_log2(change) < 0.0:
+        elif done > PATIENCE and not rough_log2(rate) * left + log_change < 0.0:
             left = 0.0
     m[lob.CONTRACTION] = min(max(found, 1e-4), 1e4)
     m[lob.CONTRACTION_STEP] = h
@@ -203,14 +210,10 @@ def rates_at_end(effects, work, m):
 def end_of_step(effects, work, m, n):
     """Put the end of the step where the block stepper would leave it."""
     last = STAGES - 1
-    h = work[at.STEP]
     for k in range(n):
-        start = m[lob.START_ACC * STAGES + k]
-        a = lob.row_of(m, lob.NODE_ACC + k)
-        v = work[at.V + k]
-        work[at.VS + k] = v + h * lob.weighted(m, lob.MATRIX, start, a, last)
-        work[at.QS + k] = work[at.Q + k] + h * (v + h * lob.weighted(m, lob.SQUARE, start, a, last))
-        work[at.ACC + k] = a[7]
+        work[at.QS + k] = m[(at.QS + k) * STAGES + last]
+        work[at.VS + k] = m[(at.VS + k) * STAGES + last]
+        work[at.ACC + k] = m[(lob.NODE_ACC + k) * STAGES + last]
     rates_at_end(effects, work, m)
 
 
