@@ -31,24 +31,38 @@ def interior_peak(d0, m0, d1, m1):
 
 @scalar_function
 def root(d0, m0, d1, m1, end):
-    """Where the cubic changes sign between 0 and `end`; Newton kept inside a shrinking bracket."""
+    """Where the cubic changes sign between 0 and `end`: Halley's iteration from the chord on, kept inside a shrinking bracket.
+
+    With derivatives f1, f2 and f3 a change e leaves an error of some ((f2/2f1)**2 + |f3/6f1|) e**3, which tells whether
+    another would matter.
+    """
     low, high = 0.0, end
-    rising = hermite(d0, m0, d1, m1, end) > d0
     c2 = 3.0 * (d1 - d0) - 2.0 * m0 - m1
     c3 = 2.0 * (d0 - d1) + m0 + m1
-    s = 0.5 * end
+    after = hermite(d0, m0, d1, m1, end)
+    rising = after > d0
+    s = end * (d0 / (d0 - after))
+    if not (low < s < high):
+        s = 0.5 * end
     for _ in range(60):
-        value = hermite(d0, m0, d1, m1, s)
+        value = d0 + s * (m0 + s * (c2 + s * c3))
         if (value > 0.0) == rising:
             high = s
         else:
             low = s
-        slope = m0 + s * (2.0 * c2 + s * 3.0 * c3)
-        new = s - value / slope if slope != 0.0 else -1.0
-        if not (low < new < high):
+        inverse = 1.0 / (m0 + s * (2.0 * c2 + s * 3.0 * c3))
+        bend = (c2 + 3.0 * s * c3) * inverse
+        step = value * inverse
+        change = step / (1.0 - step * bend)
+        new = s - change
+        if low <= new <= high and abs(step * bend) < 0.5:  # beyond, it would settle on an extremum
+            left = change * change * (bend * bend + abs(c3 * inverse))  # of the change, if it is small
+            if left <= 1e-6 and left * abs(change) <= 1e-16 * end:
+                return new
+        else:
             new = 0.5 * (low + high)
-        if abs(new - s) <= 1e-14 * end:
-            return new
+            if high - low <= 1e-14 * end:
+                return new
         s = new
     return s
 

@@ -58,8 +58,9 @@ def end_of_step(rules, lane, W, n, block, settings):
             stop_at_kinks(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0 and rules.free:
             status = stop_free_crank(lane, W, block, settings, n - 1)
-        for p in range(rules.begin, rules.end):
-            integrate_gap(lane, W, work, p)
+        if work[at.ACCEPT * W + lane] == 1.0:
+            for p in range(rules.begin, rules.end):
+                integrate_gap(lane, W, work, p)
     return status
 
 
