@@ -279,7 +279,7 @@ def test_a_sweep_is_packed(law: str):
 
     @numba.njit(error_model="numpy", fastmath=FASTMATH)
     def sweep(m, work):
-        lobatto.set_stages(m, work, 4, 1e-6)
+        lobatto.take_accelerations(m, work, 4, 1e-6, False)
         lobatto.guess(m, 4, 1e-6)
 
     sweep(lobatto.new_memory(), np.zeros(at.WORK))

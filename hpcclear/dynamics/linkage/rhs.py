@@ -3,6 +3,7 @@
 A stepper knows nothing of a motion but this address, so that one compiled stepper serves them all.
 """
 
+import inspect
 import sys
 from functools import cache
 from types import ModuleType
@@ -11,13 +12,17 @@ from typing import Any
 from numba import carray, cfunc, types
 
 from hpcclear.base.bits import beyond, call_at
-from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.jit import FASTMATH, interleaved, lane_function
 from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import slider_crank
 from hpcclear.dynamics.linkage.baumgarte import nine_coordinates
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.motion import both_ideal, table_value
+
+LONG = 200
+"""Lines of a text from which half of its vectors stand side by side: of all of them there are more instructions than the
+processor keeps decoded."""
 
 
 @lane_function
@@ -118,9 +123,12 @@ def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
 
 @cache
 def compiled_text(name: str) -> Any:
-    """The compiled motion of a text by its name, which another process can be told."""
+    """The compiled motion of a text by its name, which another process can be told; its second word is the number of lanes."""
     text = getattr(text_named(name), name)
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+    lanes = int(name.split("_")[1])
+    long = inspect.getsource(text).count("\n") > LONG
+    with interleaved(lanes // 2 if long else lanes):
+        return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 
 @cache
