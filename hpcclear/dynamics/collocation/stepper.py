@@ -15,11 +15,12 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
-from hpcclear.dynamics.collocation.crossings import stop_at_contacts
+from hpcclear.dynamics.collocation.crossings import gap_before, stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit
+from hpcclear.dynamics.stepping.peaks import NEAR, damping, keep_peak
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 from hpcclear.dynamics.stepping.settings import (
@@ -218,14 +219,21 @@ def end_of_step(effects, work, m, n):
 
 
 @lane_function
-def peaks_inside(work, m, p):
-    """Extremes of joint p at the nodes of an accepted step, its end left to `commit`."""
+def peaks_between(rules, work, par, m, p):
+    """Extremes of joint p at the nodes of an accepted step and between them, its end left to `commit`."""
     if work[at.AVERAGING] == 1.0:
+        c = damping(rules, work, par, p, 0, 1)
+        force = work[at.RATE_OLD + at.FORCE + p]
         for i in range(STAGES):
-            force = m[(at.RATE_NOW + at.FORCE + p) * STAGES + i]
+            before, force = force, m[(at.RATE_NOW + at.FORCE + p) * STAGES + i]
             depth = m[(at.RATE_NOW + at.GAP + p) * STAGES + i]
             work[at.PEAK + p] = max(work[at.PEAK + p], force)
             work[at.DEEPEST + p] = max(work[at.DEEPEST + p], depth)
+            _, length, d0, m0, d1, m1 = gap_before(work, m, p, i)
+            high = NEAR * max(before, force) > work[at.PEAK + p]
+            if high or NEAR * max(d0, d1) > work[at.DEEPEST + p]:
+                h = length * work[at.STEP]
+                keep_peak(work, p, 0, 1, d0, m0 / h, d1, m1 / h, 0.0, c, h, before, force)
 
 
 @lane_function
@@ -297,7 +305,7 @@ def judge_end(effects, block, m, settings, n):
         if work[at.ACCEPT] == 1.0:
             for p in range(rules.begin, rules.end):
                 integrate_gap(0, 1, work, p)
-                peaks_inside(work, m, p)
+                peaks_between(rules, work, block.par, m, p)
     return status
 
 

@@ -18,6 +18,7 @@ from hpcclear.dynamics.implicit.stiff import ask_implicit
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
+from hpcclear.dynamics.stepping.peaks import peaks_inside
 from hpcclear.dynamics.stepping.record import record_step
 from hpcclear.dynamics.stepping.settings import CYCLE, GAP_TOLERANCE, PROFILE
 from hpcclear.dynamics.stepping.special import END_OF_REVOLUTION, END_OF_STEP, NEXT_SAMPLE, ask
@@ -85,6 +86,7 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
         running += judge_steps(codes.special, rules, n, numbers, block, queue, settings, W)
         if rules.profile:
             run_motion(numbers[PROFILE], work, method.tables)
+        peaks_inside(rules, work, block.par, W)
         ended = commit(at.Stepped(rules, method.measures), work, block.stages, n, W)
         full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
         if ended > 0.0:

@@ -160,6 +160,7 @@ def commit_joint(latched, work, p, i, W):
     keep(work, at.RATE_OLD + at.GAP + p, d, yes, i, W)
     rate = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
     keep(work, at.RATE_OLD + at.GAP_RATE + p, rate, yes, i, W)
+    keep(work, at.RATE_OLD + at.FORCE + p, force, yes, i, W)
     on = work[(at.ACTIVE + p) * W + i]
     off = 1.0 if (latched * accept * on == 1.0) & (d < 0.0) else 0.0
     work[(at.ACTIVE + p) * W + i] = on - off

@@ -1,0 +1,55 @@
+"""What happens inside a step: roots of the gaps' cubics, and peaks of force and penetration between its ends."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.stepping.events import hermite, root
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
+
+from scenes import ensemble, scene  # noqa: E402
+
+
+def cubics(count: int):
+    """Ends and slopes over eight decades with a change of sign between, flat and steep, many with a near double root."""
+    rng = np.random.default_rng(7)
+    ends = rng.normal(size=(count, 2)) * 10.0 ** rng.uniform(-8.0, 0.0, (count, 2))
+    ends[:, 1] = -np.sign(ends[:, 0]) * np.abs(ends[:, 1])
+    slopes = rng.normal(size=(count, 2)) * 10.0 ** rng.uniform(-6.0, 1.0, (count, 2))
+    return np.column_stack([ends[:, 0], slopes[:, 0], ends[:, 1], slopes[:, 1]])
+
+
+def test_roots_are_where_the_cubic_changes_sign():
+    near = 1e-13
+    for case in cubics(20_000):
+        found = root(*case, 1.0)
+        assert 0.0 <= found <= 1.0
+        left, right = (hermite(*case, x) for x in (max(found - near, 0.0), min(found + near, 1.0)))
+        value = abs(hermite(*case, found))
+        assert left * right <= 0.0 or value < 1e-15 * np.abs(case).sum(), case
+
+
+@pytest.mark.parametrize("law", ["hunt-crossley", "frictionless", "lankarani-nikravesh"])
+@pytest.mark.parametrize("method", ["pair", "collocation"])
+def test_peaks_lie_between_the_ends_of_steps(law: str, method: str):
+    # Those at the ends are 0.2 % low in the median, 1.7 % at worst. At 1e-12 steps are so short that it does not matter.
+    def run(rtol: float, collocation: bool):
+        setup = ensemble(scene(law, rtol, 0, 1), 64)
+        problem = replace(setup.problem, collocation=collocation)
+        return Lanes(problem, 1 if collocation else 32).run(setup.par, setup.start)
+
+    exact = run(1e-12, False)
+    found = run(1e-6, method == "collocation")
+    for ours, theirs in (
+        (found.peak_force[:, :2], exact.peak_force[:, :2]),
+        (found.deepest[:, :2], exact.deepest[:, :2]),
+    ):
+        error = np.abs(ours / theirs - 1.0)
+        # one latched design of 64 has other forces at 1e-6, whose error falls with the tolerance like that of its motion
+        assert np.sort(error.max(axis=1))[-2] < 1e-4
+        assert error.max() < 1e-3
