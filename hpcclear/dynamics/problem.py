@@ -36,8 +36,8 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-TIGHT = 1e-9
-"""Relative tolerance from which "auto" integrates a single response by collocation: two methods agree to about this."""
+LOOSE = 1e-4
+"""Relative tolerance up to which "auto" integrates a single response by collocation: it is faster there, and more accurate."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -325,10 +325,9 @@ def _bars_of(scene: Scene) -> Mechanism:
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
 
-    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digits that either
-    knows. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
+    Looser than `LOOSE` the pair is faster. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
     where the motion may be stiff, implicit steps are called for.
 
     Raises
@@ -356,7 +355,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         )
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
-    return single and automatic and smooth and scene.numerics.rtol <= TIGHT
+    return single and automatic and smooth and scene.numerics.rtol <= LOOSE
 
 
 def _cells_of_curves(
