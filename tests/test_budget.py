@@ -274,6 +274,14 @@ def test_a_tolerance_that_alpha_needs_tighter_than_the_pilot_is_taken(tmp_path, 
     assert contents(tmp_path / "out") == contents(tmp_path / "it")
 
 
+def test_no_tolerance_is_tightened_for_what_most_samples_ended(tmp_path):
+    told: list[str] = []
+    few = scene_of("study.verification.most_samples=128", "study.accuracy=0.002")
+    run_study(few, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    assert not any("simulated again" in text for text in told)
+    assert "study.verification.most_samples ended them" in " ".join(told)
+
+
 def test_simulations_of_a_study_are_those_of_its_split():
     scene = scene_of()
     made = budget.spread(scene, lambda label, one, points: budget.simulated(alone(), one, points))

@@ -91,7 +91,7 @@ def test_a_journal_that_turns_under_a_constant_load_does_linear_work(revolutions
 
 
 INCH, POUND = 0.0254, 4.4482216152605
-BUSHING = Path(__file__).parent.parent / "jobs" / "bushing.toml"
+BUSHING = Path(__file__).parent.parent / "jobs" / "worn_bushing.toml"
 
 
 @pytest.mark.parametrize(

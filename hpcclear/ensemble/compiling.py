@@ -35,9 +35,8 @@ def compile_share(payload: Mapping[str, Any], ranks: Ranks) -> None:
     """
     mine: tuple[Callable[[Mapping[str, Any]], None], ...] = (_ensemble, _response, _statistics)
     if ranks.size > 1 and ranks.is_root:
-        mine = mine[
-            :2
-        ]  # the first takes as long as the others together; then the second is there to load
+        # the first takes as long as the others together; then the second is there to load
+        mine = mine[:2]
     elif ranks.size > 1:
         mine = mine[1:][ranks.rank - 1 :: ranks.size - 1]
     for part in mine:

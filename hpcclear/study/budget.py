@@ -259,8 +259,8 @@ def verified(
     if rtol == run.scene.numerics.rtol:
         return run, made, true, table
     run.tell(
-        f"Pairs on alpha and beta show that rtol {run.scene.numerics.rtol:.0e} takes more of their accuracy than was "
-        f"asked: verified designs are simulated again at {rtol:.0e}."
+        f"Pairs on alpha and beta show that rtol {run.scene.numerics.rtol:.0e} takes more of their accuracy than the "
+        f"samples leave: verified designs are simulated again at {rtol:.0e}."
     )
     run = run.of(run.scene.with_({"numerics.rtol": rtol}))
     true = run.stage("verification-2", truth.simulate, designs, "verification")
@@ -281,7 +281,9 @@ def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Res
     # what chance may have made counts as a bias too: a needless tolerance is dear, a missed one makes the answer wrong
     known = np.sqrt(np.maximum(bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
     known = np.nan_to_num(np.concatenate([known, FALL * known[-1:]]))
-    good = (np.hypot(_reach(true)[rows], known) <= wanted).all(axis=(1, 2))
+    # what samples leave, at least the split's share: where `most_samples` ended them no tolerance makes up for it
+    left = np.fmax(wanted**2 - _reach(true)[rows] ** 2, np.fmin(made.split.tolerance, wanted) ** 2)
+    good = (known**2 <= left).all(axis=(1, 2))
     further = int(good.argmax()) if good.any() else len(rtol) - 1
     split = replace(made.split, rung=made.split.rung + further, rtol=float(rtol[further]))
     worst = known[further].max(axis=0, initial=0.0)

@@ -130,7 +130,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     bearing and journal about their own centres, and the dissipated power.
     """
     ex, ey, vx, vy, spin_journal, spin_bearing = relative
-    spins = swept(spin_journal, 1.0), swept(spin_bearing, 1.0)
+    moving = ex, ey, vx, vy, swept(spin_journal, 1.0), swept(spin_bearing, 1.0)
     block = joint.block
     active = work[joint.active * W + i]
     inverse_impact = work[joint.inverse_impact * W + i]
@@ -139,7 +139,6 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     nx = ex * inverse
     ny = ey * inverse
     round_gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
-    moving = (vx, vy, *spins)
     here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
@@ -172,7 +171,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     side = tilted(effects.waves, here, (nx, ny, inverse), normal)
     elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
     loss = (normal - elastic) * rate + either_product(coulomb, other, tangential, sliding)
-    oil = film_of(effects, par, joint, (ex, ey, vx, vy, *spins), (nx, ny, gap), i, W)
+    oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = pressed(
         effects.film, normal, nx, ny, oil[0], oil[1]

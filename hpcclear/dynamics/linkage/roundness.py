@@ -88,13 +88,10 @@ def waves_at(flag, par, row, cosine, sine, i, W):
 
 
 @lane_function
-def waves_here(flag, effects, par, joint, moving, normal, turns, i, W):
-    """What waves come to where journal and bearing touch; 0 of round ones.
-
-    `moving`: the journal's velocity relative to the bearing, spins of both; `normal`: its direction, and 1/|e|.
-    """
+def waves_here(flag, effects, par, joint, relative, normal, turns, i, W):
+    """What waves come to where journal and bearing touch; `normal`: its direction, and 1/|e|; 0 of round ones."""
     if flag is not None:
-        vx, vy, spin_journal, spin_bearing = moving
+        _, _, vx, vy, spin_journal, spin_bearing = relative
         nx, ny, inverse = normal
         cb, sb, cj, sj = turns
         own = (nx * cb + ny * sb, ny * cb - nx * sb)
