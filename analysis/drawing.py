@@ -1,10 +1,11 @@
 """What several of these programs draw, or ask, alike."""
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -31,13 +32,36 @@ def save_figures(figures: Mapping[str, Callable[[], Figure]], options: argparse.
             print(f"no {name}: {error}")
 
 
-def error_panels(titles: Sequence[str], width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """Panels side by side for time against the error of the slider's position, both logarithmic."""
+def by_code(runs: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each code of a comparison, and what was measured of it."""
+    for code in runs["code"].values:
+        yield str(code), runs.sel(code=code)
+
+
+def error_panels(
+    runs: Mapping[str, xr.Dataset],
+    width: float,
+    height: float,
+    curve: Callable[[Axes, int, str, xr.Dataset], object],
+) -> tuple[Figure, list[Axes]]:
+    """A panel for each title: time against the error of the slider's position, both logarithmic; `curve` draws a code's."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, len(titles), figsize=(width * len(titles), height), sharey=True)
-    panels = list(np.atleast_1d(axes))
-    for panel, title in zip(panels, titles, strict=True):
+    plt.switch_backend("Agg")
+    size = (width * len(runs), height)
+    figure, axes = plt.subplots(1, len(runs), figsize=size, sharey=True, squeeze=False)
+    panels = list(axes[0])
+    for panel, (title, data) in zip(panels, runs.items(), strict=True):
         panel.set(xscale="log", yscale="log", xlabel="error of the slider position, m")
         panel.set_title(title, fontsize=9)
+        for k, (code, row) in enumerate(by_code(data)):
+            curve(panel, k, code, row)
     return figure, panels
+
+
+def described(
+    dims: tuple[str, ...], values: Mapping[str, np.ndarray], words: Mapping[str, tuple[str, str]]
+) -> dict[str, xr.Variable]:
+    """Variables of the same dimensions, shape that of each in `values`; `words`: long name and unit of each."""
+    said = {name: dict(zip(("long_name", "units"), words[name], strict=True)) for name in values}
+    return {name: xr.Variable(dims, array, said[name]) for name, array in values.items()}

@@ -20,6 +20,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
+from drawing import described
 
 from hpcclear import __version__
 from hpcclear.base.errors import InputError
@@ -206,16 +207,8 @@ def measure(paths: list[Path], revolutions: int, trust: bool) -> xr.Dataset:
             for key, value in row.items():
                 result[key][k, j] = value
         print(f"  {name} done", flush=True)
-    data = {
-        name: (
-            ("case", "rtol"),
-            values,
-            {"long_name": VARIABLES[name][0], "units": VARIABLES[name][1]},
-        )
-        for name, values in result.items()
-    }
     return xr.Dataset(
-        data,
+        described(("case", "rtol"), result, VARIABLES),
         coords={"case": list(scenes), "rtol": list(TOLERANCES)},
         attrs={"title": "Hard scenes at several tolerances", "versions": f"hpcclear {__version__}"},
     )

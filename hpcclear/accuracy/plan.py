@@ -294,18 +294,14 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
         Lives cannot be followed, or an error was asked for that these have no use for.
     """
     lives.check(scene)
-    if scene.study is not None and scene.study.accuracy is not None:
-        if error is not None:
-            raise InputError(
-                "--error", error, "the study asks for an accuracy of its own, which decides the tolerance",
-                "Leave it out, and set study.accuracy",
-            )  # fmt: skip
-        return ()
-    if scene.study is not None and scene.study.worn:
-        if error is not None:
-            raise InputError(
-                "--error", error, "lives of worn joints are followed at the settings of the file",
-                "Leave it out, and set wear.tolerance and wear.copies",
-            )  # fmt: skip
-        return ()
-    return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
+    study = scene.study
+    if study is None or (study.accuracy is None and not study.worn):
+        return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
+    if error is not None:
+        reason = "lives of worn joints are followed at the settings of the file"
+        remedy = "Leave it out, and set wear.tolerance and wear.copies"
+        if study.accuracy is not None:
+            reason = "the study asks for an accuracy of its own, which decides the tolerance"
+            remedy = "Leave it out, and set study.accuracy"
+        raise InputError("--error", error, reason, remedy)
+    return ()

@@ -13,7 +13,8 @@ from hpcclear.cli.options import (
     SET,
     How,
     check_free,
-    is_root,
+    flag,
+    of_one_process,
     on_ranks,
     output_option,
     place_of,
@@ -46,10 +47,9 @@ def _check_kind(
 @SET
 @output_option("NetCDF file to write.")
 @POINTS
-@click.option(
+@flag(
     "--statistics",
-    is_flag=True,
-    help="Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
+    "Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
 )
 @click.option(
     "--raw",
@@ -105,6 +105,7 @@ def sample(
 @SET
 @output_option("NetCDF file to write: the name that was given with each part.")
 @POINTS
+@of_one_process
 def merge(file: Path, overrides: tuple[str, ...], output: Path, points: Path | None) -> int:
     """Write what sample --part 1/N to N/N made as one file: the bytes that a single run would have written.
 
@@ -112,8 +113,6 @@ def merge(file: Path, overrides: tuple[str, ...], output: Path, points: Path | N
 
     Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.cli.printing import describe_samples
     from hpcclear.ensemble.samples import design
     from hpcclear.ensemble.split import run_merge
@@ -180,12 +179,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
 @click.command(short_help="Say which effects a scene can do without.")
 @FILE
 @SET
-@click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    help="NetCDF file to write; by default NAME-effects.nc here.",
-)
+@output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @click.option(
     "--tolerance",
     default="1%",
@@ -199,11 +193,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
     metavar="N",
     help="Samples of a variant at most; by default as many as a twentieth of the study allows.",
 )
-@click.option(
-    "--forces",
-    is_flag=True,
-    help="Hold peak contact forces to the tolerance, too, not only tell them.",
-)
+@flag("--forces", "Hold peak contact forces to the tolerance, too, not only tell them.")
 @click.option(
     "--scene",
     "reduced",

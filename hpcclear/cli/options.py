@@ -11,7 +11,7 @@ import click
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.launcher import launched_rank
-from hpcclear.ranks.stopping import StopSwitch
+from hpcclear.ranks.stopping import Exit, StopSwitch
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Options
@@ -29,14 +29,17 @@ SET = click.option(
 )
 
 
-def output_option(words: str) -> Callable[[Any], Any]:
+def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
     """The option that names where results go."""
-    return click.option("-o", "--output", type=PATH, required=True, help=words)
+    return click.option("-o", "--output", type=PATH, required=required, help=words)
 
 
-FRESH = click.option(
-    "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
-)
+def flag(name: str, words: str) -> Callable[[Any], Any]:
+    """An option that is given or not."""
+    return click.option(name, is_flag=True, help=words)
+
+
+FRESH = flag("--fresh", "Start anew beside earlier results, never over them.")
 LIMIT = click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
@@ -126,6 +129,16 @@ def check_free(path: Path) -> None:
 def is_root() -> bool:
     """Whether this process is the first of its launcher, or has none."""
     return launched_rank() in (0, None)
+
+
+def of_one_process(command: Callable[..., int]) -> Callable[..., int]:
+    """A command that one process carries out: others of its launcher leave at once."""
+
+    @functools.wraps(command)
+    def alone(**values: Any) -> int:
+        return command(**values) if is_root() else Exit.DONE
+
+    return alone
 
 
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")

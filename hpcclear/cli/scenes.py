@@ -10,7 +10,8 @@ from hpcclear.cli.options import (
     PATH,
     SET,
     check_free,
-    is_root,
+    flag,
+    of_one_process,
     output_option,
     place_of,
     scene_of,
@@ -20,11 +21,11 @@ from hpcclear.ranks.stopping import Exit
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
-@click.option(
+@flag(
     "--four-stroke",
-    is_flag=True,
-    help="A gas force against two turns of the crank, in an engine written as a linkage.",
+    "A gas force against two turns of the crank, in an engine written as a linkage.",
 )
+@of_one_process
 def init(file: Path, four_stroke: bool) -> int:
     """Write an engine to start from: every table, each number with its unit, and a small study.
 
@@ -32,8 +33,6 @@ def init(file: Path, four_stroke: bool) -> int:
 
     Example: hpcclear init engine.toml --four-stroke
     """
-    if not is_root():
-        return Exit.DONE
     from importlib import resources
 
     from hpcclear.results import files
@@ -57,13 +56,12 @@ def init(file: Path, four_stroke: bool) -> int:
     metavar="FIGURE",
     help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
 )
+@of_one_process
 def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.cli.printing import describe_scene
 
     scene = scene_of(file, overrides, warn=False)
@@ -84,6 +82,7 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
 @FILE
 @SET
 @output_option("NetCDF file to write.")
+@of_one_process
 def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
@@ -92,8 +91,6 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
@@ -118,13 +115,12 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 
 @click.command(short_help="Write figures and an HTML page.")
 @click.argument("directory", type=PATH)
+@of_one_process
 def report(directory: Path) -> int:
     """Write figures and a self-contained HTML page about a directory of results.
 
     Example: hpcclear report results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.report.html.page import write_report
 
     click.echo(f"report  {write_report(directory)}")
@@ -140,6 +136,7 @@ def report(directory: Path) -> int:
     show_default=True,
     help="Samples of each file, spread over it.",
 )
+@of_one_process
 def reproduce(place: Path, samples: int) -> int:
     """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
 
@@ -148,8 +145,6 @@ def reproduce(place: Path, samples: int) -> int:
 
     Example: hpcclear reproduce results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.ensemble.repeating import repeated
 
     found = list(repeated(place, samples))
@@ -165,13 +160,12 @@ def reproduce(place: Path, samples: int) -> int:
 
 @click.command(short_help="Describe results for an archive.")
 @click.argument("directory", type=PATH)
+@of_one_process
 def crate(directory: Path) -> int:
     """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
 
     Example: hpcclear crate results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.results.crate import write_crate
 
     click.echo(f"crate  {write_crate(directory)}")

@@ -12,6 +12,7 @@ from hpcclear.cli.options import (
     PROGRESS,
     SET,
     STUDYING,
+    flag,
     on_ranks,
     output_option,
     place_of,
@@ -64,9 +65,7 @@ def run(
 @FILE
 @SET
 @output_option("Directory for accuracy.nc and the figures.")
-@click.option(
-    "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
-)
+@flag("--quick", "A look in about a minute instead of the whole picture.")
 @FRESH
 @LIMIT
 def accuracy(
