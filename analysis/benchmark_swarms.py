@@ -30,6 +30,7 @@ import xarray as xr
 from drawing import described
 from matplotlib.ticker import NullFormatter
 
+from hpcclear.results.rows import Columns, number
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.pareto import cut
 
@@ -81,14 +82,15 @@ PROBLEMS: dict[str, tuple[Function, int, int]] = {
 TARGETS = {"ZDT1": 0.8700, "ZDT2": 0.5379, "ZDT3": 1.3265, "DTLZ2": 0.7290}
 
 
-VARIABLES = {
-    "hypervolume": ("hypervolume of the cut front, reference point 1.1", "1"),
-    "igd_plus": ("IGD+ of the cut front against the known front", "1"),
-    "evaluations": ("function evaluations used", "1"),
-    "front_size": ("points in the cut front", "1"),
-    "seconds": ("wall time of the run, function included", "s"),
+RUNS = ("problem", "algorithm", "seed")
+VARIABLES: Columns = {
+    "hypervolume": number(RUNS, "1", "hypervolume of the cut front, reference point 1.1"),
+    "igd_plus": number(RUNS, "1", "IGD+ of the cut front against the known front"),
+    "evaluations": number(RUNS, "1", "function evaluations used"),
+    "front_size": number(RUNS, "1", "points in the cut front"),
+    "seconds": number(RUNS, "s", "wall time of the run, function included"),
 }
-"""Long name and unit of what is measured of every run."""
+"""What is measured of every run."""
 
 
 def run_hpcclear(function: Function, variables: int, _: int, budget: int, seed: int) -> np.ndarray:
@@ -178,10 +180,9 @@ def compare(methods: list[str], budget: int, seeds: list[int]) -> xr.Dataset:
 
 
 def _dataset(result: dict, fronts: np.ndarray, methods: list[str], seeds: list[int]) -> xr.Dataset:
-    dims = ("problem", "algorithm", "seed")
-    data: dict[str, Any] = dict(described(dims, result, VARIABLES))
+    data: dict[str, Any] = dict(described(result, VARIABLES))
     data["front"] = (
-        (*dims, "solution", "objective"),
+        (*RUNS, "solution", "objective"),
         fronts,
         {"long_name": "objectives of the cut front, NaN where absent", "units": "1"},
     )

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from hpcclear import report
 from hpcclear.base.errors import InputError
+from hpcclear.results.rows import Columns
 
 
 def figure_options(words: str, name: str, what: str) -> argparse.Namespace:
@@ -59,9 +60,11 @@ def error_panels(
     return figure, panels
 
 
-def described(
-    dims: tuple[str, ...], values: Mapping[str, np.ndarray], words: Mapping[str, tuple[str, str]]
-) -> dict[str, xr.Variable]:
-    """Variables of the same dimensions, shape that of each in `values`; `words`: long name and unit of each."""
-    said = {name: dict(zip(("long_name", "units"), words[name], strict=True)) for name in values}
-    return {name: xr.Variable(dims, array, said[name]) for name, array in values.items()}
+def described(values: Mapping[str, np.ndarray], rows: Columns) -> dict[str, xr.Variable]:
+    """Variables with the dimensions, units and long names of `rows`; each value has the shape that these ask for."""
+    return {
+        name: xr.Variable(
+            rows[name].dims, array, {"long_name": rows[name].long_name, "units": rows[name].units}
+        )
+        for name, array in values.items()
+    }

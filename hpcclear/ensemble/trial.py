@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Records
+from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
@@ -206,18 +207,14 @@ class Trial:
 
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
         """Follow the certificate to its end; raises what `simulate` does."""
-        asking = certificate(plan)
-        wanted = next(asking)
-        while True:
-            told = [
+
+        def told(wanted: Sequence[Asked]) -> list[Seen]:
+            return [
                 self.seen(one, simulate(self.simulated(one.off), self.points(one)))
                 for one in wanted
             ]
-            try:
-                wanted = asking.send(told)
-            except StopIteration as end:
-                found: Certificate = end.value
-                return found
+
+        return answered(certificate(plan), told)
 
     def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
         """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""

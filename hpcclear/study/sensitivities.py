@@ -9,17 +9,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box
 from hpcclear.scene.study import Study
-from hpcclear.statistics.sensitivity import (
-    IntervalDesign,
-    IntervalSettings,
-    analyse_intervals,
-    analyse_sobol,
-    best_estimates,
-    convergence_intervals,
-    design_intervals,
-    select_influential,
-    sobol_design,
-)
+from hpcclear.statistics import sensitivity
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
 from hpcclear.statistics.surrogate.surface_search import (
@@ -108,23 +98,23 @@ def write(run: StudyRun, result: Result) -> None:
     run.write(content, "sensitivity.nc")
 
 
-def _designs(run: StudyRun) -> list[IntervalDesign]:
+def _designs(run: StudyRun) -> list[sensitivity.IntervalDesign]:
     settings = run.study.sensitivity
     lower, upper = run.study.variable(parameter(run)).bounds
     clearances = np.linspace(lower, upper, settings.levels)
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
+        found.append(sensitivity.design_intervals(_bounds(run, names), clearances, rng, laid_out))
     return found
 
 
-def _layouts(study: Study) -> list[IntervalSettings]:
+def _layouts(study: Study) -> list[sensitivity.IntervalSettings]:
     """How many points each surface gets."""
     settings = study.sensitivity
     separate = [False] * len(study.groups)
     return [
-        IntervalSettings(
+        sensitivity.IntervalSettings(
             steps=settings.rounds,
             shrink=settings.shrink,
             n_points=settings.together_samples if together else settings.samples,
@@ -147,7 +137,7 @@ def _columns(run: StudyRun, names: Sequence[str]) -> list[int]:
 def _first_order(
     run: StudyRun,
     inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
+    designs: Sequence[sensitivity.IntervalDesign],
     values: Sequence[Array],
 ) -> Result:
     settings = run.study.sensitivity
@@ -161,9 +151,9 @@ def _first_order(
         result[name] = np.full(of_clearance, np.nan)
     fractions = (1.0 - settings.shrink) ** np.arange(settings.rounds)
     for k, names in enumerate(inputs):
-        history = analyse_intervals(designs[k], values[k])
-        found = convergence_intervals(history)
-        slope, uncertainty = best_estimates(history, found)
+        history = sensitivity.analyse_intervals(designs[k], values[k])
+        found = sensitivity.convergence_intervals(history)
+        slope, uncertainty = sensitivity.best_estimates(history, found)
         at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
         result["sensitivity"][k][..., at] = history.sensitivity * span
         result["standard_error"][k][..., at] = history.standard_error * span
@@ -181,7 +171,7 @@ def _first_order(
     return result | {"interval": fractions, "clearance": designs[0].clearances}
 
 
-def _levels(design: IntervalDesign, values: Array) -> Result:
+def _levels(design: sensitivity.IntervalDesign, values: Array) -> Result:
     """Mean objective over the box of the last surface at each clearance, and its standard error.
 
     The mean of a Latin hypercube has only the scatter that is left after all that is additive in
@@ -210,7 +200,7 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     error = np.stack(
         [result["uncertainty"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
     )
-    chosen = select_influential(
+    chosen = sensitivity.select_influential(
         names, slope, error, np.ones(len(names)), fraction=run.study.sensitivity.influence
     )
     influence = np.full(len(run.study.names), np.nan)
@@ -225,7 +215,7 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
 def _accepted(
     run: StudyRun,
     inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
+    designs: Sequence[sensitivity.IntervalDesign],
     values: Sequence[Array],
 ) -> Result:
     """The surface over each global interval; a refused one gets more points or another order."""
@@ -255,7 +245,7 @@ def _accepted(
 
 
 def _surface(
-    run: StudyRun, variables: int, design: IntervalDesign, values: Array, level: int
+    run: StudyRun, variables: int, design: sensitivity.IntervalDesign, values: Array, level: int
 ) -> tuple[Accuracy | None, int, int, bool]:
     """Accuracy, order and points of a surface of so many variables, and whether it was accepted."""
     settings, laid_out = run.study.sensitivity, design.settings
@@ -276,7 +266,7 @@ def _surface(
 def _searched(
     run: StudyRun,
     inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
+    designs: Sequence[sensitivity.IntervalDesign],
     places: Sequence[tuple[int, int]],
 ) -> list[SurfaceSearch]:
     """More points or another order for the surfaces at these places, (surface, level), all in the same batches."""
@@ -310,7 +300,7 @@ def _sobol_points(run: StudyRun) -> Array:
     rows = _sobol_rows(run.study)
     if rows == 0:
         return np.empty((0, len(run.study.names)))
-    return sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
+    return sensitivity.sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
 
 
 def _sobol_rows(study: Study) -> int:
@@ -326,7 +316,7 @@ def _global(run: StudyRun, values: Array | None) -> Result:
         nothing = np.full(count, np.nan)
         names = ("sobol_first", "sobol_total", "sobol_first_error", "sobol_total_error")
         return dict.fromkeys(names, nothing)
-    found = analyse_sobol(values, count, run.rng("sobol bootstrap"))
+    found = sensitivity.analyse_sobol(values, count, run.rng("sobol bootstrap"))
     return {
         "sobol_first": found.first,
         "sobol_total": found.total,
