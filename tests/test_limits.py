@@ -6,7 +6,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,14 +27,6 @@ def compiled(tmp_path_factory) -> Path:
     code, text = commands.run(commands.sample(output, 64))
     assert code == 0, text
     return output
-
-
-def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
-    deadline = time.time() + crowded(60.0)
-    while not commands.result_files(folder):
-        assert job.poll() is None, commands.finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.02)
 
 
 # -- the disk -----------------------------------------------------------------------------------
@@ -143,7 +134,7 @@ def test_memory_that_runs_out_during_the_run_ends_in_a_message(tmp_path, rank):
 def test_a_second_run_on_one_output_is_refused(tmp_path):
     words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     job = commands.start(words)
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     code, output = commands.run(words, 0)
     assert code == 2, output
     assert "holds it" in output
@@ -157,7 +148,7 @@ def test_a_second_run_on_one_output_is_refused(tmp_path):
 def test_the_lock_of_a_killed_run_is_recognised(tmp_path):
     words = commands.sample(tmp_path / "samples.nc", 3000, *OPTIONS)
     job = commands.start(words)
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     for process in commands.ranks_of(job).values():
         commands.kill(process)
     commands.finish(job, 20.0)
@@ -189,7 +180,7 @@ def test_another_scene_is_refused_with_the_keys_that_differ_and_fresh_lies_besid
 def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
     output = tmp_path / "samples.nc"
     job = commands.start(commands.sample(output, 100_000, *OPTIONS))
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     commands.kill(job.pid, signal.SIGTERM)
     assert commands.finish(job)[0] == 3
     before = {path: path.read_bytes() for path in commands.result_files(tmp_path)}

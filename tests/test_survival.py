@@ -3,7 +3,6 @@
 import itertools
 import random
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -196,7 +195,7 @@ def test_both_entry_points_obey_a_signal(tmp_path, undisturbed, program, ranks):
     words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     entry = ("-m", "hpcclear") if program == "-m hpcclear" else (_script(),)
     job = commands.start(words, ranks, entry)
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     commands.kill(job.pid, signal.SIGTERM)
     code, output = commands.finish(job, 10.0)
     assert code == 3, output
@@ -212,7 +211,7 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
     job = commands.start(
         words, ranks, TEST_FAIL="sleep hpcclear.results.checkpoint:Checkpoint.flush 3"
     )
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     time.sleep(1.5)
     commands.kill(job.pid, signal.SIGINT)
     time.sleep(1.0)
@@ -224,15 +223,6 @@ def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturb
     assert code == 3 or ranks, output  # mpiexec aborts the job by itself, with a code of its own
     assert "Traceback" not in output
     assert commands.check_readable(tmp_path) > 0
-
-
-def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
-    """Wait until the first finished samples are on disk."""
-    deadline = time.time() + crowded(60.0)
-    while not commands.result_files(folder):
-        assert job.poll() is None, commands.finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.02)
 
 
 def _script() -> str:
@@ -327,7 +317,7 @@ def test_a_program_error_at_any_stage_of_a_study_is_reported_once(place, undistu
 def test_results_of_an_interrupted_run_are_datasets_of_their_own(tmp_path, undisturbed):
     words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     job = commands.start(words)
-    wait_for_parts(job, tmp_path)
+    commands.wait_for_parts(job, tmp_path)
     time.sleep(1.0)
     commands.kill(job.pid, signal.SIGTERM)
     assert commands.finish(job)[0] == 3

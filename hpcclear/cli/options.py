@@ -70,8 +70,26 @@ PROGRESS = click.option(
 
 
 @dataclass(frozen=True)
+class Written:
+    """A scene as the words of a command have it: a file, and what is changed of it."""
+
+    file: Path
+    overrides: tuple[str, ...]
+
+    def scene(self, warn: bool = True) -> "Scene":
+        """The scene; what looks like a slip of units is said, unless the caller says it."""
+        from hpcclear.scene import load_scene
+        from hpcclear.scene.plausibility import implausible
+
+        scene = load_scene(self.file, self.overrides)
+        for text in implausible(scene) if warn else ():
+            say(f"Warning: {text}")
+        return scene
+
+
+@dataclass(frozen=True)
 class How:
-    """How a run is carried out: four options of a command, one argument of its function."""
+    """How a run is carried out."""
 
     fresh: bool
     time_limit: float | None
@@ -85,30 +103,24 @@ class How:
         return Options(self.fresh, self.interval, self.progress)
 
 
-def with_how(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the four options of `How`, as its argument `how`."""
+def _gathering(name: str, kind: type, *options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Gives a command these options, one a field of `kind`, as its one argument `name`."""
 
-    @FRESH
-    @LIMIT
-    @INTERVAL
-    @PROGRESS
-    @functools.wraps(command)
-    def gathered(**values: Any) -> int:
-        how = How(**{field.name: values.pop(field.name) for field in fields(How)})
-        return command(how=how, **values)
+    def decorator(command: Callable[..., int]) -> Callable[..., int]:
+        @functools.wraps(command)
+        def gathered(**values: Any) -> int:
+            parts = {field.name: values.pop(field.name) for field in fields(kind)}
+            return command(**{name: kind(**parts)}, **values)
 
-    return gathered
+        for option in reversed(options):
+            gathered = option(gathered)
+        return gathered
+
+    return decorator
 
 
-def scene_of(file: Path, overrides: tuple[str, ...], warn: bool = True) -> "Scene":
-    """The scene; what looks like a slip of units is said, unless the caller says it."""
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.plausibility import implausible
-
-    scene = load_scene(file, overrides)
-    for text in implausible(scene) if warn else ():
-        say(f"Warning: {text}")
-    return scene
+with_scene = _gathering("written", Written, FILE, SET)
+with_how = _gathering("how", How, FRESH, LIMIT, INTERVAL, PROGRESS)
 
 
 def place_of(output: Path) -> Path:

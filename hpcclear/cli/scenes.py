@@ -6,15 +6,14 @@ from pathlib import Path
 import click
 
 from hpcclear.cli.options import (
-    FILE,
     PATH,
-    SET,
+    Written,
     check_free,
     flag,
     of_one_process,
     output_option,
     place_of,
-    scene_of,
+    with_scene,
 )
 from hpcclear.ranks.stopping import Exit
 
@@ -47,8 +46,7 @@ def init(file: Path, four_stroke: bool) -> int:
 
 
 @click.command(short_help="Say what a file would simulate, at what cost.")
-@FILE
-@SET
+@with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
 @click.option(
     "--sketch",
@@ -57,14 +55,14 @@ def init(file: Path, four_stroke: bool) -> int:
     help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
 )
 @of_one_process
-def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | None) -> int:
+def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
     from hpcclear.cli.printing import describe_scene
 
-    scene = scene_of(file, overrides, warn=False)
+    scene = written.scene(warn=False)
     describe_scene(scene, cost)
     if sketch is not None:
         from hpcclear.report import save, sketch_figure
@@ -79,11 +77,10 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
 
 
 @click.command(short_help="Simulate one response.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write.")
 @of_one_process
-def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
+def simulate(written: Written, output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
     Exit code 1 if the simulation did not reach its end, 4 if f is not known to numerics.target_error; what there is
@@ -97,7 +94,7 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
     from hpcclear.dynamics.steady.telling import why_missed
     from hpcclear.results import dataset, files, netcdf
 
-    scene = scene_of(file, overrides)
+    scene = written.scene()
     files.probe(place_of(output), netcdf.SEAL)
     began = time.perf_counter()
     response = simulate_scene(scene)

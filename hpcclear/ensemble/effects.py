@@ -74,29 +74,21 @@ def run_effects(
     InputError, StorageError, Stopped, RankFailed
     """
     began = time.perf_counter()
-    check_tolerance(tolerance)
-    place = Place.of_file(output, options.fresh)
     trial = Trial(scene)
+    plan = trial.plan(tolerance, samples, forces)
+    place = Place.of_file(output, options.fresh)
     asked = {"tolerance": repr(tolerance), "samples": str(samples), "forces": str(forces)}
     with Session(place, {**run_key(scene, "effects"), **asked}, ranks, options) as session:
         content = session.found("effects")
         times: dict[str, str] | None = None
         if content is None:
             session.describe(scene)
-            content = _certified(trial, trial.plan(tolerance, samples, forces), session)
+            content = _certified(trial, plan, session)
             with ranks.stage("effects: cost"):
                 variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
                 times = {SECONDS_PER_SAMPLE: json.dumps(trial.seconds(variants))}
         session.close(times)
     return session.finished(content, began)
-
-
-def check_tolerance(tolerance: float) -> None:
-    """InputError unless it is one."""
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(
-            "--tolerance", tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
-        )  # fmt: skip
 
 
 def _certified(trial: Trial, plan: Plan, session: Session) -> xr.Dataset:

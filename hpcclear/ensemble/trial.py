@@ -155,7 +155,17 @@ class Trial:
         return made
 
     def plan(self, tolerance: float, samples: int, forces: bool) -> Plan:
-        """What is asked of the certificate."""
+        """What is asked of the certificate.
+
+        Raises
+        ------
+        InputError
+            The tolerance is none.
+        """
+        if not 0.0 < tolerance < 1.0:
+            raise InputError(
+                "--tolerance", tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
+            )  # fmt: skip
         most = max(samples // self.drawn.size, 4)
         return Plan(
             len(self.switches), tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
