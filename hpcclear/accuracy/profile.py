@@ -5,56 +5,37 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Profile:
-    """Sizes of every panel.
-
-    Attributes
-    ----------
-    name : str
-    rungs : tuple of float
-        Tolerances of the ladder, loosest first.
-    designs : int
-        Designs near the scene that each method integrates; errors are root mean squares over them.
-    repeats : int
-        Runs that each timing is the median of.
-    outside_repeats : int
-        The same for methods written in Python.
-    more_methods : bool
-        Whether the methods that have to be compiled for this panel alone take part.
-    revolutions : int
-        Of the long runs of the averaging panel.
-    copies : int
-        Long runs that differ by tiny kicks at their start.
-    stretches : int
-        Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions.
-    training : tuple of int
-        Sample sizes of the surrogates.
-    tests : int
-        Points the surrogates are tested on.
-    draws : tuple of int
-        Monte Carlo sizes on the surrogate.
-    blocks : int
-        Monte Carlo samples of each size; the error is their root mean square.
-    simulations : int
-        Direct simulations, shared out into samples of each size.
-    strong_seconds : float
-        Core-seconds of the batch whose speed-up is measured.
-    """
+    """Sizes of every panel."""
 
     name: str
     rungs: tuple[float, ...]
+    """Tolerances of the ladder, loosest first."""
     designs: int
+    """Designs near the scene that each method integrates; errors are root mean squares over them."""
     repeats: int
+    """Runs that each timing is the median of."""
     outside_repeats: int
+    """The same for methods written in Python."""
     more_methods: bool
+    """Whether the methods that have to be compiled for this panel alone take part."""
     revolutions: int
+    """Of the long runs of the averaging panel."""
     copies: int
+    """Long runs that differ by tiny kicks at their start."""
     stretches: int
+    """Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions."""
     training: tuple[int, ...]
+    """Sample sizes of the surrogates."""
     tests: int
+    """Points the surrogates are tested on."""
     draws: tuple[int, ...]
+    """Monte Carlo sizes on the surrogate."""
     blocks: int
+    """Monte Carlo samples of each size; the error is their root mean square."""
     simulations: int
+    """Direct simulations, shared out into samples of each size."""
     strong_seconds: float
+    """Core-seconds of the batch whose speed-up is measured."""
 
 
 QUICK = Profile(

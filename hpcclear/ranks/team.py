@@ -41,31 +41,21 @@ Maker = Callable[[Any, "Ranks"], Worker]
 
 @dataclass(frozen=True)
 class Task:
-    """What the ranks do in a stage that simulates; it travels to every rank.
-
-    Attributes
-    ----------
-    name : str
-        Of the stage, for reports and timing.
-    make : callable
-        A function of a module: pickle sends its name.
-    payload : object
-        What it makes a worker from, such as a scene's content.
-    dtype : dtype
-        Of the records; has a field ``sample``.
-    workers : int, optional
-        How many ranks get samples, root first; by default all. The others only make their worker.
-    share : callable, optional
-        Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles,
-        and root, which hands them out, simulates nothing.
-    """
+    """What the ranks do in a stage that simulates; it travels to every rank."""
 
     name: str
+    """Of the stage, for reports and timing."""
     make: Maker
+    """A function of a module: pickle sends its name."""
     payload: object
+    """What it makes a worker from, such as a scene's content."""
     dtype: np.dtype = OUTCOME
+    """Of the records; has a field ``sample``."""
     workers: int | None = None
+    """How many ranks get samples, root first; by default all. The others only make their worker."""
     share: Callable[[Any], Sharing] | None = None
+    """Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles, and
+    root, which hands them out, simulates nothing."""
 
 
 class Ranks:

@@ -72,35 +72,23 @@ class Rows:
 
 @dataclass(frozen=True)
 class Motion:
-    """A text and what it needs.
-
-    Attributes
-    ----------
-    source : str
-        Of the function ``lane(effects, joints, work, par, i, W)``.
-    forest : Forest
-    parameters : dict
-        Rows of `par` by name.
-    derived : dict
-        Texts of the derived parameters, by name, in parameters of `inputs`.
-    inputs : tuple of str
-        Names that `numbers.values` gives a number to.
-    constraints : tuple of str
-        Names of the multipliers.
-    curves : mapping
-        Rows of tabulated values, by drive or load.
-    coordinates : int
-        Row of the first of the forest's coordinates.
-    """
+    """A text and what it needs."""
 
     source: str
+    """Of the function ``lane(effects, joints, work, par, i, W)``."""
     forest: Forest
     parameters: dict[str, int]
+    """Rows of `par` by name."""
     derived: dict[str, str]
+    """Texts of the derived parameters, by name, in parameters of `inputs`."""
     inputs: tuple[str, ...]
+    """Names that `numbers.values` gives a number to."""
     constraints: tuple[str, ...]
+    """Names of the multipliers."""
     curves: Mapping[str, int] = field(default_factory=dict)
+    """Rows of tabulated values, by drive or load."""
     coordinates: int = at.QS
+    """Row of the first of the forest's coordinates."""
 
 
 def generate(
