@@ -17,6 +17,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
@@ -80,7 +81,7 @@ class Ranks:
         self._stage = "start"
         self._desk: Desk | None = None
         self._unsent: list[np.ndarray] = []
-        self._write = 0.0  # seconds of output not booked yet
+        self._writing = Stopwatch()  # output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
         self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (see `Desk`)
@@ -134,14 +135,9 @@ class Ranks:
         with self._timed(name, serial=True):
             yield
 
-    @contextlib.contextmanager
-    def writing(self) -> Iterator[None]:
+    def writing(self) -> contextlib.AbstractContextManager[None]:
         """Count root's time inside as output of the stage under way."""
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self._write += time.perf_counter() - started
+        return self._writing.running()
 
     def run_points(
         self,
@@ -247,20 +243,21 @@ class Ranks:
     def _timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
         """Book the wall time inside, less what is booked inside; yields the table to fill."""
         spent = np.zeros((self.size, len(COLUMNS)))
-        (outer, self._stage), (write, self._write) = (self._stage, name), (self._write, 0.0)
+        outer, self._stage = self._stage, name
+        writing, self._writing = self._writing, Stopwatch()
         started, booked = time.perf_counter(), self._booked
         try:
             yield spent
             self._stage = outer  # not after an error: its report names the stage
         finally:
             wall = time.perf_counter() - started - (self._booked - booked)
-            spent[0, COLUMNS.index("write")] = self._write
+            spent[0, COLUMNS.index("write")] = self._writing.seconds
             if serial:
-                spent[0, COLUMNS.index("busy")] = wall - self._write
+                spent[0, COLUMNS.index("busy")] = wall - self._writing.seconds
             spent[:, COLUMNS.index("idle")] = np.maximum(wall - spent.sum(axis=1), 0.0)
             self.stage_seconds[name] = self.stage_seconds.get(name, 0.0) + spent
             self._booked += wall
-            self._write = write
+            self._writing = writing
 
     def heed(self, message: Message) -> None:
         """Act on what a rank may say at any time."""
