@@ -209,6 +209,7 @@ def effects(
     def program(ranks: "Ranks") -> int:
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
+        from hpcclear.ensemble.trial import Wanted
         from hpcclear.study.extent import certificate_samples
 
         allowed = tolerance_of(tolerance)
@@ -220,9 +221,7 @@ def effects(
             place_of(output or Path(f"{written.file.stem}-effects.nc")),
             ranks,
             how.options(),
-            tolerance=allowed,
-            samples=certificate_samples(scene) if samples is None else samples,
-            forces=forces,
+            Wanted(allowed, certificate_samples(scene) if samples is None else samples, forces),
         )
         code = describe(found, scene, written.file)
         if reduced is not None:

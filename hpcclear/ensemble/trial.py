@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,6 +92,17 @@ class Drawn:
         return Points(tuple(paths), values, tuple((path,) for path in paths))
 
 
+class Wanted(NamedTuple):
+    """What a certificate has to hold to."""
+
+    tolerance: float
+    """Relative change that is allowed."""
+    samples: int
+    """Of each variant at most."""
+    forces: bool = False
+    """Whether peak contact forces must stay within the tolerance as well."""
+
+
 class Trial:
     """A scene, the effects that it might do without, and how variants of it are simulated.
 
@@ -154,7 +165,7 @@ class Trial:
         assert made is not None
         return made
 
-    def plan(self, tolerance: float, samples: int, forces: bool) -> Plan:
+    def plan(self, wanted: Wanted) -> Plan:
         """What is asked of the certificate.
 
         Raises
@@ -162,14 +173,14 @@ class Trial:
         InputError
             The tolerance is none.
         """
-        if not 0.0 < tolerance < 1.0:
+        if not 0.0 < wanted.tolerance < 1.0:
             raise InputError(
-                "--tolerance", tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
+                "--tolerance", wanted.tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
             )  # fmt: skip
-        most = max(samples // self.drawn.size, 4)
+        most = max(wanted.samples // self.drawn.size, 4)
         return Plan(
-            len(self.switches), tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
-            forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
+            len(self.switches), wanted.tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
+            wanted.forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
         )  # fmt: skip
 
     def points(self, asked: Asked) -> Points:
