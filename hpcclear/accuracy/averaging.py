@@ -38,9 +38,9 @@ class Averaging:
 
     transient: Integers
     averaged: Integers
-    """transient and averaged: Revolutions waited for (t,) and averaged (a,)."""
+    """transient and averaged: revolutions waited for (t,) and averaged (a,)."""
     error: Array
-    """Shape (t, a): Relative error of the objective, root mean square over copies."""
+    """Shape (t, a): relative error of the objective, root mean square over copies."""
     floor: float
     """Scatter of the copies' averages over the second half of the run, relative: no average goes below."""
     seconds: float

@@ -50,21 +50,21 @@ class Spending:
     tolerance: Array
     """Shape (r,)."""
     spent: Integers
-    """Shape (n,): Revolutions averaged, over all copies."""
+    """Shape (n,): revolutions averaged, over all copies."""
     error: Array
     model: Array
-    """error and model: Shape (r, n): Measured over disjoint means of so many revolutions, NaN where there are fewer than
+    """error and model, shape (r, n): measured over disjoint means of so many revolutions, NaN where there are fewer than
     four; and by the formula."""
     bias: Array
     bias_error: Array
-    """bias and bias_error: Shape (r,): Of the mean at each tolerance against the mean of the tightest that agree, with its
+    """bias and bias_error, shape (r,): of the mean at each tolerance against the mean of the tightest that agree, with its
     standard error; NaN where it is that mean."""
     variance: Array
-    """Shape (r,): Of the mean of one revolution among many, relative."""
+    """Shape (r,): of the mean of one revolution among many, relative."""
     spin_up: float
     """Revolutions that each copy leaves out: the motion's, whatever the tolerance."""
     turn_seconds: Array
-    """Shape (r,): Of a revolution."""
+    """Shape (r,): of a revolution."""
     revolutions: int
     """Of all copies at all tolerances."""
 
@@ -96,9 +96,9 @@ class Run:
     gaps: Array
     """Shape (stretches, r, copies, joints)."""
     seconds: Array
-    """Shape (r,): Processor time so far."""
+    """Shape (r,): processor time so far."""
     start: Array
-    """Shape (r, copies, Start.size): Where they go on from."""
+    """Shape (r, copies, Start.size): where they go on from."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Run":

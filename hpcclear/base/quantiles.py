@@ -100,7 +100,7 @@ class Named:
     scale: float = 1.0
     lower: float = -inf
     upper: float = inf
-    """lower and upper: Where it is cut off; infinite for the whole of it."""
+    """lower and upper: where it is cut off; infinite for the whole of it."""
 
     @cached_property
     def _whole(self) -> Any:

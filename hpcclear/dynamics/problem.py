@@ -82,11 +82,11 @@ class Problem:
     max_steps: int
     averaged_cap: int = 0
     objective_tolerance: float = 0.0
-    """averaged_cap and objective_tolerance: The average goes on until the relative standard error of the objective is below
+    """averaged_cap and objective_tolerance: the average goes on until the relative standard error of the objective is below
     this, or to the cap; a tolerance of 0 averages over `averaged` revolutions."""
     torque_table: Array | None = None
     load_table: Array | None = None
-    """torque_table and load_table: Cubic cells of a periodic table, 4 coefficients a cell."""
+    """torque_table and load_table: cubic cells of a periodic table, 4 coefficients a cell."""
     implicit: str = "never"
     """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
     collocation: bool = False
@@ -161,7 +161,8 @@ class Problem:
 
     @property
     def tables(self) -> Array:
-        """The tabulated curves as the kernel reads them, one behind the other; one that is absent is never looked up."""
+        """The tabulated curves as the kernel reads them, one behind the other, shape (curves * 4 * CELLS,); one that is absent
+        is never looked up."""
         curves = self.curves if self.linkage is not None else (self.torque_table, self.load_table)
         tables = np.zeros((len(curves), 4 * at.CELLS))
         for row, curve in zip(tables, curves, strict=True):

@@ -112,11 +112,11 @@ class Finished:
     content: xr.Dataset
     output: Path
     timing: Path
-    """output and timing: Files of the content and of the times."""
+    """output and timing: files of the content and of the times."""
     seconds: float
     """Wall time of the command."""
     spent: np.ndarray
-    """Shape (ranks, 4): Seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`."""
+    """Shape (ranks, 4): seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`."""
 
 
 class Session:

@@ -20,7 +20,7 @@ class Points:
     names: tuple[str, ...]
     """Column names, length d."""
     values: Array
-    """Shape (n, d): Read-only, in the SI unit of each column."""
+    """Shape (n, d): read-only, in the SI unit of each column."""
     paths: tuple[tuple[str, ...], ...]
     """Scene entries that each column drives."""
 

@@ -62,7 +62,7 @@ class Budget:
     searched: float
     """Tolerance of the search; that of the split is verification's."""
     ends: Array = field(default_factory=lambda: np.full(2, np.nan))
-    """Shape (2,): What the tolerance was found to take of alpha and beta, at worst; NaN before they are known."""
+    """Shape (2,): what the tolerance was found to take of alpha and beta, at worst; NaN before they are known."""
 
     @property
     def tolerance_share(self) -> Array:

@@ -27,7 +27,7 @@ class Assembly:
     """Its coordinates are those of `q` and `v`."""
     q: Array
     v: Array
-    """q and v: Shape (n,): Mass centres and angles of the bodies at the start, and their velocities, SI."""
+    """q and v, shape (n,): mass centres and angles of the bodies at the start, and their velocities, SI."""
     steps: int
     """Newton steps it took."""
 

@@ -37,7 +37,7 @@ class Prescribed:
     q: Array
     v: Array
     a: Array
-    """q, v and a: Shape (t, n): Mass centres and angles of all bodies, velocities and accelerations, SI; the order of
+    """q, v and a, shape (t, n): mass centres and angles of all bodies, velocities and accelerations, SI; the order of
     ``assembly.loops.forest``."""
     holds: dict[str, Array]
     """By constraint: ``"NAME_x"`` and ``"NAME_y"`` are the force of a pin on its journal's body, ``"NAME_across"`` that of
@@ -45,9 +45,9 @@ class Prescribed:
     power: Array
     loss: Array
     load_power: Array
-    """power, loss and load_power: Shape (t,): Of all drives, of friction, of the loads, W."""
+    """power, loss and load_power, shape (t,): of all drives, of friction, of the loads, W."""
     margin: Array
-    """Shape (t,): Smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
+    """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
 
 
 def prescribed_motion(

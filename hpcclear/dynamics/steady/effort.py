@@ -66,7 +66,7 @@ class Mean:
     limit: float
     """Half-width of the limits of f, m; NaN where there is no steady mean."""
     outcomes: Outcome
-    """Shape (stretches, copies): What the average is made of."""
+    """Shape (stretches, copies): what the average is made of."""
     stretch: int
     """Revolutions of each of these."""
     rtol: float
@@ -82,7 +82,7 @@ class Mean:
     status: Status = Status.OK
     revolutions: int = 0
     evaluations: float = 0.0
-    """revolutions and evaluations: All that was simulated."""
+    """revolutions and evaluations: all that was simulated."""
 
     @property
     def tightest(self) -> float:

@@ -30,7 +30,7 @@ class Windows:
     length: int
     """Revolutions of the later window: about half of them, whole periods."""
     gaps: Array
-    """Shape (copies, 2): Mean gaps over it."""
+    """Shape (copies, 2): mean gaps over it."""
     settling: float
     """How far the average may still move if it goes on as it did."""
     moved: float

@@ -27,10 +27,10 @@ class Joints:
 
     clearance: Array
     bearing_radius: Array
-    """clearance and bearing_radius: When new, m."""
+    """clearance and bearing_radius: when new, m."""
     bearing: Array
     journal: Array
-    """bearing and journal: Depth of wear for each joule of sliding work, m/J, once run in."""
+    """bearing and journal: depth of wear for each joule of sliding work, m/J, once run in."""
     excess: Array
     fading: Array
     """excess and fading: a - 1 and W0, J, of running in; 0 and 1 without."""

@@ -46,7 +46,7 @@ class Plan:
     """Revolutions of a jump, at least."""
     copies: int
     most_copies: int
-    """copies and most_copies: Simulations at a state of wear: at first, and where limits are wider than the tolerance
+    """copies and most_copies: simulations at a state of wear: at first, and where limits are wider than the tolerance
     allows."""
 
 

@@ -36,7 +36,7 @@ class Section:
 
     name: str
     title: str
-    """name and title: Its anchor, and its heading."""
+    """name and title: its anchor, and its heading."""
     template: str
     """File in ``templates`` that shows its content."""
     content: Any

@@ -38,20 +38,20 @@ class Evidence:
     """What a pilot has measured; all errors relative, of mean and deviation."""
 
     rtol: Array
-    """Shape (r,): Loosest first; biases are against the last one."""
+    """Shape (r,): loosest first; biases are against the last one."""
     evaluations: Array
-    """Shape (r,): Of the equations of motion, a simulation."""
+    """Shape (r,): of the equations of motion, a simulation."""
     bias: Array
-    """Shape (r - 1, 2): Root mean square over designs, without what chance adds to it; with that of the last one (`FALL`)."""
+    """Shape (r - 1, 2): root mean square over designs, without what chance adds to it; with that of the last one (`FALL`)."""
     doubt: Array
-    """Shape (r - 1, 2): Standard error of the mean bias of all designs."""
+    """Shape (r - 1, 2): standard error of the mean bias of all designs."""
     pairs: int
     points: int
-    """pairs and points: Simulations of a design that biases, and `reach`, are of."""
+    """pairs and points: simulations of a design that biases, and `reach`, are of."""
     reach: Array
-    """Shape (d, 2): Half-widths of confidence limits of each design."""
+    """Shape (d, 2): half-widths of confidence limits of each design."""
     power: Array
-    """Shape (2,): By which power of the simulations they fall."""
+    """Shape (2,): by which power of the simulations they fall."""
     confidence: float
 
     def tolerance_shares(self, doubtful: bool) -> Array:
@@ -80,7 +80,7 @@ class Split:
     rtol: float
     tolerance: Array
     samples: Array
-    """tolerance and samples: Shape (2,): What each may take of the accuracy, of mean and deviation; their squares add up."""
+    """tolerance and samples, shape (2,): what each may take of the accuracy, of mean and deviation; their squares add up."""
     points: float
     """Simulations that a verified design will take, on average."""
     evaluations: float

@@ -33,7 +33,7 @@ class SampledMoments:
     deviation: np.ndarray
     mean_error: np.ndarray
     deviation_error: np.ndarray
-    """mean_error and deviation_error: Standard errors."""
+    """mean_error and deviation_error: standard errors."""
 
 
 def sample_moments(values: np.ndarray) -> SampledMoments:

@@ -30,7 +30,7 @@ class Estimate:
 
     value: float
     shifts: Array
-    """Shape (r,): By how much each replicate would move it (its influence), of mean 0; NaN for a replicate without a value."""
+    """Shape (r,): by how much each replicate would move it (its influence), of mean 0; NaN for a replicate without a value."""
 
     @property
     def error(self) -> float:
@@ -100,7 +100,7 @@ class Limited(Estimate):
 
     lower: float
     upper: float
-    """lower and upper: Confidence limits; NaN where the sample does not reach that far."""
+    """lower and upper: confidence limits; NaN where the sample does not reach that far."""
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:

@@ -39,21 +39,21 @@ class ConvergenceIntervals:
     """Where the sensitivities stopped changing; the rule is in the module's text."""
 
     found: Booleans
-    """Shape (c, d): Interval found and derivative determined; False is "not determined"."""
+    """Shape (c, d): interval found and derivative determined; False is "not determined"."""
     interval: Integers
-    """Shape (c, d): Index of the convergence interval in the history, -1 where not determined."""
+    """Shape (c, d): index of the convergence interval in the history, -1 where not determined."""
     plateau: Integers
-    """Shape (c, d): Index of the widest interval from which on the estimates agree, -1 if not even the last two do. Not
+    """Shape (c, d): index of the widest interval from which on the estimates agree, -1 if not even the last two do. Not
     determined with a plateau: not distinguishable from 0. Without: still changing."""
     sensitivity: Array
     uncertainty: Array
-    """sensitivity and uncertainty: Shape (c, d): There, in units of f per unit of the variable; the uncertainty holds the
+    """sensitivity and uncertainty, shape (c, d): there, in units of f per unit of the variable; the uncertainty holds the
     standard error and the truncation that may be left. NaN where not determined."""
     converged: Booleans
-    """Shape (k, c, d): The convergence interval and all shorter ones."""
+    """Shape (k, c, d): the convergence interval and all shorter ones."""
     confidence: float
     tolerance: float
-    """confidence and tolerance: The rule's settings."""
+    """confidence and tolerance: the rule's settings."""
 
 
 def convergence_intervals(

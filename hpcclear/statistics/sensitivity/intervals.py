@@ -40,7 +40,7 @@ class IntervalSettings:
     n_points: int = 45
     n_test: int = 5
     order: int = 3
-    """n_points, n_test and order: Training points, test points and total order of each surface."""
+    """n_points, n_test and order: training points, test points and total order of each surface."""
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -61,10 +61,10 @@ class IntervalDesign:
     """Points to simulate for every interval and clearance, all known beforehand."""
 
     points: Array
-    """Shape (n, d + 1): The d variables and, last, the clearance. By interval, then clearance, then the training points
+    """Shape (n, d + 1): the d variables and, last, the clearance. By interval, then clearance, then the training points
     followed by the test points."""
     intervals: Array
-    """Shape (k, d, 2): Limits of the variables, the widest first."""
+    """Shape (k, d, 2): limits of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     settings: IntervalSettings
@@ -75,20 +75,20 @@ class SensitivityHistory:
     """Midpoint derivatives of every surface; NaN where too few simulations succeeded."""
 
     intervals: Array
-    """Shape (k, d, 2): Limits of the variables, the widest first."""
+    """Shape (k, d, 2): limits of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     sensitivity: Array
     standard_error: Array
-    """sensitivity and standard_error: Shape (k, c, d): Derivatives at the midpoint, in units of f per unit of the variable."""
+    """sensitivity and standard_error, shape (k, c, d): derivatives at the midpoint, in units of f per unit of the variable."""
     r2: Array
     rmae: Array
-    """r2 and rmae: Shape (k, c): Accuracy on the test points (`hpcclear.statistics.surrogate.metrics`)."""
+    """r2 and rmae, shape (k, c): accuracy on the test points (`hpcclear.statistics.surrogate.metrics`)."""
     leave_one_out_r2: Array
     """Shape (k, c)."""
     degrees_of_freedom: Integers
     failed: Integers
-    """degrees_of_freedom and failed: Shape (k, c): Of the residuals (0 where no surface was fitted); simulations that
+    """degrees_of_freedom and failed, shape (k, c): of the residuals (0 where no surface was fitted); simulations that
     failed."""
     order: int
     """Total order of the surfaces."""

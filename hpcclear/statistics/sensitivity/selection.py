@@ -50,14 +50,14 @@ class Selection:
     """Variable of each column."""
     effect: Array
     effect_error: Array
-    """effect and effect_error: Shape (c, m): Magnitude of the derivative times the interval length, and its standard error,
+    """effect and effect_error, shape (c, m): magnitude of the derivative times the interval length, and its standard error,
     in the unit of f."""
     influence: NDArray[np.int8]
     """Shape (c, m): `Influence` at each clearance."""
     rank: Integers
     """Shape (c, m): 1 for the largest effect; 0 without an estimate."""
     share: Array
-    """Shape (m,): Share of the clearances with an estimate at which the column is influential; NaN if none."""
+    """Shape (m,): share of the clearances with an estimate at which the column is influential; NaN if none."""
     selected: tuple[str, ...]
     """X_G-I, each name once, the largest mean relative effect first."""
     order_stable: bool

@@ -35,18 +35,18 @@ class Summary:
     """Statistics of some samples; of none, when made by `empty`."""
 
     count: Integers
-    """Shape (rows,): Finite numbers, for each of `ROWS`."""
+    """Shape (rows,): finite numbers, for each of `ROWS`."""
     mean: Array
     squares: Array
     minimum: Array
     maximum: Array
-    """mean, squares, minimum and maximum: Shape (rows,): Mean, sum of squared deviations from it, extremes; SI."""
+    """mean, squares, minimum and maximum, shape (rows,): mean, sum of squared deviations from it, extremes; SI."""
     histogram: Integers
-    """Shape (rows, bins + 2): Numbers below the edges, between each two, and at or above the last."""
+    """Shape (rows, bins + 2): numbers below the edges, between each two, and at or above the last."""
     status: Integers
-    """Shape (outcomes,): Samples by `hpcclear.base.outcome.Status`."""
+    """Shape (outcomes,): samples by `hpcclear.base.outcome.Status`."""
     flags: Integers
-    """Shape (flags,): Samples by `hpcclear.base.outcome.Flag`."""
+    """Shape (flags,): samples by `hpcclear.base.outcome.Flag`."""
 
     @property
     def deviation(self) -> Array:
