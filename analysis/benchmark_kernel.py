@@ -19,6 +19,7 @@ import numpy as np
 import plain_loop
 import xarray as xr
 from assembly import Arithmetic, executed_arithmetic, force_evaluation
+from drawing import by_code
 from numba import njit
 from scenes import Setup, ensemble, scene
 
@@ -234,8 +235,7 @@ def report(data: xr.Dataset) -> str:
         f"{'':<12}{'ms a revolution':>16}{'of plain':>10}{'evaluations':>13}{'ns a force':>12}"
     ]
     ratio = data["time"] / data["time"].sel(code=YARDSTICK)
-    for code in data["code"].values:
-        row = data.sel(code=code)
+    for code, row in by_code(data):
         lines.append(
             f"{code:<12}{float(row['time'].median()):>16.4f}"
             f"{1.0 / float(ratio.sel(code=code).median()):>9.2f}x"

@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 import xarray as xr
-from drawing import error_panels
+from drawing import by_code, error_panels
+from matplotlib.axes import Axes
 from scenes import LAWS, Setup, ensemble, scene, single
 
 from hpcclear.results.dataset import provenance
@@ -232,8 +233,7 @@ def ensemble_table(runs: xr.Dataset) -> list[str]:
         f"({int(runs['agreed'])} of {runs.attrs['samples']} samples have an error to tell)"
     )
     own = runs["each"].sel(code=f"{OWN} lanes")
-    for code in runs["code"].values:
-        row = runs.sel(code=code)
+    for code, row in by_code(runs):
         lines.append(
             f"{code:<24}{float(row['each'].median()):>16.4f}"
             f"{float((row['each'] / own).median()):>12.2f}{float(row['error']):>10.0e}"
@@ -244,18 +244,18 @@ def ensemble_table(runs: xr.Dataset) -> list[str]:
 
 def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
     """Time against error, a panel for each law."""
-    matplotlib.use("Agg")
-    figure, axes = error_panels(list(runs), 3.4, 4.6)
-    for axis, data in zip(axes, runs.values(), strict=True):
-        for k, code in enumerate(data["code"].values):
-            row = data.sel(code=code)
-            width = 2.0 if str(code).startswith(OWN) else 0.9
-            axis.plot(
-                np.maximum(row["error"], 1e-15), row["seconds"].median("round") * 1e3,
-                marker="osv^D"[k % 5], markersize=2.5, linewidth=width, label=code,
-                color=matplotlib.colormaps["tab20"](k % 20),
-            )  # fmt: skip
-        axis.legend(fontsize=5.5, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=2)
+
+    def curve(panel: Axes, k: int, code: str, row: xr.Dataset) -> None:
+        panel.plot(
+            np.maximum(row["error"], 1e-15), row["seconds"].median("round") * 1e3,
+            marker="osv^D"[k % 5], markersize=2.5, label=code,
+            linewidth=2.0 if code.startswith(OWN) else 0.9,
+            color=matplotlib.colormaps["tab20"](k % 20),
+        )  # fmt: skip
+
+    figure, axes = error_panels(runs, 3.4, 4.6, curve)
+    for panel in axes:
+        panel.legend(fontsize=5.5, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncol=2)
     axes[0].set_ylabel("ms a revolution")
     figure.tight_layout()
     figure.savefig(path, dpi=200)

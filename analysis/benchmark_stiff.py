@@ -18,10 +18,10 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from drawing import error_panels
+from matplotlib.axes import Axes
 from numba import carray, cfunc, njit
 from numbalsoda import lsoda, lsoda_sig
 from plain_loop import motion
@@ -254,18 +254,16 @@ def table(runs: xr.Dataset) -> list[str]:
 
 def draw(all_runs: dict[str, xr.Dataset], path: Path) -> None:
     """Time against error, a panel for each scene."""
-    matplotlib.use("Agg")
-    figure, axes = error_panels(list(all_runs), 2.6, 3.2)
-    for axis, runs in zip(axes, all_runs.values(), strict=True):
-        for k, method in enumerate(runs["code"].values):
-            row = runs.sel(code=method)
-            axis.plot(
-                row["error"], row["seconds"].median("round") * 1e3, marker="osv"[k],
-                markersize=3, color=("#0072b2", "#d55e00", "#009e73")[k], label=method,
-            )  # fmt: skip
-    first = axes[0]
-    first.set_ylabel("processor time a revolution, ms")
-    first.legend(fontsize=7)
+
+    def curve(panel: Axes, k: int, method: str, row: xr.Dataset) -> None:
+        panel.plot(
+            row["error"], row["seconds"].median("round") * 1e3, marker="osv"[k],
+            markersize=3, color=("#0072b2", "#d55e00", "#009e73")[k], label=method,
+        )  # fmt: skip
+
+    figure, axes = error_panels(all_runs, 2.6, 3.2, curve)
+    axes[0].set_ylabel("processor time a revolution, ms")
+    axes[0].legend(fontsize=7)
     figure.tight_layout()
     figure.savefig(path, dpi=200)
 

@@ -18,6 +18,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -26,8 +27,10 @@ import matplotlib.pyplot as plt
 import moocore
 import numpy as np
 import xarray as xr
+from drawing import described
 from matplotlib.ticker import NullFormatter
 
+from hpcclear.results.rows import Columns, number
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.pareto import cut
 
@@ -77,6 +80,17 @@ PROBLEMS: dict[str, tuple[Function, int, int]] = {
     "DTLZ2": (dtlz2, 12, 3),
 }
 TARGETS = {"ZDT1": 0.8700, "ZDT2": 0.5379, "ZDT3": 1.3265, "DTLZ2": 0.7290}
+
+
+RUNS = ("problem", "algorithm", "seed")
+VARIABLES: Columns = {
+    "hypervolume": number(RUNS, "1", "hypervolume of the cut front, reference point 1.1"),
+    "igd_plus": number(RUNS, "1", "IGD+ of the cut front against the known front"),
+    "evaluations": number(RUNS, "1", "function evaluations used"),
+    "front_size": number(RUNS, "1", "points in the cut front"),
+    "seconds": number(RUNS, "s", "wall time of the run, function included"),
+}
+"""What is measured of every run."""
 
 
 def run_hpcclear(function: Function, variables: int, _: int, budget: int, seed: int) -> np.ndarray:
@@ -139,8 +153,7 @@ METHODS: dict[str, tuple[str, Callable[..., np.ndarray]]] = {
 def compare(methods: list[str], budget: int, seeds: list[int]) -> xr.Dataset:
     """Every method on every problem for every seed."""
     shape = (len(PROBLEMS), len(methods), len(seeds))
-    names = ("hypervolume", "igd_plus", "evaluations", "front_size", "seconds")
-    result = {name: np.full(shape, np.nan) for name in names}
+    result = {name: np.full(shape, np.nan) for name in VARIABLES}
     fronts = np.full((*shape, FRONT, 3), np.nan)
     for p, (function, variables, objectives) in enumerate(PROBLEMS.values()):
         known = true_front(function, variables)
@@ -167,20 +180,9 @@ def compare(methods: list[str], budget: int, seeds: list[int]) -> xr.Dataset:
 
 
 def _dataset(result: dict, fronts: np.ndarray, methods: list[str], seeds: list[int]) -> xr.Dataset:
-    dims = ("problem", "algorithm", "seed")
-    long_names = {
-        "hypervolume": ("hypervolume of the cut front, reference point 1.1", "1"),
-        "igd_plus": ("IGD+ of the cut front against the known front", "1"),
-        "evaluations": ("function evaluations used", "1"),
-        "front_size": ("points in the cut front", "1"),
-        "seconds": ("wall time of the run, function included", "s"),
-    }
-    data = {
-        name: (dims, array, {"long_name": long_names[name][0], "units": long_names[name][1]})
-        for name, array in result.items()
-    }
+    data: dict[str, Any] = dict(described(result, VARIABLES))
     data["front"] = (
-        (*dims, "solution", "objective"),
+        (*RUNS, "solution", "objective"),
         fronts,
         {"long_name": "objectives of the cut front, NaN where absent", "units": "1"},
     )

@@ -22,7 +22,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.ensemble.certificate import Asked
-from hpcclear.ensemble.trial import CONFIDENCE, Trial
+from hpcclear.ensemble.trial import CONFIDENCE, Trial, Wanted
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.paired import Change, deviation_change, mean_change
@@ -118,7 +118,7 @@ def judged(number: int, replicates: int, linkages: bool) -> dict[str, object]:
     """One scene: certificate, its cost, and the reduced scene at fresh points."""
     objective, tolerance, scene = scene_of(number, linkages)
     trial, spent = Trial(scene), Simulated()
-    plan = trial.plan(tolerance, certificate_samples(scene), False)
+    plan = trial.plan(Wanted(tolerance, certificate_samples(scene)))
     found = trial.certify(plan, spent)
     off = found.recommended
     seconds = trial.seconds([(), off]) if off else {}

@@ -20,6 +20,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
+from drawing import described
 
 from hpcclear import __version__
 from hpcclear.base.errors import InputError
@@ -33,6 +34,7 @@ from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
+from hpcclear.results.rows import Columns, number
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -162,17 +164,22 @@ def uncertainty(scene: Scene) -> float:
     return float(evaluate_records(asked, NOTHING, lanes=1)["objective_uncertainty"][0])
 
 
-VARIABLES = {
-    "objective": ("objective f", "m"),
-    "objective_spread": ("standard deviation of f between revolutions", "m"),
-    "objective_uncertainty": ("how far f may be off, by kicked and stricter copies", "m"),
-    "off_reference": ("f over f at rtol 1e-10, less 1", "1"),
-    "energy_residual": ("largest energy residual over max(kinetic energy, driving work)", "1"),
-    "rhs_evaluations": ("force evaluations a revolution", "1"),
-    "implicit_share": ("share of implicit steps", "1"),
-    "seconds": ("wall time", "s"),
-    "status": ("status code", "1"),
-    "flags": ("flag bits", "1"),
+CASES = ("case", "rtol")
+VARIABLES: Columns = {
+    "objective": number(CASES, "m", "objective f"),
+    "objective_spread": number(CASES, "m", "standard deviation of f between revolutions"),
+    "objective_uncertainty": number(
+        CASES, "m", "how far f may be off, by kicked and stricter copies"
+    ),
+    "off_reference": number(CASES, "1", "f over f at rtol 1e-10, less 1"),
+    "energy_residual": number(
+        CASES, "1", "largest energy residual over max(kinetic energy, driving work)"
+    ),
+    "rhs_evaluations": number(CASES, "1", "force evaluations a revolution"),
+    "implicit_share": number(CASES, "1", "share of implicit steps"),
+    "seconds": number(CASES, "s", "wall time"),
+    "status": number(CASES, "1", "status code"),
+    "flags": number(CASES, "1", "flag bits"),
 }
 
 
@@ -206,16 +213,8 @@ def measure(paths: list[Path], revolutions: int, trust: bool) -> xr.Dataset:
             for key, value in row.items():
                 result[key][k, j] = value
         print(f"  {name} done", flush=True)
-    data = {
-        name: (
-            ("case", "rtol"),
-            values,
-            {"long_name": VARIABLES[name][0], "units": VARIABLES[name][1]},
-        )
-        for name, values in result.items()
-    }
     return xr.Dataset(
-        data,
+        described(result, VARIABLES),
         coords={"case": list(scenes), "rtol": list(TOLERANCES)},
         attrs={"title": "Hard scenes at several tolerances", "versions": f"hpcclear {__version__}"},
     )

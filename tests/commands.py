@@ -40,6 +40,15 @@ def sample(output: Path, samples: int, *options: str) -> list[str]:
     return ["sample", str(SCENE), "-o", str(output), *study, *options]
 
 
+def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
+    """Wait until the first finished samples are on disk."""
+    deadline = time.time() + crowded(60.0)
+    while not result_files(folder):
+        assert job.poll() is None, finish(job)[1]
+        assert time.time() < deadline
+        time.sleep(0.02)
+
+
 def start(
     words: Sequence[str],
     ranks: int = 2,

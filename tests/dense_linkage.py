@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from dense_mechanism import touching
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -154,13 +155,7 @@ class Dense:
         """Generalised forces of one contact."""
         centre_j, speed_j, _ = self.motion_of(q, v, joint.journal)
         centre_b, speed_b, _ = self.motion_of(q, v, joint.bearing)
-        e = centre_j - centre_b
-        distance = np.linalg.norm(e)
-        n = e / distance
-        t = np.array([-n[1], n[0]])
-        gap = distance - joint.clearance
-        depth = max(gap, 0.0)
-        where = centre_b + (joint.bearing_radius + depth / 2) * n
+        gap, depth, n, t, where = touching(joint, centre_j - centre_b, centre_b)
         on_j, on_b = (
             self.point_on(q, m.split(place)[0], where) for place in (joint.journal, joint.bearing)
         )

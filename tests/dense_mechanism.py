@@ -5,7 +5,7 @@ coordinates, and one linear system gives accelerations and multipliers (paper eq
 """
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import film_by_quadrature as quadrature
 import numpy as np
@@ -22,6 +22,26 @@ def turned(vector, angle):
 
 def cross(a, b):
     return a[0] * b[1] - a[1] * b[0]
+
+
+class Touch(NamedTuple):
+    """Journal and bearing as circles: gap, depth, normal from bearing to journal and tangent, and where they touch."""
+
+    gap: float
+    depth: float
+    n: np.ndarray
+    t: np.ndarray
+    place: np.ndarray  # half way between both surfaces
+
+
+def touching(joint, e, centre_b) -> Touch:
+    """Of a journal whose centre is at `e` from the bearing's."""
+    distance = np.linalg.norm(e)
+    n = e / distance
+    gap = distance - joint.clearance
+    depth = max(gap, 0.0)
+    place = centre_b + (joint.bearing_radius + depth / 2) * n
+    return Touch(gap, depth, n, np.array([-n[1], n[0]]), place)
 
 
 @dataclass
@@ -141,12 +161,7 @@ class Dense:
 
         centre_b, centre_j = point(bearing, bearing_offset), point(journal, journal_offset)
         e = centre_j - centre_b
-        distance = np.linalg.norm(e)
-        n = e / distance
-        t = np.array([-n[1], n[0]])
-        gap = distance - joint.clearance
-        depth = max(gap, 0.0)
-        place = centre_b + (joint.bearing_radius + depth / 2) * n
+        gap, depth, n, t, place = touching(joint, e, centre_b)
         rate = (speed(journal, centre_j) - speed(bearing, centre_b)) @ n
         # at the journal's own surface, which in contact is the same place
         own = centre_j + (joint.bearing_radius - joint.clearance - depth / 2) * n

@@ -30,6 +30,32 @@ def store_crank(torque, work, last, acceleration, i, W):
 
 
 @lane_function
+def given(effects, work, par, omega, i, W):
+    """Gravity, the load on the slider and the torque on the crank."""
+    g = gravity_of(effects.gravity, par, i, W)
+    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
+    return g, load, torque
+
+
+@lane_function
+def rod_and_slider(work, phi, i, W):
+    """With one joint open: sines and cosines of crank and rod, the rod's spin, the slider's place and speed."""
+    crank = sincos(phi)
+    rod = sincos(work[(at.QS + 0) * W + i])
+    spin = work[(at.VS + 0) * W + i]
+    return (
+        crank[0],
+        crank[1],
+        rod[0],
+        rod[1],
+        spin,
+        work[(at.QS + 1) * W + i],
+        work[(at.VS + 1) * W + i],
+    )
+
+
+@lane_function
 def two_open(effects, work, par, phi, omega, i, W):
     """Both joints open: every body moves under forces alone."""
     cphi_s = sincos(phi)
@@ -80,10 +106,8 @@ def two_open(effects, work, par, phi, omega, i, W):
         i,
         W,
     )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
+    g, load, torque = given(effects, work, par, omega, i, W)
     guide = guide_friction(effects.guide, par, v3, fy2 + par[at.SLIDER_MASS * W + i] * g, i, W)
-    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
     crank_load = (
         crank * (sphi * fx1 - cphi * fy1)
         + mj1
@@ -114,13 +138,7 @@ def two_open(effects, work, par, phi, omega, i, W):
 @lane_function
 def crank_rod_open(effects, work, par, phi, omega, i, W):
     """O12 open, O23 ideal: coordinates rod angle and slider x, coupled by the rod's mass."""
-    s_c = sincos(phi)
-    sphi, cphi = s_c[0], s_c[1]
-    s_c = sincos(work[(at.QS + 0) * W + i])
-    st, ct = s_c[0], s_c[1]
-    x3 = work[(at.QS + 1) * W + i]
-    spin = work[(at.VS + 0) * W + i]
-    v3 = work[(at.VS + 1) * W + i]
+    sphi, cphi, st, ct, spin, x3, v3 = rod_and_slider(work, phi, i, W)
     length = par[at.ROD_LENGTH * W + i]
     far = par[at.ROD_FAR * W + i]
     crank = par[at.CRANK_LENGTH * W + i]
@@ -141,9 +159,7 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
         i,
         W,
     )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
+    g, load, torque = given(effects, work, par, omega, i, W)
     m2 = par[at.ROD_MASS * W + i]
     m3 = par[at.SLIDER_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * far * far
@@ -181,13 +197,7 @@ def crank_rod_open(effects, work, par, phi, omega, i, W):
 @lane_function
 def rod_slider_open(effects, work, par, phi, omega, i, W):
     """O12 ideal, O23 open: coordinates rod angle, slider x (and the crank angle, coupled by the rod's mass)."""
-    s_c = sincos(phi)
-    sphi, cphi = s_c[0], s_c[1]
-    s_c = sincos(work[(at.QS + 0) * W + i])
-    st, ct = s_c[0], s_c[1]
-    x3 = work[(at.QS + 1) * W + i]
-    spin = work[(at.VS + 0) * W + i]
-    v3 = work[(at.VS + 1) * W + i]
+    sphi, cphi, st, ct, spin, x3, v3 = rod_and_slider(work, phi, i, W)
     length = par[at.ROD_LENGTH * W + i]
     near = par[at.ROD_NEAR * W + i]
     crank = par[at.CRANK_LENGTH * W + i]
@@ -208,9 +218,7 @@ def rod_slider_open(effects, work, par, phi, omega, i, W):
         i,
         W,
     )
-    g = gravity_of(effects.gravity, par, i, W)
-    load = load_of(effects.load, effects.load_table, par, work[at.LOAD_VALUE * W + i], i, W)
-    torque = torque_of(effects.torque_table, effects.torque_falls, work, par, omega, i, W)
+    g, load, torque = given(effects, work, par, omega, i, W)
     guide = guide_friction(effects.guide, par, v3, fy + par[at.SLIDER_MASS * W + i] * g, i, W)
     m2 = par[at.ROD_MASS * W + i]
     a11 = par[at.ROD_INERTIA * W + i] + m2 * near * near

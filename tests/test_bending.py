@@ -4,16 +4,8 @@ import math
 
 import numpy as np
 import pytest
+import running
 from bending_by_lagrange import IdealSliderCrank, Rod, share_of
-from running import (
-    HUNT_CROSSLEY,
-    LATCHED,
-    energy_residual,
-    lanes_have_single_bits,
-    methods_agree,
-    run,
-    scene_with,
-)
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
@@ -435,25 +427,27 @@ def bending(changes=None, rtol=1e-6, revolutions=1, **table):
     """The paper's slider-crank with a rod that bends, from the start."""
     rod = {"stiffness": 300.0, "damping": 0.01} | table
     own = {"mechanism.rod.bending": rod, "numerics.energy": True}
-    return scene_with({"effects.contact": HUNT_CROSSLEY} | own | (changes or {}), revolutions, rtol)
+    return running.scene_with(
+        {"effects.contact": running.HUNT_CROSSLEY} | own | (changes or {}), revolutions, rtol
+    )
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_energy_closes_with_play_contact_and_friction(rtol):
     """By the tests' own energies, over ten revolutions."""
     scene = bending({"effects.gravity": 9.81}, rtol=rtol, revolutions=10, stiffness=50.0)
-    result = run(scene)
+    result = running.run(scene)
     assert result.out.status == Status.OK
     assert np.abs(result.q[:, 0]).max() > 5e-4
-    rest, passed = energy_residual(scene, result)
+    rest, passed = running.energy_residual(scene, result)
     assert abs(rest) < BOUNDS[rtol] * passed
 
 
 @pytest.mark.parametrize(
     "contact",
     [
-        pytest.param(LATCHED, id="latched", marks=pytest.mark.full),
-        pytest.param(HUNT_CROSSLEY, id="hunt-crossley"),
+        pytest.param(running.LATCHED, id="latched", marks=pytest.mark.full),
+        pytest.param(running.HUNT_CROSSLEY, id="hunt-crossley"),
     ],
 )
 def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):
@@ -462,10 +456,10 @@ def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):
     for modes in (1, 2, 3, 4):
         for power in (-3, 0, 1, 2, 4, 6, 8):
             scene = bending({"effects.contact": contact}, stiffness=10.0**power, modes=modes)
-            result = run(scene)
+            result = running.run(scene)
             end = ends[modes, power] = Status(int(result.out.status))
             if end is Status.OK:
-                rest, passed = energy_residual(scene, result)
+                rest, passed = running.energy_residual(scene, result)
                 assert abs(rest) < BOUNDS[1e-6] * passed, (modes, power)
             else:
                 assert math.isnan(result.out.objective)
@@ -487,11 +481,11 @@ def test_errors_of_stiff_modes_hold_no_more_energy_than_those_of_their_speeds():
 
 
 def test_a_stiff_rod_tends_to_a_rigid_one_like_one_over_its_stiffness():
-    without = {"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
-    rigid = run(scene_with(without, rtol=1e-10))
+    without = {"effects.contact": running.HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
+    rigid = running.run(running.scene_with(without, rtol=1e-10))
     apart = []
     for stiffness in (1e5, 1e6):
-        soft = run(bending(without, 1e-10, stiffness=stiffness, damping=0.1, modes=1))
+        soft = running.run(bending(without, 1e-10, stiffness=stiffness, damping=0.1, modes=1))
         apart.append(np.abs(soft.q[-1, 1:] - rigid.q[-1]).max())
     assert apart[0] < 1e-5
     assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.05)
@@ -500,7 +494,9 @@ def test_a_stiff_rod_tends_to_a_rigid_one_like_one_over_its_stiffness():
 @pytest.mark.full
 def test_methods_agree():
     # collocation has room for five coordinates
-    methods_agree(bending({}, 1e-10, modes=1), ("dormand-prince", "radau", "switching", "lobatto"))
+    running.methods_agree(
+        bending({}, 1e-10, modes=1), ("dormand-prince", "radau", "switching", "lobatto")
+    )
 
 
 @pytest.mark.full
@@ -513,7 +509,7 @@ def test_samples_beside_others_have_the_bits_of_single_ones():
         ("mechanism.rod.inertia",): rng.uniform(2e-4, 8e-4, 24),
         ("mechanism.rod.bending.stiffness",): 10 ** rng.uniform(2.5, 5, 24),
     }
-    lanes_have_single_bits(scene, columns)
+    running.lanes_have_single_bits(scene, columns)
 
 
 def test_the_slider_crank_written_as_a_linkage_is_the_same():

@@ -14,6 +14,7 @@ import xarray as xr
 from commands import kill_once_it_saved, overrides, run
 from margins import at_least, fewest
 
+from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli.effects import tolerance_of
@@ -105,23 +106,16 @@ def followed(change, effects, tolerance=0.01, noise=0.0, most=256, saves=None) -
     """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k]."""
     saves = saves or [0.3] * effects
     plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, lambda off: 1.0)
-    asking = certificate(plan)
-    wanted = next(asking)
-    while True:
-        told = []
-        for one in wanted:
-            rows = np.arange(one.first, one.last)
-            design = 1.0 + 0.5 * np.sin(1.0 + rows)[:, None] * np.ones((1, 4))
-            rng = np.random.default_rng([*one.off, 99, one.first])
-            f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
-            work = 1000.0 * np.prod([1.0 - saves[k] for k in one.off])
-            told.append(
-                Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)))
-            )  # fmt: skip
-        try:
-            wanted = asking.send(told)
-        except StopIteration as end:
-            return end.value
+
+    def seen(one):
+        rows = np.arange(one.first, one.last)
+        design = 1.0 + 0.5 * np.sin(1.0 + rows)[:, None] * np.ones((1, 4))
+        rng = np.random.default_rng([*one.off, 99, one.first])
+        f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
+        work = 1000.0 * np.prod([1.0 - saves[k] for k in one.off])
+        return Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)))
+
+    return answered(certificate(plan), lambda wanted: [seen(one) for one in wanted])
 
 
 def test_what_is_within_the_tolerance_is_left_out_together():
@@ -169,16 +163,13 @@ def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not()
 
 def test_the_cheapest_set_that_is_impossible_is_not_asked_for():
     plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), lambda off: 1.0)
-    asking = certificate(plan)
-    wanted = next(asking)
-    while True:
+
+    def told(wanted):
         assert all(one.off != (0, 1) for one in wanted)
         ones = [np.ones((one.last - one.first, 4)) for one in wanted]
-        try:
-            wanted = asking.send([Seen(x, np.ones((*x.shape, 1)), x.astype(int)) for x in ones])
-        except StopIteration as end:
-            found = end.value
-            break
+        return [Seen(x, np.ones((*x.shape, 1)), x.astype(int)) for x in ones]
+
+    found = answered(certificate(plan), told)
     assert found.recommended == (0,)
 
 

@@ -47,6 +47,13 @@ class Name:
         return f"{self.doc}\n{self.around}"
 
 
+def strings(node: ast.ClassDef) -> Iterator[str]:
+    """The docstring of a class, and the words below its fields."""
+    for one in node.body:
+        if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant):
+            yield str(one.value.value)
+
+
 def public(path: Path) -> Iterator[Name]:
     """Classes, functions and methods without an underscore."""
     module = ast.parse(path.read_text(encoding="utf-8"))
@@ -56,7 +63,7 @@ def public(path: Path) -> Iterator[Name]:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 yield Name(f"{prefix}.{node.name}", node, around)
                 if isinstance(node, ast.ClassDef):
-                    text = f"{ast.get_docstring(node)}\n{around}"
+                    text = "\n".join([*strings(node), around])
                     yield from within(node, f"{prefix}.{node.name}", text)
 
     yield from within(module, path.stem, ast.get_docstring(module) or "")

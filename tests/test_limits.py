@@ -6,26 +6,11 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import commands
 import pytest
-from commands import (
-    CHEAP,
-    MPIEXEC,
-    ROOT,
-    SCENE,
-    check_readable,
-    finish,
-    kill,
-    overrides,
-    ranks_of,
-    result_files,
-    run,
-    sample,
-    start,
-)
 from patience import crowded
 
 from hpcclear.ranks.schedule import COLUMNS
@@ -39,17 +24,9 @@ OPTIONS = ("--checkpoint-interval", "0.2", "--progress", "quiet")
 def compiled(tmp_path_factory) -> Path:
     """A small result; the kernel is compiled afterwards."""
     output = tmp_path_factory.mktemp("compiled") / "samples.nc"
-    code, text = run(sample(output, 64))
+    code, text = commands.run(commands.sample(output, 64))
     assert code == 0, text
     return output
-
-
-def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
-    deadline = time.time() + crowded(60.0)
-    while not result_files(folder):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.02)
 
 
 # -- the disk -----------------------------------------------------------------------------------
@@ -70,19 +47,22 @@ def small_disk(tmp_path) -> Iterator[Path]:
 def test_a_full_disk_ends_in_a_message_and_keeps_what_is_there(small_disk, compiled, ranks):
     earlier = small_disk / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
-    words = sample(small_disk / "samples.nc", 20_000, *OPTIONS)
-    code, output = run(words, ranks)
+    words = commands.sample(small_disk / "samples.nc", 20_000, *OPTIONS)
+    code, output = commands.run(words, ranks)
     assert code == 1, output
     assert "Traceback" not in output
     assert output.count("No space left on device. Free some space") == 1, output
     assert "results written earlier are intact" in output
     assert earlier.read_bytes() == compiled.read_bytes()
-    assert check_readable(small_disk) > 1  # checkpoints up to the last that found room
+    assert commands.check_readable(small_disk) > 1  # checkpoints up to the last that found room
     assert not list(small_disk.rglob("*.tmp"))
     assert not (small_disk / "samples.nc").exists()
     subprocess.run(["mount", "-o", "remount,size=100m", small_disk], check=True)
-    kept = sum(dataset.read(p, "samples").sizes["sample"] for p in result_files(small_disk)) - 64
-    code, output = run([*words[:-1], "log"], ranks)
+    kept = (
+        sum(dataset.read(p, "samples").sizes["sample"] for p in commands.result_files(small_disk))
+        - 64
+    )
+    code, output = commands.run([*words[:-1], "log"], ranks)
     assert code == 0, output
     assert 0 < kept < 20_000
     assert dataset.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
@@ -92,14 +72,14 @@ def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[i
     """Exit code and output of a command under a resource limit (what ulimit sets)."""
     limit = f"import os, resource, sys; resource.setrlimit({kind}, ({amount}, {amount}))\n"
     limit += "os.execvp(sys.argv[1], sys.argv[1:])"
-    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    launch = [str(commands.MPIEXEC), "-n", str(ranks)] if ranks else []
     done = subprocess.run(
         [*launch, sys.executable, "-c", limit, sys.executable, "-m", "hpcclear", *words],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONPATH": str(commands.ROOT)},
         timeout=crowded(120),
         check=False,
     )
@@ -109,15 +89,15 @@ def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[i
 def test_a_limit_on_file_sizes_ends_in_a_message(tmp_path, compiled):
     earlier = tmp_path / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
-    words = sample(tmp_path / "samples.nc", 4000, *OPTIONS)
+    words = commands.sample(tmp_path / "samples.nc", 4000, *OPTIONS)
     # one process: the limit would refuse MPI its shared memory, which counts as a file
     code, output = limited(resource.RLIMIT_FSIZE, 60_000, words, 0)
     assert code == 1, output
     assert "Traceback" not in output
     assert output.count("ulimit -f") == 1, output
     assert earlier.read_bytes() == compiled.read_bytes()
-    check_readable(tmp_path)
-    assert run(words, 0)[0] == 0
+    commands.check_readable(tmp_path)
+    assert commands.run(words, 0)[0] == 0
 
 
 # -- memory -------------------------------------------------------------------------------------
@@ -127,7 +107,7 @@ def test_a_limit_on_file_sizes_ends_in_a_message(tmp_path, compiled):
 def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, compiled, ranks):
     earlier = tmp_path / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
-    words = sample(tmp_path / "samples.nc", 500_000_000, *OPTIONS)
+    words = commands.sample(tmp_path / "samples.nc", 500_000_000, *OPTIONS)
     code, output = limited(resource.RLIMIT_AS, 4_000_000_000, words, ranks)
     assert code == 1, output
     assert output.count("out of memory") == 1, output
@@ -137,78 +117,78 @@ def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, comp
 
 @pytest.mark.parametrize("rank", [0, 1])
 def test_memory_that_runs_out_during_the_run_ends_in_a_message(tmp_path, rank):
-    words = sample(tmp_path / "samples.nc", 4000, *OPTIONS)
+    words = commands.sample(tmp_path / "samples.nc", 4000, *OPTIONS)
     failing = {"TEST_FAIL": "simulation", "TEST_ERROR": "MemoryError", "TEST_RANK": str(rank)}
-    code, output = run(words, **failing)
+    code, output = commands.run(words, **failing)
     assert code == 1, output
     assert output.count("out of memory") == 1, output
     assert f"rank {rank} of 2" in output
     assert "Traceback" not in output
-    check_readable(tmp_path)
-    assert run(words)[0] == 0
+    commands.check_readable(tmp_path)
+    assert commands.run(words)[0] == 0
 
 
 # -- two runs in one place ----------------------------------------------------------------------
 
 
 def test_a_second_run_on_one_output_is_refused(tmp_path):
-    words = sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
-    job = start(words)
-    wait_for_parts(job, tmp_path)
-    code, output = run(words, 0)
+    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
+    job = commands.start(words)
+    commands.wait_for_parts(job, tmp_path)
+    code, output = commands.run(words, 0)
     assert code == 2, output
     assert "holds it" in output
-    assert f"process {ranks_of(job)[0]}" in output
+    assert f"process {commands.ranks_of(job)[0]}" in output
     assert "Wait for that run or stop it" in output
     assert job.poll() is None
-    kill(job.pid, signal.SIGTERM)
-    assert finish(job)[0] == 3
+    commands.kill(job.pid, signal.SIGTERM)
+    assert commands.finish(job)[0] == 3
 
 
 def test_the_lock_of_a_killed_run_is_recognised(tmp_path):
-    words = sample(tmp_path / "samples.nc", 3000, *OPTIONS)
-    job = start(words)
-    wait_for_parts(job, tmp_path)
-    for process in ranks_of(job).values():
-        kill(process)
-    finish(job, 20.0)
+    words = commands.sample(tmp_path / "samples.nc", 3000, *OPTIONS)
+    job = commands.start(words)
+    commands.wait_for_parts(job, tmp_path)
+    for process in commands.ranks_of(job).values():
+        commands.kill(process)
+    commands.finish(job, 20.0)
     (lock,) = tmp_path.glob(".*.lock")
     assert json.loads(lock.read_text())["pid"] > 0
-    assert run(words)[0] == 0
+    assert commands.run(words)[0] == 0
     assert not lock.exists()
 
 
 def test_another_scene_is_refused_with_the_keys_that_differ_and_fresh_lies_beside(tmp_path):
     output = tmp_path / "samples.nc"
-    assert run(sample(output, 100), 0)[0] == 0
+    assert commands.run(commands.sample(output, 100), 0)[0] == 0
     before = output.read_bytes()
-    other = sample(output, 100, "--set", "effects.gravity=9.81", "--set", "study.seed=2")
-    code, text = run(other, 0)
+    other = commands.sample(output, 100, "--set", "effects.gravity=9.81", "--set", "study.seed=2")
+    code, text = commands.run(other, 0)
     assert code == 2, text
     assert "effects.gravity: 0.0 there, 9.81 now" in text
     assert "study.seed: 1 there, 2 now" in text
     assert "--fresh" in text
-    assert run([*other, "--fresh"], 0)[0] == 0
+    assert commands.run([*other, "--fresh"], 0)[0] == 0
     assert output.read_bytes() == before
     beside = dataset.read(tmp_path / "samples-2.nc", "samples")
     assert beside.sizes["sample"] == 100
-    assert run([*other, "--fresh"], 0)[0] == 0
+    assert commands.run([*other, "--fresh"], 0)[0] == 0
     assert (tmp_path / "samples-3.nc").read_bytes() == (tmp_path / "samples-2.nc").read_bytes()
     assert output.read_bytes() == before
 
 
 def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
     output = tmp_path / "samples.nc"
-    job = start(sample(output, 100_000, *OPTIONS))
-    wait_for_parts(job, tmp_path)
-    kill(job.pid, signal.SIGTERM)
-    assert finish(job)[0] == 3
-    before = {path: path.read_bytes() for path in result_files(tmp_path)}
-    code, text = run(sample(output, 100), 0)
+    job = commands.start(commands.sample(output, 100_000, *OPTIONS))
+    commands.wait_for_parts(job, tmp_path)
+    commands.kill(job.pid, signal.SIGTERM)
+    assert commands.finish(job)[0] == 3
+    before = {path: path.read_bytes() for path in commands.result_files(tmp_path)}
+    code, text = commands.run(commands.sample(output, 100), 0)
     assert code == 2, text
     assert "study.samples: 100000 there, 100 now" in text
-    assert {path: path.read_bytes() for path in result_files(tmp_path)} == before
-    assert run([*sample(output, 100), "--fresh"], 0)[0] == 0
+    assert {path: path.read_bytes() for path in commands.result_files(tmp_path)} == before
+    assert commands.run([*commands.sample(output, 100), "--fresh"], 0)[0] == 0
     assert {path: path.read_bytes() for path in before} == before
     assert (tmp_path / "samples-2.nc").exists()
 
@@ -218,10 +198,19 @@ def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
 
 @pytest.mark.full
 def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
-    words = ["sample", str(SCENE), "-o", str(tmp_path / "samples.nc"), "--time-limit", "600"]
-    words += overrides(*CHEAP, "numerics.averaged_revolutions=50", "study.samples=60000")
+    words = [
+        "sample",
+        str(commands.SCENE),
+        "-o",
+        str(tmp_path / "samples.nc"),
+        "--time-limit",
+        "600",
+    ]
+    words += commands.overrides(
+        *commands.CHEAP, "numerics.averaged_revolutions=50", "study.samples=60000"
+    )
     # the plain command: to be watched takes time too
-    code, output = finish(start(words, program=("-m", "hpcclear")))
+    code, output = commands.finish(commands.start(words, program=("-m", "hpcclear")))
     assert code == 0, output
     timing = dataset.read(tmp_path / "timing.nc", "timing")
     root = timing.sel(rank=0)

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import binom
 from test_wear import ROTOR, WORN
 
+from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.wear.curves import curves, lifetime
@@ -34,22 +35,20 @@ def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK, se
 
     `settling`: by how much, relative, copies that wait longer wear faster.
     """
-    asking, rng = life(joints, plan), np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     f = objective or (lambda c: float(c[0]))
-    asked = next(asking)
-    while True:
+
+    def seen(asked):
         c, _ = joints.worn(asked.work)
         n = len(asked.copies)
         scatter = 1.0 + noise * rng.standard_normal((n, 1))
         scatter[np.array(asked.copies) % 2 == 1] += settling
-        answer = Seen(
+        return Seen(
             scatter * rate(c), np.full(n, f(c)) * scatter[:, 0], np.ones((n, len(c))),
             np.full(n, int(status)),
         )  # fmt: skip
-        try:
-            asked = asking.send(answer)
-        except StopIteration as end:
-            return end.value
+
+    return answered(life(joints, plan), seen)
 
 
 def test_a_constant_rate_makes_linear_progress():

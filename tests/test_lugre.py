@@ -5,15 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from running import (
-    HUNT_CROSSLEY,
-    LATCHED,
-    energy_residual,
-    lanes_have_single_bits,
-    methods_agree,
-    run,
-    scene_with,
-)
+import running
 from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
@@ -43,7 +35,9 @@ BOUNDS = {1e-6: 2e-5, 1e-8: 1e-7}  # of the library of hard scenes
 def bristled(changes=None, rtol=1e-6, revolutions=1, **friction) -> Scene:
     """The paper's slider-crank with bristles in its joints, from the start."""
     own = {"effects.friction": LUGRE | friction, "numerics.energy": True}
-    return scene_with({"effects.contact": HUNT_CROSSLEY} | own | (changes or {}), revolutions, rtol)
+    return running.scene_with(
+        {"effects.contact": running.HUNT_CROSSLEY} | own | (changes or {}), revolutions, rtol
+    )
 
 
 # ---- the law -----------------------------------------------------------------------------------------------
@@ -205,14 +199,16 @@ def test_stick_slip_agrees_with_an_independent_solver():
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_energy_closes(rtol):
     scene = bristled(rtol=rtol, revolutions=10, bristle_damping=0.1, viscous_coefficient=1e-3)
-    result = run(scene)
+    result = running.run(scene)
     assert result.out.status == Status.OK
     assert result.out.dissipated > 0.0
-    rest, passed = energy_residual(scene, result)
+    rest, passed = running.energy_residual(scene, result)
     assert abs(rest) < BOUNDS[rtol] * passed
 
 
-@pytest.mark.parametrize("contact", [LATCHED, HUNT_CROSSLEY], ids=lambda law: law["law"])
+@pytest.mark.parametrize(
+    "contact", [running.LATCHED, running.HUNT_CROSSLEY], ids=lambda law: law["law"]
+)
 def test_bristles_however_stiff_end_in_a_stated_way(contact):
     """Whatever ends well closes its energy balance; what is stiffer than the steps that are allowed says so."""
     hard = [
@@ -229,10 +225,10 @@ def test_bristles_however_stiff_end_in_a_stated_way(contact):
     ends = []
     for friction in hard:
         scene = bristled({"effects.contact": contact, "numerics.max_steps": 300_000}, **friction)
-        result = run(scene)
+        result = running.run(scene)
         ends.append(Status(int(result.out.status)))
         if ends[-1] is Status.OK:
-            rest, passed = energy_residual(scene, result)
+            rest, passed = running.energy_residual(scene, result)
             assert abs(rest) < BOUNDS[1e-6] * passed, friction
         else:
             assert math.isnan(result.out.objective)
@@ -243,7 +239,7 @@ def test_bristles_however_stiff_end_in_a_stated_way(contact):
 @pytest.mark.full
 def test_methods_agree():
     scene = bristled({"numerics.max_steps": 10**7}, 1e-9)
-    methods_agree(scene, ("dormand-prince", "radau", "auto"))
+    running.methods_agree(scene, ("dormand-prince", "radau", "auto"))
 
 
 @pytest.mark.full
@@ -255,7 +251,7 @@ def test_samples_beside_others_have_the_bits_of_single_ones():
         ("effects.friction.coefficient",): rng.uniform(0.01, 0.15, 24),
         ("effects.friction.bristle_stiffness",): 10 ** rng.uniform(3, 7, 24),
     }
-    lanes_have_single_bits(scene, columns)
+    running.lanes_have_single_bits(scene, columns)
 
 
 @pytest.mark.full
@@ -263,9 +259,9 @@ def test_samples_beside_others_have_the_bits_of_single_ones():
 def test_one_joint_alone_has_its_bristles(ideal):
     scene = bristled({f"joints.{ideal}": {"kind": "ideal"}}, 1e-8)
     assert coordinate_count(scene) == 3
-    result = run(scene)
+    result = running.run(scene)
     assert result.out.status == Status.OK
-    rest, passed = energy_residual(scene, result)
+    rest, passed = running.energy_residual(scene, result)
     assert abs(rest) < BOUNDS[1e-8] * passed
 
 
@@ -294,7 +290,7 @@ def test_without_friction_bristles_change_nothing():
     assert (np.abs(without).max(axis=1) > 1e3).sum() > 50
     np.testing.assert_allclose(accelerations(on, states), without, rtol=1e-14, atol=1e-9)
     tight = {"numerics.rtol": 1e-11}
-    ends = [run(scene.with_(tight)) for scene in (on, off)]
+    ends = [running.run(scene.with_(tight)) for scene in (on, off)]
     np.testing.assert_allclose(ends[0].q[-1, 2:], ends[1].q[-1], rtol=0, atol=1e-11)
 
 
@@ -394,7 +390,7 @@ def test_a_linkage_without_room_for_bristles_is_refused():
 
 def test_bristles_give_way_at_most_where_friction_at_rest_holds_them():
     """Their coordinates come before the mechanism's, and the deflections are the velocities of these."""
-    result = run(bristled())
+    result = running.run(bristled())
     deflections = result.v[:, :2]
     largest = 1.5e-6  # static_coefficient over bristle_stiffness
     assert 0.5 * largest < np.abs(deflections).max() < 1.001 * largest

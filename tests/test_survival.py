@@ -3,7 +3,6 @@
 import itertools
 import random
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -11,32 +10,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import commands
 import losses
 import numpy as np
 import pytest
-from commands import (
-    CHEAP,
-    PROGRAM,
-    SCENE,
-    check_readable,
-    finish,
-    kill,
-    overrides,
-    ranks_of,
-    remove_orphans,
-    result_files,
-    run,
-    sample,
-    start,
-    wait_until,
-)
 from losses import Loss
 from patience import crowded
 
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
 
-sys.path.insert(0, str(PROGRAM.parent))
+sys.path.insert(0, str(commands.PROGRAM.parent))
 
 import formula
 
@@ -65,14 +49,22 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def sample_words(folder: Path) -> list[str]:
-    return sample(folder / "samples.nc", SAMPLES, *OPTIONS)
+    return commands.sample(folder / "samples.nc", SAMPLES, *OPTIONS)
 
 
 def study_words(folder: Path) -> list[str]:
     """A study in which every stage is small."""
     scene = folder.parent / "study.toml"
-    scene.write_text(SCENE.read_text().partition("[study]")[0] + formula.STUDY)
-    return ["run", str(scene), "-o", str(folder), "--progress", "quiet", *overrides(*CHEAP)]
+    scene.write_text(commands.SCENE.read_text().partition("[study]")[0] + formula.STUDY)
+    return [
+        "run",
+        str(scene),
+        "-o",
+        str(folder),
+        "--progress",
+        "quiet",
+        *commands.overrides(*commands.CHEAP),
+    ]
 
 
 @pytest.fixture(scope="module", params=["sample", "run"])
@@ -82,13 +74,13 @@ def undisturbed(request, tmp_path_factory) -> Iterator[Undisturbed]:
     place = tmp_path_factory.mktemp("undisturbed")
     for name in ("compiling", "results"):
         (place / name).mkdir()
-        code, output = run(words(place / name), TEST_LOG=str(place / f"{name}.log"))
+        code, output = commands.run(words(place / name), TEST_LOG=str(place / f"{name}.log"))
         assert code == 0, output
     log = losses.read(place / "results.log")
     work = log[-1].time - min(event.time for event in log if event.what == "opened")
     interval = INTERVAL if request.param == "sample" else CHECKPOINT_INTERVAL
     yield Undisturbed(words, interval, work, files(place / "results"))
-    remove_orphans()
+    commands.remove_orphans()
 
 
 @pytest.fixture
@@ -121,24 +113,24 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
         words = undisturbed.words(folder)
         for number in range(min(4, kills - done)):  # up to four kills of one run
             logs.append(tmp_path / f"{turn}-{number}.log")
-            job = start(words, TEST_LOG=str(logs[-1]))
+            job = commands.start(words, TEST_LOG=str(logs[-1]))
             early = dice.random() < 0.2
             while not early and job.poll() is None and not logs[-1].exists():
                 time.sleep(0.02)  # the checkpoint is opened
             moment = time.time() + dice.uniform(0.0, 1.0) * (1.0 if early else undisturbed.work)
-            wait_until(job, moment, folder, writing=dice.random() < 0.3)
-            ranks = ranks_of(job)
+            commands.wait_until(job, moment, folder, writing=dice.random() < 0.3)
+            ranks = commands.ranks_of(job)
             if job.poll() is not None or not ranks:
                 break
             states["amid a write"] += any(folder.rglob(".hpcclear-*.tmp"))
-            kill(ranks[dice.choice(sorted(ranks))])
-            code, output = finish(job, 60.0)
+            commands.kill(ranks[dice.choice(sorted(ranks))])
+            code, output = commands.finish(job, 60.0)
             states["too late"] += code == 0
-            check_readable(folder)
+            commands.check_readable(folder)
             done += 1
-        code, output = finish(job)
+        code, output = commands.finish(job)
         logs.append(tmp_path / f"{turn}-last.log")
-        code, output = run(words, TEST_LOG=str(logs[-1]))
+        code, output = commands.run(words, TEST_LOG=str(logs[-1]))
         assert code == 0, output
         assert files(folder) == undisturbed.files
         found += [
@@ -172,26 +164,26 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
         began = [folder.parent / f"began{rank}" for rank in (0, 1)]
         settings = {"TEST_BEGAN": str(folder.parent / "began")}
         if how == "time limit":
-            code, output = run([*words, "--time-limit", str(delay)], **settings)
+            code, output = commands.run([*words, "--time-limit", str(delay)], **settings)
             told = began[0].stat().st_mtime + delay
         else:
-            job = start(words, begin_warm=True, **settings)
+            job = commands.start(words, begin_warm=True, **settings)
             while job.poll() is None and not all(mark.exists() for mark in began):
                 time.sleep(0.02)  # a signal before that ends it as it would any program
-            wait_until(job, time.time() + delay, folder)
+            commands.wait_until(job, time.time() + delay, folder)
             told = time.time()
-            kill(job.pid, signal.Signals[how])
-            code, output = finish(job)
+            commands.kill(job.pid, signal.Signals[how])
+            code, output = commands.finish(job)
         elapsed = time.time() - told
         assert "Traceback" not in output
         assert elapsed < crowded(5.0) or (code == 0 and how == "time limit"), output
         slowest = max(slowest, elapsed)
-        check_readable(folder)
+        commands.check_readable(folder)
         if code == 0:  # it came too late
             late += 1
         else:
             assert code == 3, output
-        assert run(words)[0] == 0
+        assert commands.run(words)[0] == 0
         assert files(folder) == undisturbed.files
     print(f"{how}: {moments} moments, {late} after the end, the slowest took {slowest:.2f} s")
 
@@ -200,12 +192,12 @@ def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed
 @pytest.mark.parametrize("program", ["hpcclear", "-m hpcclear"])
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_both_entry_points_obey_a_signal(tmp_path, undisturbed, program, ranks):
-    words = sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
+    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     entry = ("-m", "hpcclear") if program == "-m hpcclear" else (_script(),)
-    job = start(words, ranks, entry)
-    wait_for_parts(job, tmp_path)
-    kill(job.pid, signal.SIGTERM)
-    code, output = finish(job, 10.0)
+    job = commands.start(words, ranks, entry)
+    commands.wait_for_parts(job, tmp_path)
+    commands.kill(job.pid, signal.SIGTERM)
+    code, output = commands.finish(job, 10.0)
     assert code == 3, output
     assert output.count("SIGTERM was received") == 1
     assert "The same command goes on from here" in output
@@ -214,30 +206,23 @@ def test_both_entry_points_obey_a_signal(tmp_path, undisturbed, program, ranks):
 @only_sample
 @pytest.mark.parametrize("ranks", [0, 2])
 def test_a_second_interrupt_exits_at_once_and_breaks_nothing(tmp_path, undisturbed, ranks):
-    words = sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
+    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
     # the first interrupt finds a root that does not listen
-    job = start(words, ranks, TEST_FAIL="sleep hpcclear.results.checkpoint:Checkpoint.flush 3")
-    wait_for_parts(job, tmp_path)
+    job = commands.start(
+        words, ranks, TEST_FAIL="sleep hpcclear.results.checkpoint:Checkpoint.flush 3"
+    )
+    commands.wait_for_parts(job, tmp_path)
     time.sleep(1.5)
-    kill(job.pid, signal.SIGINT)
+    commands.kill(job.pid, signal.SIGINT)
     time.sleep(1.0)
     assert job.poll() is None
     told = time.time()
-    kill(job.pid, signal.SIGINT)
-    code, output = finish(job, 10.0)
+    commands.kill(job.pid, signal.SIGINT)
+    code, output = commands.finish(job, 10.0)
     assert time.time() - told < crowded(2.0)
     assert code == 3 or ranks, output  # mpiexec aborts the job by itself, with a code of its own
     assert "Traceback" not in output
-    assert check_readable(tmp_path) > 0
-
-
-def wait_for_parts(job: subprocess.Popen, folder: Path) -> None:
-    """Wait until the first finished samples are on disk."""
-    deadline = time.time() + crowded(60.0)
-    while not result_files(folder):
-        assert job.poll() is None, finish(job)[1]
-        assert time.time() < deadline
-        time.sleep(0.02)
+    assert commands.check_readable(tmp_path) > 0
 
 
 def _script() -> str:
@@ -297,15 +282,15 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
     if "flush" in case:  # a fast machine is done before there is a second one
         words = [*words, "--checkpoint-interval", "0.2"]
     settings = {"TEST_FAIL": case, "TEST_RANK": str(rank), "TEST_MARK": str(mark)}
-    code, output = run(words, TEST_LOG=str(before), **settings)
+    code, output = commands.run(words, TEST_LOG=str(before), **settings)
     elapsed = time.time() - mark.stat().st_mtime
     assert code == 1, output
     assert elapsed < crowded(5.0)
     assert output.count("Traceback") == 1, output
     assert output.count(f"hpcclear failed on rank {rank} of 2 in stage") == 1, output
     assert "raised on purpose" in output
-    check_readable(place)
-    assert run(words, TEST_LOG=str(after))[0] == 0
+    commands.check_readable(place)
+    assert commands.run(words, TEST_LOG=str(after))[0] == 0
     assert files(place) == undisturbed.files
     return losses.loss_of(before, [after], None).samples
 
@@ -330,13 +315,13 @@ def test_a_program_error_at_any_stage_of_a_study_is_reported_once(place, undistu
 
 @only_sample
 def test_results_of_an_interrupted_run_are_datasets_of_their_own(tmp_path, undisturbed):
-    words = sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
-    job = start(words)
-    wait_for_parts(job, tmp_path)
+    words = commands.sample(tmp_path / "samples.nc", 100_000, *OPTIONS)
+    job = commands.start(words)
+    commands.wait_for_parts(job, tmp_path)
     time.sleep(1.0)
-    kill(job.pid, signal.SIGTERM)
-    assert finish(job)[0] == 3
-    parts = [dataset.read(path, "samples") for path in result_files(tmp_path)]
+    commands.kill(job.pid, signal.SIGTERM)
+    assert commands.finish(job)[0] == 3
+    parts = [dataset.read(path, "samples") for path in commands.result_files(tmp_path)]
     numbers = np.concatenate([part["sample"] for part in parts])
     assert numbers.size == np.unique(numbers).size > 100
     assert all(np.isfinite(part["m2"]).all() for part in parts)

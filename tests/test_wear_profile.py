@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from test_wear import ROTOR, WEAR
 
 import hpcclear
+from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
@@ -301,19 +302,16 @@ PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
 
 def followed(joints, relief, rate, share):
     """A life whose work and its moments are functions of the state: rate(clearance), share(moments) (joints, size)."""
-    asking = life(joints, PLAN, relief)
-    asked = next(asking)
-    while True:
+
+    def seen(asked):
         n = len(asked.copies)
         work = np.repeat(rate(joints.worn(asked.work)[0])[None], n, axis=0)
         moments = None
         if relief.size:
             moments = work[..., None] * share(asked.moments)
-        answer = Seen(work, np.ones(n), np.ones((n, 1)), np.zeros(n, int), moments)
-        try:
-            asked = asking.send(answer)
-        except StopIteration as end:
-            return end.value
+        return Seen(work, np.ones(n), np.ones((n, 1)), np.zeros(n, int), moments)
+
+    return answered(life(joints, PLAN, relief), seen)
 
 
 def test_a_life_without_waves_in_its_work_is_an_even_one():

@@ -34,25 +34,17 @@ STRICTER = 10.0
 
 @dataclass(frozen=True)
 class Averaging:
-    """The panel.
-
-    Attributes
-    ----------
-    transient, averaged : ndarray of int
-        Revolutions waited for (t,) and averaged (a,).
-    error : ndarray, shape (t, a)
-        Relative error of the objective, root mean square over copies.
-    floor : float
-        Scatter of the copies' averages over the second half of the run, relative: no average goes below.
-    seconds : float
-        Time of one revolution of one copy in a full block of lanes.
-    """
+    """The panel."""
 
     transient: Integers
     averaged: Integers
+    """transient and averaged: revolutions waited for (t,) and averaged (a,)."""
     error: Array
+    """Shape (t, a): relative error of the objective, root mean square over copies."""
     floor: float
+    """Scatter of the copies' averages over the second half of the run, relative: no average goes below."""
     seconds: float
+    """Time of one revolution of one copy in a full block of lanes."""
 
 
 def measure(scene: Scene, profile: Profile) -> Averaging:

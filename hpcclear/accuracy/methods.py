@@ -41,24 +41,16 @@ Event = Callable[[float, Array], float]
 
 @dataclass(frozen=True)
 class Method:
-    """A method of the panel.
-
-    Attributes
-    ----------
-    name : str
-    prepare : callable
-        From a tolerance to a run that can be timed, and the share of its time that one design takes; everything
-        is compiled when it returns.
-    compiled : bool
-        Whether it runs without Python inside, so that repeating it is cheap.
-    setting : callable
-        From the rung's tolerance to what the method is really given: the same, or a step over the period.
-    """
+    """A method of the panel."""
 
     name: str
     prepare: Callable[[float], tuple[Run, float]]
+    """From a tolerance to a run that can be timed, and the share of its time that one design takes; everything is compiled
+    when it returns."""
     compiled: bool = True
+    """Whether it runs without Python inside, so that repeating it is cheap."""
     setting: Callable[[float], float] = lambda rtol: rtol
+    """From the rung's tolerance to what the method is really given: the same, or a step over the period."""
 
 
 def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:

@@ -45,30 +45,20 @@ EFFICIENCY = 0.95
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the plan.
-
-    Attributes
-    ----------
-    error : float or None
-        Target error of f; None: the settings of the file.
-    scene : Scene
-        With the settings.
-    seconds : float
-        Core-seconds of one sample.
-    reached : str
-        Limits that the samples tried came to; empty where the file names no target error.
-    simulations : int or None
-        Of the whole study, if they go by the row; None: those of the plan.
-    label : str
-        What is asked, in words; empty: the error.
-    """
+    """One line of the plan."""
 
     error: float | None
+    """Target error of f; None: the settings of the file."""
     scene: Scene
+    """With the settings."""
     seconds: float
+    """Core-seconds of one sample."""
     reached: str
+    """Limits that the samples tried came to; empty where the file names no target error."""
     simulations: int | None = None
+    """Of the whole study, if they go by the row; None: those of the plan."""
     label: str = ""
+    """What is asked, in words; empty: the error."""
 
     def settings(self) -> str:
         """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
@@ -84,33 +74,22 @@ class Row:
 
 @dataclass(frozen=True)
 class Plan:
-    """What was measured.
-
-    Attributes
-    ----------
-    rows : tuple of Row
-        The file's own settings first, then the ladder.
-    samples : int
-        Simulations of `sample`.
-    study : int or None
-        Simulations of `run`, unless surrogates are refused, which takes more; None if the study has no case.
-    startup : float
-        Seconds each rank needs before it simulates.
-    memory : float
-        Bytes a rank.
-    columns : int
-        Study variables.
-    responses : int
-        Single responses of `run`, which rank 0 simulates alone.
-    """
+    """What was measured."""
 
     rows: tuple[Row, ...]
+    """The file's own settings first, then the ladder."""
     samples: int
+    """Simulations of `sample`."""
     study: int | None
+    """Simulations of `run`, unless surrogates are refused, which takes more; None if the study has no case."""
     startup: float
+    """Seconds each rank needs before it simulates."""
     memory: float
+    """Bytes a rank."""
     columns: int
+    """Study variables."""
     responses: int = 0
+    """Single responses of `run`, which rank 0 simulates alone."""
 
     def simulations(self, row: Row) -> int:
         """Of the command that is planned, at a row."""
@@ -294,18 +273,14 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
         Lives cannot be followed, or an error was asked for that these have no use for.
     """
     lives.check(scene)
-    if scene.study is not None and scene.study.accuracy is not None:
-        if error is not None:
-            raise InputError(
-                "--error", error, "the study asks for an accuracy of its own, which decides the tolerance",
-                "Leave it out, and set study.accuracy",
-            )  # fmt: skip
-        return ()
-    if scene.study is not None and scene.study.worn:
-        if error is not None:
-            raise InputError(
-                "--error", error, "lives of worn joints are followed at the settings of the file",
-                "Leave it out, and set wear.tolerance and wear.copies",
-            )  # fmt: skip
-        return ()
-    return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
+    study = scene.study
+    if study is None or (study.accuracy is None and not study.worn):
+        return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
+    if error is not None:
+        reason = "lives of worn joints are followed at the settings of the file"
+        remedy = "Leave it out, and set wear.tolerance and wear.copies"
+        if study.accuracy is not None:
+            reason = "the study asks for an accuracy of its own, which decides the tolerance"
+            remedy = "Leave it out, and set study.accuracy"
+        raise InputError("--error", error, reason, remedy)
+    return ()

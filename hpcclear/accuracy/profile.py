@@ -5,56 +5,37 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Profile:
-    """Sizes of every panel.
+    """Sizes of every panel; of the whole picture, unless said otherwise."""
 
-    Attributes
-    ----------
-    name : str
-    rungs : tuple of float
-        Tolerances of the ladder, loosest first.
-    designs : int
-        Designs near the scene that each method integrates; errors are root mean squares over them.
-    repeats : int
-        Runs that each timing is the median of.
-    outside_repeats : int
-        The same for methods written in Python.
-    more_methods : bool
-        Whether the methods that have to be compiled for this panel alone take part.
-    revolutions : int
-        Of the long runs of the averaging panel.
-    copies : int
-        Long runs that differ by tiny kicks at their start.
-    stretches : int
-        Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions.
-    training : tuple of int
-        Sample sizes of the surrogates.
-    tests : int
-        Points the surrogates are tested on.
-    draws : tuple of int
-        Monte Carlo sizes on the surrogate.
-    blocks : int
-        Monte Carlo samples of each size; the error is their root mean square.
-    simulations : int
-        Direct simulations, shared out into samples of each size.
-    strong_seconds : float
-        Core-seconds of the batch whose speed-up is measured.
-    """
-
-    name: str
-    rungs: tuple[float, ...]
-    designs: int
-    repeats: int
-    outside_repeats: int
-    more_methods: bool
-    revolutions: int
-    copies: int
-    stretches: int
-    training: tuple[int, ...]
-    tests: int
-    draws: tuple[int, ...]
-    blocks: int
-    simulations: int
-    strong_seconds: float
+    name: str = "full"
+    rungs: tuple[float, ...] = tuple(10.0**-k for k in range(3, 13))
+    """Tolerances of the ladder, loosest first."""
+    designs: int = 4
+    """Designs near the scene that each method integrates; errors are root mean squares over them."""
+    repeats: int = 7
+    """Runs that each timing is the median of."""
+    outside_repeats: int = 3
+    """The same for methods written in Python."""
+    more_methods: bool = True
+    """Whether the methods that have to be compiled for this panel alone take part."""
+    revolutions: int = 1000
+    """Of the long runs of the averaging panel."""
+    copies: int = 32
+    """Long runs that differ by tiny kicks at their start."""
+    stretches: int = 64
+    """Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions."""
+    training: tuple[int, ...] = (25, 50, 100, 200, 400)
+    """Sample sizes of the surrogates."""
+    tests: int = 200
+    """Points the surrogates are tested on."""
+    draws: tuple[int, ...] = tuple(4**k for k in range(2, 10))
+    """Monte Carlo sizes on the surrogate."""
+    blocks: int = 32
+    """Monte Carlo samples of each size; the error is their root mean square."""
+    simulations: int = 8192
+    """Direct simulations, shared out into samples of each size."""
+    strong_seconds: float = 10.0
+    """Core-seconds of the batch whose speed-up is measured."""
 
 
 QUICK = Profile(
@@ -75,22 +56,6 @@ QUICK = Profile(
     strong_seconds=1.0,
 )
 
-FULL = Profile(
-    name="full",
-    rungs=tuple(10.0**-k for k in range(3, 13)),
-    designs=4,
-    repeats=7,
-    outside_repeats=3,
-    more_methods=True,
-    revolutions=1000,
-    copies=32,
-    stretches=64,
-    training=(25, 50, 100, 200, 400),
-    tests=200,
-    draws=tuple(4**k for k in range(2, 10)),
-    blocks=32,
-    simulations=8192,
-    strong_seconds=10.0,
-)
+FULL = Profile()
 
 PROFILES = {profile.name: profile for profile in (QUICK, FULL)}

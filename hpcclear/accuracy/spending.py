@@ -45,38 +45,28 @@ AIMS = (0.1, 0.03, 0.01, 0.003, 0.001)
 
 @dataclass(frozen=True)
 class Spending:
-    """The panel; relative errors are root mean squares, seconds those of one core in full lanes.
-
-    Attributes
-    ----------
-    tolerance : ndarray, shape (r,)
-    spent : ndarray of int, shape (n,)
-        Revolutions averaged, over all copies.
-    error, model : ndarray, shape (r, n)
-        Measured over disjoint means of so many revolutions, NaN where there are fewer than four; and by the formula.
-    bias, bias_error : ndarray, shape (r,)
-        Of the mean at each tolerance against the mean of the tightest that agree, with its standard error; NaN where it is
-        that mean.
-    variance : ndarray, shape (r,)
-        Of the mean of one revolution among many, relative.
-    spin_up : float
-        Revolutions that each copy leaves out: the motion's, whatever the tolerance.
-    turn_seconds : ndarray, shape (r,)
-        Of a revolution.
-    revolutions : int
-        Of all copies at all tolerances.
-    """
+    """The panel; relative errors are root mean squares, seconds those of one core in full lanes."""
 
     tolerance: Array
+    """Shape (r,)."""
     spent: Integers
+    """Shape (n,): revolutions averaged, over all copies."""
     error: Array
     model: Array
+    """error and model, shape (r, n): measured over disjoint means of so many revolutions, NaN where there are fewer than
+    four; and by the formula."""
     bias: Array
     bias_error: Array
+    """bias and bias_error, shape (r,): of the mean at each tolerance against the mean of the tightest that agree, with its
+    standard error; NaN where it is that mean."""
     variance: Array
+    """Shape (r,): of the mean of one revolution among many, relative."""
     spin_up: float
+    """Revolutions that each copy leaves out: the motion's, whatever the tolerance."""
     turn_seconds: Array
+    """Shape (r,): of a revolution."""
     revolutions: int
+    """Of all copies at all tolerances."""
 
     @property
     def seconds(self) -> Array:
@@ -101,20 +91,14 @@ class Spending:
 
 @dataclass(frozen=True)
 class Run:
-    """Copies at every tolerance, and what they did so far.
-
-    Attributes
-    ----------
-    gaps : ndarray, shape (stretches, r, copies, joints)
-    seconds : ndarray, shape (r,)
-        Processor time so far.
-    start : ndarray, shape (r, copies, Start.size)
-        Where they go on from.
-    """
+    """Copies at every tolerance, and what they did so far."""
 
     gaps: Array
+    """Shape (stretches, r, copies, joints)."""
     seconds: Array
+    """Shape (r,): processor time so far."""
     start: Array
+    """Shape (r, copies, Start.size): where they go on from."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Run":

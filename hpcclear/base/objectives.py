@@ -27,53 +27,34 @@ class Objective(NamedTuple):
     joints: tuple[int, ...] = ()
 
 
+def _largest(name: str, unit: str, words: str) -> Objective:
+    """The largest over joints of what a record has of each under the same name."""
+    field = _field_of(name)
+    return Objective(name, unit, words, lambda records: records[field].max(axis=1), field)
+
+
+def _plain(name: str, unit: str, words: str) -> Objective:
+    """What a record has under the same name."""
+    field = _field_of(name)
+    return Objective(name, unit, words, lambda records: records[field])
+
+
+def _field_of(name: str) -> str:
+    return name.replace("-", "_")
+
+
+# fmt: off
 _ALL = (
-    Objective(
-        "mean-gap",
-        "m",
-        "mean distance from the clearance circle",
-        lambda r: r["objective"],
-        "mean_gap",
-    ),
-    Objective(
-        "mean-contact-force",
-        "N",
-        "mean contact force, of the joint where it is larger",
-        lambda r: r["mean_contact_force"].max(axis=1),
-        "mean_contact_force",
-    ),
-    Objective(
-        "peak-contact-force",
-        "N",
-        "peak contact force, of the joint where it is larger",
-        lambda r: r["peak_contact_force"].max(axis=1),
-        "peak_contact_force",
-    ),
-    Objective(
-        "peak-crank-moment",
-        "N m",
-        "peak moment of the drive on the crank",
-        lambda r: r["peak_crank_moment"],
-    ),
-    Objective(
-        "slider-acceleration-deviation",
-        "m/s^2",
-        "standard deviation in time of the slider acceleration",
-        lambda r: r["slider_acceleration_deviation"],
-    ),
-    Objective(
-        "point-acceleration-deviation",
-        "m/s^2",
-        "root mean square about its mean of the acceleration of the followed point",
-        lambda r: r["point_acceleration_deviation"],
-    ),
-    Objective(
-        "peak-point-acceleration",
-        "m/s^2",
-        "largest acceleration of the followed point",
-        lambda r: r["peak_point_acceleration"],
-    ),
+    Objective("mean-gap", "m", "mean distance from the clearance circle", lambda records: records["objective"], "mean_gap"),
+    _largest("mean-contact-force", "N", "mean contact force, of the joint where it is larger"),
+    _largest("peak-contact-force", "N", "peak contact force, of the joint where it is larger"),
+    _plain("peak-crank-moment", "N m", "peak moment of the drive on the crank"),
+    _plain("slider-acceleration-deviation", "m/s^2", "standard deviation in time of the slider acceleration"),
+    _plain("point-acceleration-deviation", "m/s^2",
+        "root mean square about its mean of the acceleration of the followed point"),
+    _plain("peak-point-acceleration", "m/s^2", "largest acceleration of the followed point"),
 )
+# fmt: on
 OBJECTIVES = {one.name: one for one in _ALL}
 """Every objective by its name."""
 

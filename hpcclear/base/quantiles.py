@@ -91,24 +91,16 @@ class Samples:
 
 @dataclass(frozen=True)
 class Named:
-    """A distribution of scipy.stats, cut off at two limits.
-
-    Attributes
-    ----------
-    name : str
-        In scipy.stats.
-    shapes : tuple of float
-    location, scale : float
-    lower, upper : float
-        Where it is cut off; infinite for the whole of it.
-    """
+    """A distribution of scipy.stats, cut off at two limits."""
 
     name: str
+    """In scipy.stats."""
     shapes: tuple[float, ...]
     location: float = 0.0
     scale: float = 1.0
     lower: float = -inf
     upper: float = inf
+    """lower and upper: where it is cut off; infinite for the whole of it."""
 
     @cached_property
     def _whole(self) -> Any:

@@ -7,18 +7,18 @@ import click
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import (
-    FILE,
     PATH,
     POINTS,
-    SET,
     How,
+    Written,
     check_free,
-    is_root,
+    flag,
+    of_one_process,
     on_ranks,
     output_option,
     place_of,
-    scene_of,
     with_how,
+    with_scene,
 )
 from hpcclear.ranks.stopping import Exit
 
@@ -42,14 +42,12 @@ def _check_kind(
 
 
 @click.command(short_help="Simulate many designs.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write.")
 @POINTS
-@click.option(
+@flag(
     "--statistics",
-    is_flag=True,
-    help="Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
+    "Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
 )
 @click.option(
     "--raw",
@@ -63,8 +61,7 @@ def _check_kind(
 )
 @with_how
 def sample(
-    file: Path,
-    overrides: tuple[str, ...],
+    written: Written,
     output: Path,
     points: Path | None,
     statistics: bool,
@@ -85,7 +82,7 @@ def sample(
         from hpcclear.ensemble.statistics import run_statistics
 
         chosen = None if part is None else Part.parse(part)
-        scene, place = scene_of(file, overrides), place_of(output)
+        scene, place = written.scene(), place_of(output)
         if statistics:
             kept = None if raw is None else place_of(raw)
             describe_statistics(
@@ -101,41 +98,36 @@ def sample(
 
 
 @click.command(short_help="Put parts of a design together.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write: the name that was given with each part.")
 @POINTS
-def merge(file: Path, overrides: tuple[str, ...], output: Path, points: Path | None) -> int:
+@of_one_process
+def merge(written: Written, output: Path, points: Path | None) -> int:
     """Write what sample --part 1/N to N/N made as one file: the bytes that a single run would have written.
 
     Scene, --set and --points are those of the parts, which stay; parts that are missing are named.
 
     Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.cli.printing import describe_samples
     from hpcclear.ensemble.samples import design
     from hpcclear.ensemble.split import run_merge
     from hpcclear.ranks.boundary import alone
 
-    scene = scene_of(file, overrides)
+    scene = written.scene()
     describe_samples(run_merge(scene, design(scene, points), output, alone()))
     return Exit.DONE
 
 
 @click.command("map", short_help="Show where the motion does what.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write.")
 @click.option(
     "--x", "x", required=True, metavar="PATH=LO:HI:N", help="First entry, its limits, its cells."
 )
 @click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second entry.")
 @with_how
-def map_command(
-    file: Path, overrides: tuple[str, ...], output: Path, x: str, y: str | None, how: How
-) -> int:
+def map_command(written: Written, output: Path, x: str, y: str | None, how: How) -> int:
     """Judge the motion over a line or a grid of one or two entries of the scene: growth of a kick (largest Lyapunov
     exponent, per revolution), period, kinds of motion from several starts, f and its limit.
 
@@ -147,19 +139,16 @@ def map_command(
         from hpcclear.ensemble.maps import run_map
 
         axes = (x,) if y is None else (x, y)
-        describe_map(
-            run_map(scene_of(file, overrides), axes, place_of(output), ranks, how.options())
-        )
+        describe_map(run_map(written.scene(), axes, place_of(output), ranks, how.options()))
 
     return on_ranks(program, how.time_limit)
 
 
 @click.command(short_help="Follow lives of joints that wear.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write.")
 @with_how
-def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
+def wear(written: Written, output: Path, how: How) -> int:
     """Follow lives of a mechanism whose joints wear: clearance, f and peak force against revolutions, how long lives last and
     how sure that is.
 
@@ -172,20 +161,14 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
         from hpcclear.cli.wear import describe
         from hpcclear.ensemble.wear import run_wear
 
-        return describe(run_wear(scene_of(file, overrides), place_of(output), ranks, how.options()))
+        return describe(run_wear(written.scene(), place_of(output), ranks, how.options()))
 
     return on_ranks(program, how.time_limit)
 
 
 @click.command(short_help="Say which effects a scene can do without.")
-@FILE
-@SET
-@click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    help="NetCDF file to write; by default NAME-effects.nc here.",
-)
+@with_scene
+@output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @click.option(
     "--tolerance",
     default="1%",
@@ -199,11 +182,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
     metavar="N",
     help="Samples of a variant at most; by default as many as a twentieth of the study allows.",
 )
-@click.option(
-    "--forces",
-    is_flag=True,
-    help="Hold peak contact forces to the tolerance, too, not only tell them.",
-)
+@flag("--forces", "Hold peak contact forces to the tolerance, too, not only tell them.")
 @click.option(
     "--scene",
     "reduced",
@@ -213,8 +192,7 @@ def wear(file: Path, overrides: tuple[str, ...], output: Path, how: How) -> int:
 )
 @with_how
 def effects(
-    file: Path,
-    overrides: tuple[str, ...],
+    written: Written,
     output: Path | None,
     tolerance: str,
     samples: int | None,
@@ -231,22 +209,21 @@ def effects(
     def program(ranks: "Ranks") -> int:
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
+        from hpcclear.ensemble.trial import Wanted
         from hpcclear.study.extent import certificate_samples
 
         allowed = tolerance_of(tolerance)
-        scene = scene_of(file, overrides)
+        scene = written.scene()
         if reduced is not None:
             check_free(reduced)
         found = run_effects(
             scene,
-            place_of(output or Path(f"{file.stem}-effects.nc")),
+            place_of(output or Path(f"{written.file.stem}-effects.nc")),
             ranks,
             how.options(),
-            tolerance=allowed,
-            samples=certificate_samples(scene) if samples is None else samples,
-            forces=forces,
+            Wanted(allowed, certificate_samples(scene) if samples is None else samples, forces),
         )
-        code = describe(found, scene, file)
+        code = describe(found, scene, written.file)
         if reduced is not None:
             from hpcclear.results import files
 

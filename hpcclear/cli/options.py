@@ -11,7 +11,7 @@ import click
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.launcher import launched_rank
-from hpcclear.ranks.stopping import StopSwitch
+from hpcclear.ranks.stopping import Exit, StopSwitch
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Options
@@ -29,14 +29,17 @@ SET = click.option(
 )
 
 
-def output_option(words: str) -> Callable[[Any], Any]:
+def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
     """The option that names where results go."""
-    return click.option("-o", "--output", type=PATH, required=True, help=words)
+    return click.option("-o", "--output", type=PATH, required=required, help=words)
 
 
-FRESH = click.option(
-    "--fresh", is_flag=True, help="Start anew beside earlier results, never over them."
-)
+def flag(name: str, words: str) -> Callable[[Any], Any]:
+    """An option that is given or not."""
+    return click.option(name, is_flag=True, help=words)
+
+
+FRESH = flag("--fresh", "Start anew beside earlier results, never over them.")
 LIMIT = click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
@@ -67,8 +70,26 @@ PROGRESS = click.option(
 
 
 @dataclass(frozen=True)
+class Written:
+    """A scene as the words of a command have it: a file, and what is changed of it."""
+
+    file: Path
+    overrides: tuple[str, ...]
+
+    def scene(self, warn: bool = True) -> "Scene":
+        """The scene; what looks like a slip of units is said, unless the caller says it."""
+        from hpcclear.scene import load_scene
+        from hpcclear.scene.plausibility import implausible
+
+        scene = load_scene(self.file, self.overrides)
+        for text in implausible(scene) if warn else ():
+            say(f"Warning: {text}")
+        return scene
+
+
+@dataclass(frozen=True)
 class How:
-    """How a run is carried out: four options of a command, one argument of its function."""
+    """How a run is carried out."""
 
     fresh: bool
     time_limit: float | None
@@ -82,30 +103,24 @@ class How:
         return Options(self.fresh, self.interval, self.progress)
 
 
-def with_how(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the four options of `How`, as its argument `how`."""
+def _gathering(name: str, kind: type, *options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Gives a command these options, one a field of `kind`, as its one argument `name`."""
 
-    @FRESH
-    @LIMIT
-    @INTERVAL
-    @PROGRESS
-    @functools.wraps(command)
-    def gathered(**values: Any) -> int:
-        how = How(**{field.name: values.pop(field.name) for field in fields(How)})
-        return command(how=how, **values)
+    def decorator(command: Callable[..., int]) -> Callable[..., int]:
+        @functools.wraps(command)
+        def gathered(**values: Any) -> int:
+            parts = {field.name: values.pop(field.name) for field in fields(kind)}
+            return command(**{name: kind(**parts)}, **values)
 
-    return gathered
+        for option in reversed(options):
+            gathered = option(gathered)
+        return gathered
+
+    return decorator
 
 
-def scene_of(file: Path, overrides: tuple[str, ...], warn: bool = True) -> "Scene":
-    """The scene; what looks like a slip of units is said, unless the caller says it."""
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.plausibility import implausible
-
-    scene = load_scene(file, overrides)
-    for text in implausible(scene) if warn else ():
-        say(f"Warning: {text}")
-    return scene
+with_scene = _gathering("written", Written, FILE, SET)
+with_how = _gathering("how", How, FRESH, LIMIT, INTERVAL, PROGRESS)
 
 
 def place_of(output: Path) -> Path:
@@ -126,6 +141,16 @@ def check_free(path: Path) -> None:
 def is_root() -> bool:
     """Whether this process is the first of its launcher, or has none."""
     return launched_rank() in (0, None)
+
+
+def of_one_process(command: Callable[..., int]) -> Callable[..., int]:
+    """A command that one process carries out: others of its launcher leave at once."""
+
+    @functools.wraps(command)
+    def alone(**values: Any) -> int:
+        return command(**values) if is_root() else Exit.DONE
+
+    return alone
 
 
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")

@@ -6,25 +6,25 @@ from pathlib import Path
 import click
 
 from hpcclear.cli.options import (
-    FILE,
     PATH,
-    SET,
+    Written,
     check_free,
-    is_root,
+    flag,
+    of_one_process,
     output_option,
     place_of,
-    scene_of,
+    with_scene,
 )
 from hpcclear.ranks.stopping import Exit
 
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
-@click.option(
+@flag(
     "--four-stroke",
-    is_flag=True,
-    help="A gas force against two turns of the crank, in an engine written as a linkage.",
+    "A gas force against two turns of the crank, in an engine written as a linkage.",
 )
+@of_one_process
 def init(file: Path, four_stroke: bool) -> int:
     """Write an engine to start from: every table, each number with its unit, and a small study.
 
@@ -32,8 +32,6 @@ def init(file: Path, four_stroke: bool) -> int:
 
     Example: hpcclear init engine.toml --four-stroke
     """
-    if not is_root():
-        return Exit.DONE
     from importlib import resources
 
     from hpcclear.results import files
@@ -48,8 +46,7 @@ def init(file: Path, four_stroke: bool) -> int:
 
 
 @click.command(short_help="Say what a file would simulate, at what cost.")
-@FILE
-@SET
+@with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
 @click.option(
     "--sketch",
@@ -57,16 +54,15 @@ def init(file: Path, four_stroke: bool) -> int:
     metavar="FIGURE",
     help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
 )
-def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | None) -> int:
+@of_one_process
+def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.cli.printing import describe_scene
 
-    scene = scene_of(file, overrides, warn=False)
+    scene = written.scene(warn=False)
     describe_scene(scene, cost)
     if sketch is not None:
         from hpcclear.report import save, sketch_figure
@@ -81,10 +77,10 @@ def check(file: Path, overrides: tuple[str, ...], cost: bool, sketch: Path | Non
 
 
 @click.command(short_help="Simulate one response.")
-@FILE
-@SET
+@with_scene
 @output_option("NetCDF file to write.")
-def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
+@of_one_process
+def simulate(written: Written, output: Path) -> int:
     """Simulate one response: time series, forces, energies, objective.
 
     Exit code 1 if the simulation did not reach its end, 4 if f is not known to numerics.target_error; what there is
@@ -92,15 +88,13 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
     from hpcclear.results import dataset, files, netcdf
 
-    scene = scene_of(file, overrides)
+    scene = written.scene()
     files.probe(place_of(output), netcdf.SEAL)
     began = time.perf_counter()
     response = simulate_scene(scene)
@@ -118,13 +112,12 @@ def simulate(file: Path, overrides: tuple[str, ...], output: Path) -> int:
 
 @click.command(short_help="Write figures and an HTML page.")
 @click.argument("directory", type=PATH)
+@of_one_process
 def report(directory: Path) -> int:
     """Write figures and a self-contained HTML page about a directory of results.
 
     Example: hpcclear report results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.report.html.page import write_report
 
     click.echo(f"report  {write_report(directory)}")
@@ -140,6 +133,7 @@ def report(directory: Path) -> int:
     show_default=True,
     help="Samples of each file, spread over it.",
 )
+@of_one_process
 def reproduce(place: Path, samples: int) -> int:
     """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
 
@@ -148,8 +142,6 @@ def reproduce(place: Path, samples: int) -> int:
 
     Example: hpcclear reproduce results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.ensemble.repeating import repeated
 
     found = list(repeated(place, samples))
@@ -165,13 +157,12 @@ def reproduce(place: Path, samples: int) -> int:
 
 @click.command(short_help="Describe results for an archive.")
 @click.argument("directory", type=PATH)
+@of_one_process
 def crate(directory: Path) -> int:
     """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
 
     Example: hpcclear crate results/quickstart
     """
-    if not is_root():
-        return Exit.DONE
     from hpcclear.results.crate import write_crate
 
     click.echo(f"crate  {write_crate(directory)}")

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcclear.cli.options import (
-    FILE,
     FRESH,
     LIMIT,
     PROGRESS,
-    SET,
     STUDYING,
+    Written,
+    flag,
     on_ranks,
     output_option,
     place_of,
     say,
-    scene_of,
+    with_scene,
 )
 
 if TYPE_CHECKING:
@@ -24,15 +24,13 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Carry a whole study.")
-@FILE
-@SET
+@with_scene
 @output_option("Directory for the results.")
 @FRESH
 @LIMIT
 @PROGRESS
 def run(
-    file: Path,
-    overrides: tuple[str, ...],
+    written: Written,
     output: Path,
     fresh: bool,
     time_limit: float | None,
@@ -48,7 +46,7 @@ def run(
         from hpcclear.study import run_study
 
         place = run_study(
-            scene_of(file, overrides),
+            written.scene(),
             place_of(output),
             ranks,
             fresh=fresh,
@@ -61,17 +59,13 @@ def run(
 
 
 @click.command(short_help="Show what accuracy costs in time.")
-@FILE
-@SET
+@with_scene
 @output_option("Directory for accuracy.nc and the figures.")
-@click.option(
-    "--quick", is_flag=True, help="A look in about a minute instead of the whole picture."
-)
+@flag("--quick", "A look in about a minute instead of the whole picture.")
 @FRESH
 @LIMIT
 def accuracy(
-    file: Path,
-    overrides: tuple[str, ...],
+    written: Written,
     output: Path,
     quick: bool,
     fresh: bool,
@@ -94,15 +88,14 @@ def accuracy(
             click.echo(f"accuracy: {text}", err=True)
 
         profile = PROFILES["quick" if quick else "full"]
-        scene, place = scene_of(file, overrides), place_of(output)
+        scene, place = written.scene(), place_of(output)
         describe(*run_accuracy(scene, place, ranks, profile, tell, Options(fresh=fresh)))
 
     return on_ranks(program, time_limit)
 
 
 @click.command(short_help="Say what a run will cost.")
-@FILE
-@SET
+@with_scene
 @click.option(
     "--error",
     type=click.FloatRange(0.0, 0.5, min_open=True),
@@ -116,7 +109,7 @@ def accuracy(
     metavar="N",
     help="Ranks to plan for; by default those it runs on.",
 )
-def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: int | None) -> int:
+def plan(written: Written, error: float | None, workers: int | None) -> int:
     """Measure some samples and say what a run costs: settings, core-hours, ranks, wall time.
 
     Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
@@ -127,8 +120,8 @@ def plan(file: Path, overrides: tuple[str, ...], error: float | None, workers: i
         from hpcclear.cli.plan import describe
 
         planned = ranks.size if workers is None else workers
-        scene = scene_of(file, overrides)
+        scene = written.scene()
         made = measure(scene, ranks, ladder(scene, error), planned, say)
-        describe(made, str(file), error, planned)
+        describe(made, str(written.file), error, planned)
 
     return on_ranks(program)

@@ -13,19 +13,8 @@ from hpcclear.scene.points import Points
 def evaluator_of(
     scene: Scene, columns: Points, lanes: int = DEFAULT_LANES
 ) -> Evaluator | SteadyEvaluator:
-    """The steady mean to a named error, or the stretch of revolutions that the scene names.
-
-    Parameters
-    ----------
-    scene : Scene
-    columns : Points
-        Points (perhaps none) whose names and paths all submitted values share.
-    lanes : int, optional
-
-    Raises
-    ------
-    InputError
-        If the scene asks for what the kernel cannot do.
+    """The steady mean to a named error, or the stretch of revolutions that the scene names; arguments and errors are those of
+    either.
     """
     steady = scene.numerics.target_error is not None and scene.clearance_joints()
     return (SteadyEvaluator if steady else Evaluator)(scene, columns, lanes)

@@ -63,39 +63,6 @@ IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 class Problem:
     """Everything that is common to the samples of a run.
 
-    Attributes
-    ----------
-    effects : layout.Effects
-    coordinates : int
-    tableau : Tableau
-    rtol : float
-    atol : tuple of float
-        Absolute tolerances of coordinates, then velocities, SI (2 * coordinates).
-    impact_floor : float
-        Least latched impact speed, m/s.
-    transient, averaged, max_steps : int
-    averaged_cap, objective_tolerance
-        The average goes on until the relative standard error of the objective is below this, or to the cap;
-        a tolerance of 0 averages over `averaged` revolutions.
-    torque_table, load_table : numpy.ndarray, optional
-        Cubic cells of a periodic table, 4 coefficients a cell.
-    implicit : str
-        When lanes take implicit steps, a key of `IMPLICIT_USE`.
-    collocation : bool
-        Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes.
-    cycle : float
-        By how much the driven body turns in a revolution, rad.
-    parameter_rows : int
-        Parameters of a sample.
-    linkage : Linkage, optional
-        Whose motion it is; without one, a slider-crank's by its effects.
-    curves : tuple of numpy.ndarray
-        Cubic cells of a linkage's tables.
-    chosen : tuple of int
-        Places of the joints whose gaps count for f; none for all.
-    from_rest : bool
-        Whether the body that a torque drives may begin at rest.
-
     Raises
     ------
     ValueError
@@ -107,22 +74,35 @@ class Problem:
     tableau: Tableau
     rtol: float
     atol: tuple[float, ...]
+    """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
     impact_floor: float
+    """Least latched impact speed, m/s."""
     transient: int
     averaged: int
     max_steps: int
     averaged_cap: int = 0
     objective_tolerance: float = 0.0
+    """averaged_cap and objective_tolerance: the average goes on until the relative standard error of the objective is below
+    this, or to the cap; a tolerance of 0 averages over `averaged` revolutions."""
     torque_table: Array | None = None
     load_table: Array | None = None
+    """torque_table and load_table: cubic cells of a periodic table, 4 coefficients a cell."""
     implicit: str = "never"
+    """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
     collocation: bool = False
+    """Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes."""
     cycle: float = at.TURN
+    """By how much the driven body turns in a revolution, rad."""
     parameter_rows: int = at.OWN
+    """Parameters of a sample."""
     linkage: Linkage | None = None
+    """Whose motion it is; without one, a slider-crank's by its effects."""
     curves: tuple[Array, ...] = ()
+    """Cubic cells of a linkage's tables."""
     chosen: tuple[int, ...] = ()
+    """Places of the joints whose gaps count for f; none for all."""
     from_rest: bool = False
+    """Whether the body that a torque drives may begin at rest."""
 
     def __post_init__(self) -> None:
         n = self.coordinates
@@ -181,7 +161,8 @@ class Problem:
 
     @property
     def tables(self) -> Array:
-        """The tabulated curves as the kernel reads them, one behind the other; one that is absent is never looked up."""
+        """The tabulated curves as the kernel reads them, one behind the other, shape (curves * 4 * CELLS,); one that is absent
+        is never looked up."""
         curves = self.curves if self.linkage is not None else (self.torque_table, self.load_table)
         tables = np.zeros((len(curves), 4 * at.CELLS))
         for row, curve in zip(tables, curves, strict=True):

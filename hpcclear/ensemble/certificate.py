@@ -73,35 +73,23 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked of a certificate.
-
-    Attributes
-    ----------
-    effects : int
-    tolerance : float
-        Relative change that is allowed.
-    confidence : float
-        Of each change's limits.
-    most : int
-        Replicates of a variant at most.
-    scattered : bool
-        Whether replicates have scatter in them, so that the deviation counts.
-    forces : bool
-        Whether peak forces count.
-    possible : callable
-        Whether such effects can be off together.
-    size : callable
-        How much one evaluation of the motion of a variant is, relative.
-    """
+    """What is asked of a certificate."""
 
     effects: int
     tolerance: float
+    """Relative change that is allowed."""
     confidence: float
+    """Of each change's limits."""
     most: int
+    """Replicates of a variant at most."""
     scattered: bool
+    """Whether replicates have scatter in them, so that the deviation counts."""
     forces: bool
+    """Whether peak forces count."""
     possible: Callable[[Variant], bool]
+    """Whether such effects can be off together."""
     size: Callable[[Variant], float]
+    """How much one evaluation of the motion of a variant is, relative."""
 
 
 class Changes(NamedTuple):
@@ -115,19 +103,12 @@ class Changes(NamedTuple):
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found.
-
-    Attributes
-    ----------
-    variants : tuple of Variant
-        All that were simulated, the whole scene first, in the order of asking.
-    recommended : Variant
-        Effects to leave out; () if none.
-    book : Book
-    """
+    """What was found."""
 
     variants: tuple[Variant, ...]
+    """All that were simulated, the whole scene first, in the order of asking."""
     recommended: Variant
+    """Effects to leave out; () if none."""
     book: "Book"
 
 

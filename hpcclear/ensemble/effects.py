@@ -20,9 +20,9 @@ from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.problem import coordinate_count
 from hpcclear.ensemble.certificate import Certificate, Changes, Plan, Seen, judged
 from hpcclear.ensemble.identity import run_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.session import Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points, saving
-from hpcclear.ensemble.trial import Trial
+from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.names import SECONDS_PER_SAMPLE
@@ -47,11 +47,8 @@ def run_effects(
     scene: Scene,
     output: Path,
     ranks: Ranks,
-    options: Options = DEFAULT_OPTIONS,
-    *,
-    tolerance: float = 0.01,
-    samples: int = SAMPLES,
-    forces: bool = False,
+    options: Options,
+    wanted: Wanted,
 ) -> Finished:
     """Certify on all ranks which effects a scene can do without, and write it; on root.
 
@@ -62,41 +59,28 @@ def run_effects(
         NetCDF file of kind ``effects``.
     ranks : Ranks
     options : Options
-    tolerance : float
-        Relative change that is allowed.
-    samples : int
-        Of each variant at most.
-    forces : bool
-        Whether peak contact forces must stay within the tolerance as well.
+    wanted : Wanted
 
     Raises
     ------
     InputError, StorageError, Stopped, RankFailed
     """
     began = time.perf_counter()
-    check_tolerance(tolerance)
-    place = Place.of_file(output, options.fresh)
     trial = Trial(scene)
-    asked = {"tolerance": repr(tolerance), "samples": str(samples), "forces": str(forces)}
+    plan = trial.plan(wanted)
+    place = Place.of_file(output, options.fresh)
+    asked = {name: str(value) for name, value in wanted._asdict().items()}
     with Session(place, {**run_key(scene, "effects"), **asked}, ranks, options) as session:
         content = session.found("effects")
         times: dict[str, str] | None = None
         if content is None:
             session.describe(scene)
-            content = _certified(trial, trial.plan(tolerance, samples, forces), session)
+            content = _certified(trial, plan, session)
             with ranks.stage("effects: cost"):
                 variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
                 times = {SECONDS_PER_SAMPLE: json.dumps(trial.seconds(variants))}
         session.close(times)
     return session.finished(content, began)
-
-
-def check_tolerance(tolerance: float) -> None:
-    """InputError unless it is one."""
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(
-            "--tolerance", tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
-        )  # fmt: skip
 
 
 def _certified(trial: Trial, plan: Plan, session: Session) -> xr.Dataset:

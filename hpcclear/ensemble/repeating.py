@@ -20,23 +20,15 @@ REPEATED = ("samples", "response")
 
 @dataclass(frozen=True)
 class Repeated:
-    """What came of one file.
-
-    Attributes
-    ----------
-    file : str
-    told : str
-        How much of it was simulated again, or why nothing was.
-    differing : tuple of str
-        Variables that are other ones here, with the largest relative difference.
-    changed : tuple of str
-        Versions and processor of the file that are not those here.
-    """
+    """What came of one file."""
 
     file: str
     told: str
+    """How much of it was simulated again, or why nothing was."""
     differing: tuple[str, ...] = ()
+    """Variables that are other ones here, with the largest relative difference."""
     changed: tuple[str, ...] = ()
+    """Versions and processor of the file that are not those here."""
 
 
 def repeated(place: Path, count: int) -> Iterator[Repeated]:

@@ -32,21 +32,14 @@ from hpcclear.scene.points import Points
 
 @dataclass(frozen=True)
 class Options:
-    """How a run is carried out, which changes no result.
-
-    Attributes
-    ----------
-    fresh : bool
-        Start anew beside an earlier result.
-    interval : float
-        Seconds between two checkpoints.
-    style : str
-        How progress is shown.
-    """
+    """How a run is carried out, which changes no result."""
 
     fresh: bool = False
+    """Start anew beside an earlier result."""
     interval: float = INTERVAL
+    """Seconds between two checkpoints."""
     style: Style = "auto"
+    """How progress is shown."""
 
 
 DEFAULT_OPTIONS = Options()
@@ -54,25 +47,16 @@ DEFAULT_OPTIONS = Options()
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run puts its results, and what belongs to it there.
-
-    Attributes
-    ----------
-    output : Path
-        The file, or the directory, of the results.
-    parts : Path
-        Directory of what is unfinished.
-    timing : Path
-    lock : Path
-    folders : tuple of Path
-        Where a killed run may have left half a file.
-    """
+    """Where a run puts its results, and what belongs to it there."""
 
     output: Path
+    """The file, or the directory, of the results."""
     parts: Path
+    """Directory of what is unfinished."""
     timing: Path
     lock: Path
     folders: tuple[Path, ...]
+    """Where a killed run may have left half a file."""
 
     @classmethod
     def of_file(cls, output: Path, fresh: bool) -> Self:
@@ -123,24 +107,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Finished:
-    """A command's results, for whoever prints them.
-
-    Attributes
-    ----------
-    content : xarray.Dataset
-    output, timing : Path
-        Files of the content and of the times.
-    seconds : float
-        Wall time of the command.
-    spent : ndarray, shape (ranks, 4)
-        Seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`.
-    """
+    """A command's results, for whoever prints them."""
 
     content: xr.Dataset
     output: Path
     timing: Path
+    """output and timing: files of the content and of the times."""
     seconds: float
+    """Wall time of the command."""
     spent: np.ndarray
+    """Shape (ranks, 4): seconds of every rank, columns as in `hpcclear.ranks.schedule.COLUMNS`."""
 
 
 class Session:

@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Records
+from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
@@ -91,6 +92,17 @@ class Drawn:
         return Points(tuple(paths), values, tuple((path,) for path in paths))
 
 
+class Wanted(NamedTuple):
+    """What a certificate has to hold to."""
+
+    tolerance: float
+    """Relative change that is allowed."""
+    samples: int
+    """Of each variant at most."""
+    forces: bool = False
+    """Whether peak contact forces must stay within the tolerance as well."""
+
+
 class Trial:
     """A scene, the effects that it might do without, and how variants of it are simulated.
 
@@ -153,12 +165,22 @@ class Trial:
         assert made is not None
         return made
 
-    def plan(self, tolerance: float, samples: int, forces: bool) -> Plan:
-        """What is asked of the certificate."""
-        most = max(samples // self.drawn.size, 4)
+    def plan(self, wanted: Wanted) -> Plan:
+        """What is asked of the certificate.
+
+        Raises
+        ------
+        InputError
+            The tolerance is none.
+        """
+        if not 0.0 < wanted.tolerance < 1.0:
+            raise InputError(
+                "--tolerance", wanted.tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
+            )  # fmt: skip
+        most = max(wanted.samples // self.drawn.size, 4)
         return Plan(
-            len(self.switches), tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
-            forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
+            len(self.switches), wanted.tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
+            wanted.forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
         )  # fmt: skip
 
     def points(self, asked: Asked) -> Points:
@@ -206,18 +228,14 @@ class Trial:
 
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
         """Follow the certificate to its end; raises what `simulate` does."""
-        asking = certificate(plan)
-        wanted = next(asking)
-        while True:
-            told = [
+
+        def told(wanted: Sequence[Asked]) -> list[Seen]:
+            return [
                 self.seen(one, simulate(self.simulated(one.off), self.points(one)))
                 for one in wanted
             ]
-            try:
-                wanted = asking.send(told)
-            except StopIteration as end:
-                found: Certificate = end.value
-                return found
+
+        return answered(certificate(plan), told)
 
     def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
         """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""

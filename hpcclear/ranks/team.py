@@ -17,6 +17,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
@@ -41,31 +42,21 @@ Maker = Callable[[Any, "Ranks"], Worker]
 
 @dataclass(frozen=True)
 class Task:
-    """What the ranks do in a stage that simulates; it travels to every rank.
-
-    Attributes
-    ----------
-    name : str
-        Of the stage, for reports and timing.
-    make : callable
-        A function of a module: pickle sends its name.
-    payload : object
-        What it makes a worker from, such as a scene's content.
-    dtype : dtype
-        Of the records; has a field ``sample``.
-    workers : int, optional
-        How many ranks get samples, root first; by default all. The others only make their worker.
-    share : callable, optional
-        Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles,
-        and root, which hands them out, simulates nothing.
-    """
+    """What the ranks do in a stage that simulates; it travels to every rank."""
 
     name: str
+    """Of the stage, for reports and timing."""
     make: Maker
+    """A function of a module: pickle sends its name."""
     payload: object
+    """What it makes a worker from, such as a scene's content."""
     dtype: np.dtype = OUTCOME
+    """Of the records; has a field ``sample``."""
     workers: int | None = None
+    """How many ranks get samples, root first; by default all. The others only make their worker."""
     share: Callable[[Any], Sharing] | None = None
+    """Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles, and
+    root, which hands them out, simulates nothing."""
 
 
 class Ranks:
@@ -90,7 +81,7 @@ class Ranks:
         self._stage = "start"
         self._desk: Desk | None = None
         self._unsent: list[np.ndarray] = []
-        self._write = 0.0  # seconds of output not booked yet
+        self._writing = Stopwatch()  # output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
         self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (see `Desk`)
@@ -144,14 +135,9 @@ class Ranks:
         with self._timed(name, serial=True):
             yield
 
-    @contextlib.contextmanager
-    def writing(self) -> Iterator[None]:
+    def writing(self) -> contextlib.AbstractContextManager[None]:
         """Count root's time inside as output of the stage under way."""
-        started = time.perf_counter()
-        try:
-            yield
-        finally:
-            self._write += time.perf_counter() - started
+        return self._writing.running()
 
     def run_points(
         self,
@@ -257,20 +243,21 @@ class Ranks:
     def _timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
         """Book the wall time inside, less what is booked inside; yields the table to fill."""
         spent = np.zeros((self.size, len(COLUMNS)))
-        (outer, self._stage), (write, self._write) = (self._stage, name), (self._write, 0.0)
+        outer, self._stage = self._stage, name
+        writing, self._writing = self._writing, Stopwatch()
         started, booked = time.perf_counter(), self._booked
         try:
             yield spent
             self._stage = outer  # not after an error: its report names the stage
         finally:
             wall = time.perf_counter() - started - (self._booked - booked)
-            spent[0, COLUMNS.index("write")] = self._write
+            spent[0, COLUMNS.index("write")] = self._writing.seconds
             if serial:
-                spent[0, COLUMNS.index("busy")] = wall - self._write
+                spent[0, COLUMNS.index("busy")] = wall - self._writing.seconds
             spent[:, COLUMNS.index("idle")] = np.maximum(wall - spent.sum(axis=1), 0.0)
             self.stage_seconds[name] = self.stage_seconds.get(name, 0.0) + spent
             self._booked += wall
-            self._write = write
+            self._writing = writing
 
     def heed(self, message: Message) -> None:
         """Act on what a rank may say at any time."""

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME
+from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
 
 INTERVAL = 5.0
@@ -154,8 +155,6 @@ class Checkpoint:
 
     Attributes
     ----------
-    seconds : float
-        Time spent in this class.
     problems : list of str
         What was found on disk and could not be used, a sentence each.
 
@@ -186,14 +185,19 @@ class Checkpoint:
         self.units = dict(units or {})
         self.joints = tuple(joints)
         self.attributes = {**(attributes or {}), **key_attribute(key)}
-        self.seconds = 0.0
+        self._watch = Stopwatch()
         self.problems: list[str] = []
         self._clock = clock
         self._parts: list[_Part] = []
         self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
-        with self._timed(), self._refusing():
+        with self._watch.running(), self._refusing():
             self._number = self._open()
         self._written = clock()
+
+    @property
+    def seconds(self) -> float:
+        """Time spent in this class."""
+        return self._watch.seconds
 
     # -- samples --------------------------------------------------------------------------------
 
@@ -223,7 +227,7 @@ class Checkpoint:
         if not self._buffer:
             self._written = self._clock()
             return
-        with self._timed():
+        with self._watch.running():
             records = np.concatenate([records for records, _ in self._buffer])
             values = np.concatenate([values for _, values in self._buffer])
             self._write_part(0, records, values)
@@ -303,7 +307,7 @@ class Checkpoint:
         data : mapping of str to array
             Real numbers, whole numbers, truth values or text, of any shape.
         """
-        with self._timed():
+        with self._watch.running():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}
             content = xr.Dataset(variables, attrs={**self.attributes, "stage": name})
             netcdf.save(content, self._stage_path(name))
@@ -316,7 +320,7 @@ class Checkpoint:
         InputError
             The file is another run's.
         """
-        with self._timed():
+        with self._watch.running():
             path = self._stage_path(name)
             if not path.exists():
                 return None
@@ -342,7 +346,7 @@ class Checkpoint:
 
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
-        with self._timed():
+        with self._watch.running():
             netcdf.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
@@ -386,14 +390,6 @@ class Checkpoint:
             yield
         except OSError as error:
             raise files.refused(self.directory, error) from None
-
-    @contextmanager
-    def _timed(self) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds += time.perf_counter() - start
 
 
 def _join(

@@ -1,5 +1,6 @@
 """The one table of what stands in every result file: kinds, names, dimensions, units, meanings."""
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -40,46 +41,41 @@ SECONDS_PER_SAMPLE = "seconds_per_sample"
 ALL_ON = "all on"
 """Name of the whole scene there."""
 
-_NO_YES = np.array([0, 1], np.int8)
+
+def _meanings(*words: str) -> dict[str, object]:
+    """Codes from 0 on, and what they mean."""
+    values = np.arange(len(words), dtype=np.int8)
+    return {"flag_values": values, "flag_meanings": " ".join(words)}
+
+
+def _members(codes: type[IntEnum], entry: str = "flag_values") -> dict[str, object]:
+    """Codes of an enumeration, and what they mean."""
+    return {
+        entry: np.array([int(code) for code in codes], np.int8),
+        "flag_meanings": " ".join(code.name.lower() for code in codes),
+    }
+
 
 FURTHER: dict[str, dict[str, object]] = {
-    "status": {
-        "flag_values": np.array([int(status) for status in Status], np.int8),
-        "flag_meanings": " ".join(status.name.lower() for status in Status),
-    },
-    "ending": {
-        "flag_values": np.array([int(status) for status in Status], np.int8),
-        "flag_meanings": " ".join(status.name.lower() for status in Status),
-    },
-    "outcome": {
-        "flag_values": np.array([int(status) for status in Status], np.int8),
-        "flag_meanings": " ".join(status.name.lower() for status in Status),
-    },
-    "flags": {
-        "flag_masks": np.array([int(flag) for flag in Flag], np.int8),
-        "flag_meanings": " ".join(flag.name.lower() for flag in Flag),
-    },
-    "regime": {
-        "flag_values": np.array([int(regime) for regime in Regime], np.int8),
-        "flag_meanings": " ".join(regime.name.lower() for regime in Regime),
-    },
-    "latched": {"flag_values": _NO_YES, "flag_meanings": "free latched"},
-    "converged": {"flag_values": _NO_YES, "flag_meanings": "not_determined determined"},
-    "selected": {"flag_values": _NO_YES, "flag_meanings": "left_out selected"},
-    "used": {"flag_values": _NO_YES, "flag_meanings": "not_an_input input"},
-    "surface_accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
-    "accepted": {"flag_values": _NO_YES, "flag_meanings": "refused accepted"},
-    "verified": {"flag_values": _NO_YES, "flag_meanings": "not_simulated simulated"},
-    "off": {"flag_values": _NO_YES, "flag_meanings": "on off"},
-    "told": {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": "within beyond untold"},
-    "decision": {
-        "flag_values": np.arange(3, dtype=np.int8),
-        "flag_meanings": "within beyond untold",
-    },
-    "judged": {"flag_values": _NO_YES, "flag_meanings": "told judged"},
-    "recommended": {"flag_values": _NO_YES, "flag_meanings": "not_recommended recommended"},
-    "chosen": {"flag_values": _NO_YES, "flag_meanings": "not_chosen chosen"},
-    "dominated": {"flag_values": _NO_YES, "flag_meanings": "not_surely dominated"},
+    "status": _members(Status),
+    "ending": _members(Status),
+    "outcome": _members(Status),
+    "flags": _members(Flag, "flag_masks"),
+    "regime": _members(Regime),
+    "latched": _meanings("free", "latched"),
+    "converged": _meanings("not_determined", "determined"),
+    "selected": _meanings("left_out", "selected"),
+    "used": _meanings("not_an_input", "input"),
+    "surface_accepted": _meanings("refused", "accepted"),
+    "accepted": _meanings("refused", "accepted"),
+    "verified": _meanings("not_simulated", "simulated"),
+    "off": _meanings("on", "off"),
+    "told": _meanings("within", "beyond", "untold"),
+    "decision": _meanings("within", "beyond", "untold"),
+    "judged": _meanings("told", "judged"),
+    "recommended": _meanings("not_recommended", "recommended"),
+    "chosen": _meanings("not_chosen", "chosen"),
+    "dominated": _meanings("not_surely", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
 

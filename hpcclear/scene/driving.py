@@ -4,7 +4,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from hpcclear.scene.fields import Count, Curve, CurveOf, MotionTable, Quantity, Table, invalid
+from hpcclear.scene.fields import (
+    Count,
+    Curve,
+    CurveOf,
+    MotionTable,
+    Quantity,
+    Table,
+    check_one_of,
+    invalid,
+)
 from hpcclear.scene.places import Angle, PairTable
 
 
@@ -136,13 +145,8 @@ class ForceLoad(Table):
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "ForceLoad":
-        if (self.force is None) == (self.size is None):
-            raise invalid(
-                "is given twice, or not at all",
-                "Write force = [x, y], or size and direction",
-                key="force",
-                value=None if self.force is None else [self.force.x, self.force.y],
-            )
+        force = None if self.force is None else [self.force.x, self.force.y]
+        check_one_of("force", force, self.size, "Write force = [x, y], or size and direction")
         return self
 
 

@@ -35,6 +35,12 @@ def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> Pyd
     )
 
 
+def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
+    """An error for validators unless just one of the two is given; `key` is that of `value`."""
+    if (value is None) == (other is None):
+        raise invalid("is given twice, or not at all", remedy, key=key, value=value)
+
+
 def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
     close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)

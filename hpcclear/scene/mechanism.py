@@ -136,16 +136,18 @@ class Material(Table):
     """Poisson's ratio."""
 
 
-def check_journal(clearance: float, bearing_radius: float) -> None:
-    """An error for validators unless a journal is left, m."""
-    if clearance >= bearing_radius:
+def check_journal(joint: Any) -> None:
+    """An error for validators unless a journal is left in a joint with clearance, and its film and waves fit the play."""
+    clearance, radius = joint.clearance, joint.bearing_radius
+    if clearance >= radius:
         raise invalid(
-            "the clearance must be smaller than the bearing radius "
-            f"({bearing_radius:g} m), or no journal is left",
+            f"the clearance must be smaller than the bearing radius ({radius:g} m), or no journal is left",
             "Write the radial clearance R_B - R_J",
             key="clearance",
             value=clearance,
         )
+    check_film(joint.film, clearance, radius)
+    check_waves(joint.out_of_round, clearance, joint.film)
 
 
 class ClearanceJoint(Table):
@@ -174,9 +176,7 @@ class ClearanceJoint(Table):
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
-        check_journal(self.clearance, self.bearing_radius)
-        check_film(self.film, self.clearance, self.bearing_radius)
-        check_waves(self.out_of_round, self.clearance, self.film)
+        check_journal(self)
         return self
 
 

@@ -20,10 +20,10 @@ from hpcclear.scene.fields import (
     invalid,
     nearest,
 )
-from hpcclear.scene.film import Film, check_film
+from hpcclear.scene.film import Film
 from hpcclear.scene.mechanism import Material, check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
-from hpcclear.scene.roundness import OutOfRound, check_waves
+from hpcclear.scene.roundness import OutOfRound
 from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
@@ -62,20 +62,14 @@ class PlanarBody(Table):
     @model_validator(mode="after")
     def _bar_or_points(self) -> "PlanarBody":
         if self.length is None:
-            if self.mass_center is not None:
-                raise invalid(
-                    "is measured along a bar, and this body has no length",
-                    "Give its length, or write center = [x, y]",
-                    key="mass_center",
-                    value=self.mass_center,
-                )
-            if self.inertia_ratio is not None:
-                raise invalid(
-                    "is over that of a slender bar, and this body has no length",
-                    "Give its length, or write inertia",
-                    key="inertia_ratio",
-                    value=self.inertia_ratio,
-                )
+            for key, meaning, instead in (
+                ("mass_center", "is measured along a bar", "center = [x, y]"),
+                ("inertia_ratio", "is over that of a slender bar", "inertia"),
+            ):
+                if (value := getattr(self, key)) is not None:
+                    reason = f"{meaning}, and this body has no length"
+                    remedy = f"Give its length, or write {instead}"
+                    raise invalid(reason, remedy, key=key, value=value)
             return self
         if self.inertia_ratio is not None and self.inertia:
             raise invalid(
@@ -151,9 +145,7 @@ class PlanarClearance(Table):
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":
-        check_journal(self.clearance, self.bearing_radius)
-        check_film(self.film, self.clearance, self.bearing_radius)
-        check_waves(self.out_of_round, self.clearance, self.film)
+        check_journal(self)
         return self
 
 

@@ -15,21 +15,14 @@ from hpcclear.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Points:
-    """Designs to simulate, in SI.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Column names, length d.
-    values : ndarray of float, shape (n, d)
-        Read-only, in the SI unit of each column.
-    paths : tuple of tuple of str
-        Scene entries that each column drives.
-    """
+    """Designs to simulate, in SI."""
 
     names: tuple[str, ...]
+    """Column names, length d."""
     values: Array
+    """Shape (n, d): read-only, in the SI unit of each column."""
     paths: tuple[tuple[str, ...], ...]
+    """Scene entries that each column drives."""
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64)

@@ -16,24 +16,16 @@ from hpcclear.scene.validation import validated
 
 @dataclass(frozen=True)
 class Switch:
-    """An effect that is on and may be switched off.
-
-    Attributes
-    ----------
-    name : str
-        What it is, in words.
-    changes : mapping of dotted path to value
-        What switches it off: entries to replace; None removes one.
-    moved : mapping of dotted path to dotted path
-        Numbers that stand elsewhere with the effect off.
-    joint : str, optional
-        The joint whose play it is.
-    """
+    """An effect that is on and may be switched off."""
 
     name: str
+    """What it is, in words."""
     changes: Mapping[str, Any]
+    """What switches it off: entries to replace; None removes one."""
     moved: Mapping[str, str] = field(default_factory=dict)
+    """Numbers that stand elsewhere with the effect off."""
     joint: str | None = None
+    """The joint whose play it is."""
 
     def path(self, path: str) -> str | None:
         """Where a number of the scene stands with the effect off; None if nowhere."""

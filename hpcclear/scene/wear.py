@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, check_one_of, invalid
 
 
 class WornSurface(Table):
@@ -19,13 +19,10 @@ class WornSurface(Table):
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "WornSurface":
-        if (self.coefficient is None) == (self.dimensionless is None):
-            raise invalid(
-                "is given twice, or not at all",
-                "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
-                key="coefficient",
-                value=self.coefficient,
-            )
+        check_one_of(
+            "coefficient", self.coefficient, self.dimensionless,
+            "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
+        )  # fmt: skip
         if (self.dimensionless is None) != (self.hardness is None):
             raise invalid(
                 "a dimensionless coefficient goes with a hardness, a coefficient in m2/N without",

@@ -51,28 +51,18 @@ MOMENTS = ("mean", "deviation")
 
 @dataclass(frozen=True)
 class Budget:
-    """An accuracy shared out.
-
-    Attributes
-    ----------
-    split : Split
-    found : Evidence
-    labels : list of str
-        Of the pilot's designs.
-    pilot : float
-        Evaluations of the equations of motion that it took, and pairs on alpha and beta.
-    searched : float
-        Tolerance of the search; that of the split is verification's.
-    ends : array, shape (2,)
-        What the tolerance was found to take of alpha and beta, at worst; NaN before they are known.
-    """
+    """An accuracy shared out."""
 
     split: Split
     found: Evidence
     labels: list[str]
+    """Of the pilot's designs."""
     pilot: float
+    """Evaluations of the equations of motion that it took, and pairs on alpha and beta."""
     searched: float
+    """Tolerance of the search; that of the split is verification's."""
     ends: Array = field(default_factory=lambda: np.full(2, np.nan))
+    """Shape (2,): what the tolerance was found to take of alpha and beta, at worst; NaN before they are known."""
 
     @property
     def tolerance_share(self) -> Array:

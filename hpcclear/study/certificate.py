@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Records
 from hpcclear.ensemble.effects import effects_dataset
 from hpcclear.ensemble.simulate import sample_points
-from hpcclear.ensemble.trial import Trial
+from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.report.figures.effects import statements
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
@@ -38,7 +38,7 @@ def certify(run: StudyRun) -> None:
 
     run.announce("effects")
     with run.ranks.stage("effects"):
-        found = trial.certify(trial.plan(asked.tolerance, samples, asked.forces), simulate)
+        found = trial.certify(trial.plan(Wanted(asked.tolerance, samples, asked.forces)), simulate)
     content = effects_dataset(trial, found, {})
     run.write(content, "effects.nc")
     with run.ranks.stage("effects: cost"):

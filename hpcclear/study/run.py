@@ -22,32 +22,20 @@ Result = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class StudyRun:
-    """What every stage needs.
-
-    Attributes
-    ----------
-    scene : Scene
-    directory : Path
-        Where results go.
-    ranks : Ranks
-    checkpoint : Checkpoint
-    simulations : Simulations
-    tell : callable
-        Gets what the user should know, a sentence at a time.
-    announce : callable
-        Gets the name of each stage when it begins.
-    times : dict of str to str
-        What stages measured of time, for the file of times: no result has time in it.
-    """
+    """What every stage needs."""
 
     scene: Scene
     directory: Path
+    """Where results go."""
     ranks: Ranks
     checkpoint: Checkpoint
     simulations: Simulations
     tell: Callable[[str], object]
+    """Gets what the user should know, a sentence at a time."""
     announce: Callable[[str], object] = lambda name: None
+    """Gets the name of each stage when it begins."""
     times: dict[str, str] = field(default_factory=dict)
+    """What stages measured of time, for the file of times: no result has time in it."""
 
     @property
     def study(self) -> Study:

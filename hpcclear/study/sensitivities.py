@@ -1,6 +1,7 @@
 """Response surfaces, first-order sensitivities against clearance, and global indices."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -9,17 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box
 from hpcclear.scene.study import Study
-from hpcclear.statistics.sensitivity import (
-    IntervalDesign,
-    IntervalSettings,
-    analyse_intervals,
-    analyse_sobol,
-    best_estimates,
-    convergence_intervals,
-    design_intervals,
-    select_influential,
-    sobol_design,
-)
+from hpcclear.statistics import sensitivity
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
 from hpcclear.statistics.surrogate.surface_search import (
@@ -32,6 +23,14 @@ from hpcclear.study.run import Result, StudyRun
 
 STAGE = "sensitivity"
 _NORMAL_95 = 1.959963984540054
+
+
+class Sampled(NamedTuple):
+    """A surface that was simulated: its inputs, its design, and the objective there, (n,)."""
+
+    inputs: tuple[str, ...]
+    design: sensitivity.IntervalDesign
+    values: Array
 
 
 def surfaces(study: Study) -> tuple[tuple[str, ...], ...]:
@@ -75,8 +74,9 @@ def analyse(run: StudyRun) -> Result:
     if len(sobol):
         batches.append(run.simulations.designs(run.study.names, sobol).values)
     parts = _simulated(run, batches)
-    result = _first_order(run, inputs, designs, parts)
-    result |= _accepted(run, inputs, designs, parts)
+    made = [Sampled(*one) for one in zip(inputs, designs, parts[: len(designs)], strict=True)]
+    result = _first_order(run, made)
+    result |= _accepted(run, made)
     result |= _global(run, parts[-1] if len(sobol) else None)
     result["failed"] = np.asarray(sum(np.count_nonzero(np.isnan(part)) for part in parts))
     return result
@@ -108,23 +108,23 @@ def write(run: StudyRun, result: Result) -> None:
     run.write(content, "sensitivity.nc")
 
 
-def _designs(run: StudyRun) -> list[IntervalDesign]:
+def _designs(run: StudyRun) -> list[sensitivity.IntervalDesign]:
     settings = run.study.sensitivity
     lower, upper = run.study.variable(parameter(run)).bounds
     clearances = np.linspace(lower, upper, settings.levels)
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
+        found.append(sensitivity.design_intervals(_bounds(run, names), clearances, rng, laid_out))
     return found
 
 
-def _layouts(study: Study) -> list[IntervalSettings]:
+def _layouts(study: Study) -> list[sensitivity.IntervalSettings]:
     """How many points each surface gets."""
     settings = study.sensitivity
     separate = [False] * len(study.groups)
     return [
-        IntervalSettings(
+        sensitivity.IntervalSettings(
             steps=settings.rounds,
             shrink=settings.shrink,
             n_points=settings.together_samples if together else settings.samples,
@@ -144,14 +144,9 @@ def _columns(run: StudyRun, names: Sequence[str]) -> list[int]:
     return [run.study.names.index(name) for name in names]
 
 
-def _first_order(
-    run: StudyRun,
-    inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
-    values: Sequence[Array],
-) -> Result:
+def _first_order(run: StudyRun, made: Sequence[Sampled]) -> Result:
     settings = run.study.sensitivity
-    shape = (len(inputs), settings.rounds, settings.levels)
+    shape = (len(made), settings.rounds, settings.levels)
     every = (*shape, len(run.study.names))
     of_clearance = (every[0], *every[2:])
     result = {name: np.full(every, np.nan) for name in ("sensitivity", "standard_error")}
@@ -160,10 +155,10 @@ def _first_order(
     for name in ("convergence_interval", "plateau_interval", "best_sensitivity", "uncertainty"):
         result[name] = np.full(of_clearance, np.nan)
     fractions = (1.0 - settings.shrink) ** np.arange(settings.rounds)
-    for k, names in enumerate(inputs):
-        history = analyse_intervals(designs[k], values[k])
-        found = convergence_intervals(history)
-        slope, uncertainty = best_estimates(history, found)
+    for k, (names, design, values) in enumerate(made):
+        history = sensitivity.analyse_intervals(design, values)
+        found = sensitivity.convergence_intervals(history)
+        slope, uncertainty = sensitivity.best_estimates(history, found)
         at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
         result["sensitivity"][k][..., at] = history.sensitivity * span
         result["standard_error"][k][..., at] = history.standard_error * span
@@ -177,18 +172,19 @@ def _first_order(
             result[name][k][:, at] = np.where(index >= 0, fractions[index], np.nan)
         result["best_sensitivity"][k][:, at] = slope * span
         result["uncertainty"][k][:, at] = uncertainty * span
-    result |= _ranked(run, inputs, result) | _levels(designs[-1], values[len(designs) - 1])
-    return result | {"interval": fractions, "clearance": designs[0].clearances}
+    result |= _ranked(run, [one.inputs for one in made], result) | _levels(made[-1])
+    return result | {"interval": fractions, "clearance": made[0].design.clearances}
 
 
-def _levels(design: IntervalDesign, values: Array) -> Result:
+def _levels(last: Sampled) -> Result:
     """Mean objective over the box of the last surface at each clearance, and its standard error.
 
     The mean of a Latin hypercube has only the scatter that is left after all that is additive in
     the inputs (Stein 1987, doi:10.1080/00401706.1987.10488205); a linear fit takes most of it.
     """
+    design = last.design
     shape = len(design.intervals), len(design.clearances), -1
-    whole, cut = values.reshape(shape)[0], design.settings.n_points
+    whole, cut = last.values.reshape(shape)[0], design.settings.n_points
     points = design.points[:, :-1].reshape(*shape, design.points.shape[1] - 1)[0]
     found = np.full((2, len(whole)), np.nan)
     for level, (at, outcomes) in enumerate(zip(points[:, :cut], whole[:, :cut], strict=True)):
@@ -210,7 +206,7 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     error = np.stack(
         [result["uncertainty"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
     )
-    chosen = select_influential(
+    chosen = sensitivity.select_influential(
         names, slope, error, np.ones(len(names)), fraction=run.study.sensitivity.influence
     )
     influence = np.full(len(run.study.names), np.nan)
@@ -222,27 +218,19 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     return {"influence": influence, "selected": selected}
 
 
-def _accepted(
-    run: StudyRun,
-    inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
-    values: Sequence[Array],
-) -> Result:
+def _accepted(run: StudyRun, sampled: Sequence[Sampled]) -> Result:
     """The surface over each global interval; a refused one gets more points or another order."""
-    shape = (len(inputs), run.study.sensitivity.levels)
+    shape = (len(sampled), run.study.sensitivity.levels)
     result: Result = {
         name: np.full(shape, np.nan)
         for name in ("surface_r2", "surface_rmae", "surface_r2_explained", "surface_rmae_mean")
     }
     result |= {name: np.zeros(shape, np.int64) for name in ("surface_order", "surface_points")}
     result["surface_accepted"] = np.zeros(shape, np.int8)
-    made = {
-        (k, c): _surface(run, len(inputs[k]), designs[k], values[k], c)
-        for k, c in np.ndindex(*shape)
-    }
+    made = {(k, c): _surface(run, sampled[k], c) for k, c in np.ndindex(*shape)}
     if run.study.sensitivity.resamplings > 0:
         refused = [place for place, one in made.items() if not one[3]]
-        for place, one in zip(refused, _searched(run, inputs, designs, refused), strict=True):
+        for place, one in zip(refused, _searched(run, sampled, refused), strict=True):
             made[place] = one.accuracy, one.surface.order, one.surface.n_points, one.accepted
     for (k, c), (reached, order, count, accepted) in made.items():
         if reached is not None:
@@ -254,10 +242,9 @@ def _accepted(
     return result
 
 
-def _surface(
-    run: StudyRun, variables: int, design: IntervalDesign, values: Array, level: int
-) -> tuple[Accuracy | None, int, int, bool]:
-    """Accuracy, order and points of a surface of so many variables, and whether it was accepted."""
+def _surface(run: StudyRun, sampled: Sampled, level: int) -> tuple[Accuracy | None, int, int, bool]:
+    """Accuracy, order and points of a surface at a level, and whether it was accepted."""
+    inputs, design, values = sampled
     settings, laid_out = run.study.sensitivity, design.settings
     size = laid_out.n_points + laid_out.n_test
     rows = slice(level * size, (level + 1) * size)
@@ -265,7 +252,7 @@ def _surface(
     bounds, cut = design.intervals[0], laid_out.n_points
     finite = np.isfinite(outcomes)
     reached, count = None, int(finite[:cut].sum())
-    if count >= n_terms(variables, laid_out.order) and finite[cut:].sum() >= 2:
+    if count >= n_terms(len(inputs), laid_out.order) and finite[cut:].sum() >= 2:
         surface = fit_response_surface(points[:cut], outcomes[:cut], bounds, laid_out.order)
         reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
         if reached.meets(settings.r2, settings.rmae):
@@ -274,16 +261,14 @@ def _surface(
 
 
 def _searched(
-    run: StudyRun,
-    inputs: Sequence[Sequence[str]],
-    designs: Sequence[IntervalDesign],
-    places: Sequence[tuple[int, int]],
+    run: StudyRun, sampled: Sequence[Sampled], places: Sequence[tuple[int, int]]
 ) -> list[SurfaceSearch]:
     """More points or another order for the surfaces at these places, (surface, level), all in the same batches."""
     settings = run.study.sensitivity
     searches = []
     for k, level in places:
-        laid_out = designs[k].settings
+        design = sampled[k].design
+        laid_out = design.settings
         tried = SearchSettings(
             orders=(laid_out.order, laid_out.order + 1, max(laid_out.order - 1, 1)),
             n_points=2 * laid_out.n_points,
@@ -292,15 +277,16 @@ def _searched(
             r2_min=settings.r2,
             rmae_max=settings.rmae,
         )
-        rng = run.rng("surface", " ".join(inputs[k]), str(level))
-        searches.append(search(designs[k].intervals[0], rng, tried))
+        rng = run.rng("surface", " ".join(sampled[k].inputs), str(level))
+        searches.append(search(design.intervals[0], rng, tried))
 
     def evaluate(asked: Mapping[int, Array]) -> dict[int, Array]:
         batches = []
         for number, at in asked.items():
             k, level = places[number]
-            where = np.column_stack([at, np.full(len(at), designs[k].clearances[level])])
-            batches.append(run.simulations.designs((*inputs[k], parameter(run)), where).values)
+            inputs, design, _ = sampled[k]
+            where = np.column_stack([at, np.full(len(at), design.clearances[level])])
+            batches.append(run.simulations.designs((*inputs, parameter(run)), where).values)
         return dict(zip(asked, _simulated(run, batches), strict=True))
 
     return fit_until_accepted(evaluate, searches)
@@ -310,7 +296,7 @@ def _sobol_points(run: StudyRun) -> Array:
     rows = _sobol_rows(run.study)
     if rows == 0:
         return np.empty((0, len(run.study.names)))
-    return sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
+    return sensitivity.sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
 
 
 def _sobol_rows(study: Study) -> int:
@@ -326,7 +312,7 @@ def _global(run: StudyRun, values: Array | None) -> Result:
         nothing = np.full(count, np.nan)
         names = ("sobol_first", "sobol_total", "sobol_first_error", "sobol_total_error")
         return dict.fromkeys(names, nothing)
-    found = analyse_sobol(values, count, run.rng("sobol bootstrap"))
+    found = sensitivity.analyse_sobol(values, count, run.rng("sobol bootstrap"))
     return {
         "sobol_first": found.first,
         "sobol_total": found.total,

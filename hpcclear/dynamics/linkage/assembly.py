@@ -21,22 +21,15 @@ SINGULAR = 1e-9  # smallest singular value, of rows scaled to 1, from which a po
 
 @dataclass(frozen=True)
 class Assembly:
-    """A mechanism put together.
-
-    Attributes
-    ----------
-    loops : Loops
-        Its coordinates are those of `q` and `v`.
-    q, v : ndarray, shape (n,)
-        Mass centres and angles of the bodies at the start, and their velocities, SI.
-    steps : int
-        Newton steps it took.
-    """
+    """A mechanism put together."""
 
     loops: Loops
+    """Its coordinates are those of `q` and `v`."""
     q: Array
     v: Array
+    """q and v, shape (n,): mass centres and angles of the bodies at the start, and their velocities, SI."""
     steps: int
+    """Newton steps it took."""
 
     def angle(self, body: str) -> float:
         """Angle of a body at the start, rad."""

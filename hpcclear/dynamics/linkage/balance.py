@@ -7,17 +7,7 @@ of coordinates are solved; those of prescribed angles and guides give moments an
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.expression import (
-    NOWHERE,
-    ONE,
-    ZERO,
-    Term,
-    Vector,
-    Writer,
-    across,
-    named,
-    plus,
-)
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Column, Kinematics, Move, Point
 from hpcclear.dynamics.linkage.parts import GROUND, Body, split
 from hpcclear.dynamics.linkage.trees import Forest
@@ -70,7 +60,7 @@ class Balance:
         arm = self.kinematics.arm(body.name, own, CENTER)
         names = (f"{body.name}_moment_{axis}" for axis in ("x", "y"))
         x, y = (self.writer.parameter(n) if a else ZERO for n, a in zip(names, arm, strict=True))
-        return x, y
+        return Vector(x, y)
 
     def mass(self, first: Column, second: Column) -> Term:
         """Entry of the mass matrix."""
@@ -100,7 +90,7 @@ class Balance:
     def moved_by(self, body: str) -> dict[Column, Held]:
         """Derivatives of a bent bar's first moment (`bending`) by all that changes it."""
         bend, frame = self.kinematics.bends[body], self.forest.frames[body]
-        found = {Column("angle", frame): (frame, across(bend.moved()))}
+        found = {Column("angle", frame): (frame, bend.moved().across())}
         modes = zip(bend.kinds, bend.modes, strict=True)
         return found | {Column(kind, body): (frame, bend.moved_by(k)) for kind, k in modes}
 
@@ -127,16 +117,16 @@ class Balance:
                 one, two = two, one
             (late, a), (early, b) = one, two
             if early == GROUND and late != GROUND:
-                held = (mass * a[0], mass * a[1])
-                moments[late, b] = plus(moments.get((late, b), NOWHERE), held)
+                held = Vector(mass * a.x, mass * a.y)
+                moments[late, b] = moments.get((late, b), NOWHERE) + held
                 continue
             key = (early, late)
-            dots[key] = dots.get(key, ZERO) + mass * a[0] * b[0] + mass * a[1] * b[1]
-            areas[key] = areas.get(key, ZERO) + (mass * a[1] * b[0] - mass * a[0] * b[1])
+            dots[key] = dots.get(key, ZERO) + mass * a.x * b.x + mass * a.y * b.y
+            areas[key] = areas.get(key, ZERO) + (mass * a.y * b.x - mass * a.x * b.y)
         total = ZERO
         for (frame, along), moment in moments.items():
             x, y = self.kinematics.rotated(frame, moment)
-            total = total + _times(x, rates) * along[0] + _times(y, rates) * along[1]
+            total = total + _times(x, rates) * along.x + _times(y, rates) * along.y
         for (early, late), dot in dots.items():
             if early == late:
                 total = total + _times(dot, rates)
@@ -208,19 +198,19 @@ class Balance:
                 continue
             if self.forest.on_ground(body.name):
                 if column == ("angle", body.name):
-                    x, y = self.moment_of(body)
-                    held[body.name] = plus(held.get(body.name, NOWHERE), (-y, x))
+                    turned = self.moment_of(body).across()
+                    held[body.name] = held.get(body.name, NOWHERE) + turned
                 continue
             columns = self.kinematics.columns(self.kinematics.center(body.name))
             if column in columns:
                 frame, (ax, ay) = columns[column]
                 mass = self.mass_of(body)
-                held[frame] = plus(held.get(frame, NOWHERE), (mass * ax, mass * ay))
+                held[frame] = held.get(frame, NOWHERE) + Vector(mass * ax, mass * ay)
             if body.name in self.kinematics.bends:
                 frame, moved = self.moved_by(body.name).get(column, (GROUND, NOWHERE))
-                held[frame] = plus(held.get(frame, NOWHERE), moved)
+                held[frame] = held.get(frame, NOWHERE) + moved
         for frame, moment in held.items():
-            whole = whole + self.kinematics.projected((frame, moment), 1)
+            whole = whole + self.kinematics.raised(frame, moment)
         return -(whole * self.writer.parameter("gravity"))
 
     def _turning(self, column: Column) -> Term:
@@ -264,7 +254,7 @@ class Balance:
             mine = columns[column]
             yield (spin, spin), (ONE, mine, (frame, bend.moved()))
             yield (named("2.0"), spin), (-ONE, mine, (frame, bend.moving()))
-            yield (), (-ONE, mine, (frame, (bend.gathering(), ZERO)))
+            yield (), (-ONE, mine, (frame, Vector(bend.gathering(), ZERO)))
         if column in own:
             for other, arm in point.arms.items():
                 if other != GROUND:
@@ -280,7 +270,7 @@ class Balance:
             if move.turns_along:
                 speed = named(self.kinematics.speed_name((move.kind, move.body, "")))
                 rates = (named("2.0"), speed, self.kinematics.spin(move.frame))
-                found.append((rates, (move.frame, across(move.direction))))
+                found.append((rates, (move.frame, move.direction.across())))
                 if any(move.changing):
                     found.append(((speed, speed), (move.frame, move.changing)))
         return found

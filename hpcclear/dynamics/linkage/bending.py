@@ -122,18 +122,20 @@ class Bend:
         for mode, amplitude in zip(self.modes, self.q, strict=True):
             across = across + self.lateral(mode) * amplitude
         along = -(_HALF * self._dotted("axial", self.q))
-        return self._let("along", along), self._let("across", across)
+        return Vector(self._let("along", along), self._let("across", across))
 
     def moved_by(self, mode: int) -> Vector:
         """Derivative of D by an amplitude."""
-        return -self._times("axial", mode), self.lateral(mode)
+        return Vector(-self._times("axial", mode), self.lateral(mode))
 
     def moving(self) -> Vector:
         """Rate of D while the bar does not turn."""
         across = ZERO
         for mode, speed in zip(self.modes, self.v, strict=True):
             across = across + self.lateral(mode) * speed
-        return self._let("vacross", -across), self._let("valong", -self._dotted("axial", self.v))
+        return Vector(
+            self._let("vacross", -across), self._let("valong", -self._dotted("axial", self.v))
+        )
 
     def gathering(self) -> Term:
         """Second derivative of D along the bar while no amplitude accelerates."""

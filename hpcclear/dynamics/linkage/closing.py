@@ -7,17 +7,7 @@ what c'' has to be besides them.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from hpcclear.dynamics.linkage.expression import (
-    NOWHERE,
-    ONE,
-    ZERO,
-    Term,
-    Vector,
-    Writer,
-    minus,
-    named,
-    plus,
-)
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
@@ -83,47 +73,45 @@ class Closing:
     def _pin(self, joint: Revolute) -> list[Row]:
         kin = self.kinematics
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
-        error = minus(kin.position(journal), kin.position(bearing))
+        error = kin.position(journal) - kin.position(bearing)
         rate = self.rate(*joint.places)
-        rest = minus(self.unforced(journal), self.unforced(bearing))
+        rest = self.unforced(journal) - self.unforced(bearing)
         columns = self.between(*joint.places)
         return [
             self._row(
-                f"{joint.name}_{'xy'[axis]}", {c: v[axis] for c, v in columns.items()}, rest[axis],
-                rate[axis], error[axis],
+                f"{joint.name}_{axis}", {c: getattr(v, axis) for c, v in columns.items()},
+                *(getattr(v, axis) for v in (rest, rate, error)),
             )
-            for axis in (0, 1)
+            for axis in "xy"
         ]  # fmt: skip
 
     def between(self, first: str, second: str) -> dict[Column, Vector]:
         """Derivatives of the difference of two places, along the ground's axes."""
         found: dict[Column, Vector] = {}
-        for place, add in ((first, plus), (second, minus)):
+        for place, ahead in ((first, True), (second, False)):
             for column, held in self.kinematics.columns(self.kinematics.point(place)).items():
-                old = found.get(column, NOWHERE)
-                found[column] = add(old, self.kinematics.rotated(*held))
+                moved = self.kinematics.rotated(*held)
+                found[column] = found.get(column, NOWHERE) + (moved if ahead else -moved)
         return found
 
     def rate(self, first: str, second: str) -> Vector:
         """Velocity of one place relative to another."""
         points = (self.kinematics.point(place) for place in (first, second))
         one, two = (self.kinematics.velocity(point) for point in points)
-        return minus(one, two)
+        return one - two
 
     def unforced(self, point: Point) -> Vector:
         """Acceleration of a point while no coordinate accelerates."""
         kin, found = self.kinematics, NOWHERE
-        for frame, (x, y) in point.arms.items():
+        for frame, arm in point.arms.items():
             spin = kin.spin(frame)
-            found = minus(found, kin.rotated(frame, (x * spin * spin, y * spin * spin)))
+            found = found - kin.rotated(frame, arm.times(spin, spin))
         for move in point.moves:
             if move.turns_along:
                 speed = named(kin.speed_name((move.kind, move.body, "")))
                 rate = named("2.0") * speed * kin.spin(move.frame)
-                x, y = move.direction
-                found = plus(found, kin.rotated(move.frame, (-(y * rate), x * rate)))
-                x, y = move.changing
-                found = plus(found, kin.rotated(move.frame, (x * speed * speed, y * speed * speed)))
+                found = found + kin.rotated(move.frame, move.direction.times(rate).across())
+                found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
     def _guide(self, joint: Slide) -> list[Row]:
@@ -133,16 +121,15 @@ class Closing:
         body, carrier = (split(place)[0] for place in joint.places)
         own, other = forest.frames[body], forest.frames[carrier]
         along = self.direction(joint)
-        normal = (-along[1], along[0])
+        normal = along.across()
         point, line = kin.point(joint.point), kin.point(joint.line)
-        apart = minus(kin.position(point), kin.position(line))
+        apart = kin.position(point) - kin.position(line)
         rate = self.rate(*joint.places)
-        rest = minus(self.unforced(point), self.unforced(line))
+        rest = self.unforced(point) - self.unforced(line)
         spin = kin.spin(other)
         columns = {c: dot(v, normal) for c, v in self.between(*joint.places).items()}
         if other != GROUND:
-            x, y = (write.let(f"apart_{joint.name}", part) for part in apart)
-            apart = (x, y)
+            apart = Vector(*(write.let(f"apart_{joint.name}", part) for part in apart))
             turns = Column("angle", other)
             columns[turns] = columns.get(turns, ZERO) - dot(apart, along)
         across = self._row(
@@ -153,7 +140,7 @@ class Closing:
             dot(apart, normal),
         )  # fmt: skip
         c, s = kin.trig(own)
-        tilted = s * along[0] - c * along[1]  # of the angle between body and line
+        tilted = s * along.x - c * along.y  # of the angle between body and line
         angles = {Column("angle", own): ONE, Column("angle", other): -ONE}
         angles = {column: term for column, term in angles.items() if column.body != GROUND}
         return [across, self._row(
@@ -163,9 +150,9 @@ class Closing:
     def sliding(self, joint: Slide) -> tuple[dict[Column, Term], Term]:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
         kin, along = self.kinematics, self.direction(joint)
-        normal = (-along[1], along[0])
+        normal = along.across()
         point, line = (kin.position(kin.point(place)) for place in joint.places)
-        aside = self.writer.let(f"aside_{joint.name}", dot(minus(point, line), normal))
+        aside = self.writer.let(f"aside_{joint.name}", dot(point - line, normal))
         moved = {c: dot(v, along) for c, v in self.between(*joint.places).items()}
         carrier = kin.forest.frames[split(joint.line)[0]]
         if carrier != GROUND:
@@ -180,11 +167,13 @@ class Closing:
         """Unit vector of a guide's line, along the ground's axes."""
         carrier = split(joint.line)[0]
         forest, write = self.kinematics.forest, self.writer
-        held = (ONE, ZERO)
+        held = Vector(ONE, ZERO)
         if forest.offsets[carrier] + joint.angle != 0.0:
-            held = (write.parameter(f"{joint.name}_cos"), write.parameter(f"{joint.name}_sin"))
+            held = Vector(
+                write.parameter(f"{joint.name}_cos"), write.parameter(f"{joint.name}_sin")
+            )
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
-        return write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y)
+        return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
 
     def _driven(self, drive: Drive) -> Row:
         kin, name = self.kinematics, f"{drive.name}_drive"
@@ -204,4 +193,4 @@ class Closing:
 
 def dot(a: Vector, b: Vector) -> Term:
     """Product of two vectors along the ground's axes."""
-    return a[0] * b[0] + a[1] * b[1]
+    return a.x * b.x + a.y * b.y

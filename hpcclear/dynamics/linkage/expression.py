@@ -4,7 +4,7 @@ What is nought disappears, signs move outwards, and nothing else is rearranged: 
 in which the generator did, which decides the last bits. Names are read where they are first needed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
@@ -61,8 +61,41 @@ class Term:
 
 ZERO = Term("0")
 ONE = Term("1")
-Vector = tuple[Term, Term]
-NOWHERE: Vector = (ZERO, ZERO)
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Two terms, along x and y."""
+
+    x: Term
+    y: Term
+
+    def __iter__(self) -> Iterator[Term]:
+        yield self.x
+        yield self.y
+
+    def __neg__(self) -> "Vector":
+        return Vector(-self.x, -self.y)
+
+    def __add__(self, other: "Vector") -> "Vector":
+        return Vector(self.x + other.x, self.y + other.y)
+
+    def __sub__(self, other: "Vector") -> "Vector":
+        return Vector(self.x - other.x, self.y - other.y)
+
+    def times(self, *factors: Term) -> "Vector":
+        """By one factor after the other, from the right."""
+        x, y = self.x, self.y
+        for factor in factors:
+            x, y = x * factor, y * factor
+        return Vector(x, y)
+
+    def across(self) -> "Vector":
+        """Turned by a quarter."""
+        return Vector(-self.y, self.x)
+
+
+NOWHERE = Vector(ZERO, ZERO)
 
 
 def named(name: str, fixed: bool = False) -> Term:
@@ -76,21 +109,6 @@ def onto(factor: Term, product: Term) -> Term:
         result = onto(factor, product.args[0]) * product.args[1]
         return -result if product.negative else result
     return factor * product
-
-
-def plus(a: Vector, b: Vector) -> Vector:
-    """Sum of two vectors."""
-    return a[0] + b[0], a[1] + b[1]
-
-
-def minus(a: Vector, b: Vector) -> Vector:
-    """Difference of two vectors."""
-    return a[0] - b[0], a[1] - b[1]
-
-
-def across(a: Vector) -> Vector:
-    """A vector turned by a quarter."""
-    return -a[1], a[0]
 
 
 class Writer:

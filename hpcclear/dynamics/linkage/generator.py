@@ -13,7 +13,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Writer, named
+from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -72,35 +72,23 @@ class Rows:
 
 @dataclass(frozen=True)
 class Motion:
-    """A text and what it needs.
-
-    Attributes
-    ----------
-    source : str
-        Of the function ``lane(effects, joints, work, par, i, W)``.
-    forest : Forest
-    parameters : dict
-        Rows of `par` by name.
-    derived : dict
-        Texts of the derived parameters, by name, in parameters of `inputs`.
-    inputs : tuple of str
-        Names that `numbers.values` gives a number to.
-    constraints : tuple of str
-        Names of the multipliers.
-    curves : mapping
-        Rows of tabulated values, by drive or load.
-    coordinates : int
-        Row of the first of the forest's coordinates.
-    """
+    """A text and what it needs."""
 
     source: str
+    """Of the function ``lane(effects, joints, work, par, i, W)``."""
     forest: Forest
     parameters: dict[str, int]
+    """Rows of `par` by name."""
     derived: dict[str, str]
+    """Texts of the derived parameters, by name, in parameters of `inputs`."""
     inputs: tuple[str, ...]
+    """Names that `numbers.values` gives a number to."""
     constraints: tuple[str, ...]
+    """Names of the multipliers."""
     curves: Mapping[str, int] = field(default_factory=dict)
+    """Rows of tabulated values, by drive or load."""
     coordinates: int = at.QS
+    """Row of the first of the forest's coordinates."""
 
 
 def generate(
@@ -174,10 +162,10 @@ class _Generator:
         """Call of the contact law: journal relative to bearing, and what the joint exerts on both."""
         kin, write = self.kinematics, self.writer
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
-        (x, y), (bx, by) = kin.position(journal), kin.position(bearing)
-        (vx, vy), (ux, uy) = kin.velocity(journal), kin.velocity(bearing)
+        apart = kin.position(journal) - kin.position(bearing)
+        moving = kin.velocity(journal) - kin.velocity(bearing)
         spins = [kin.end_spin(place) for place in joint.places]
-        relative = [write.text(term) for term in (x - bx, y - by, vx - ux, vy - uy, *spins)]
+        relative = [write.text(term) for term in (*apart, *moving, *spins)]
         if not (self.on.friction or self.on.waves):  # which are no faster by it
             relative[4:] = ["None" if spin is ZERO else write.text(spin) for spin in spins]
         turns = self._turns(joint) if self.on.waves else "None"
@@ -187,7 +175,8 @@ class _Generator:
         )
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
-        self.balance.pulls += [Pull(joint.journal, (-fx, -fy)), Pull(joint.bearing, (fx, fy))]
+        force = Vector(fx, fy)
+        self.balance.pulls += [Pull(joint.journal, -force), Pull(joint.bearing, force)]
         if self.on.friction or self.on.waves:
             for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
                 body, point = split(place)
@@ -200,7 +189,7 @@ class _Generator:
         kin, found = self.kinematics, []
         for place in (joint.bearing, joint.journal):
             body = split(place)[0]
-            own = (ONE, ZERO) if body == GROUND else kin.offset(body)
+            own = Vector(ONE, ZERO) if body == GROUND else kin.offset(body)
             found += [*kin.rotated(self.forest.frames[body], own)]
         return f"({', '.join(self.writer.text(term) for term in found)})"
 
@@ -215,11 +204,12 @@ class _Generator:
             self.balance.twists.append(Twist(load.body, moment))
             power = moment * kin.spin(self.forest.frames[load.body])
         else:
-            force = [
+            parts = (
                 write.let(f"{load.name}_{axis}", self._force(load, axis, value) * turned)
                 for axis, value in zip("xy", load.force, strict=True)
-            ]
-            self.balance.pulls.append(Pull(load.place, (force[0], force[1])))
+            )
+            force = Vector(*parts)
+            self.balance.pulls.append(Pull(load.place, force))
             for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
                 power = power + part * speed
         self.load_power = self.load_power + power
@@ -238,14 +228,15 @@ class _Generator:
         """Call of the spring's law, which gives the force on the first place and what both ends do."""
         kin, write = self.kinematics, self.writer
         first, second = kin.point(load.first), kin.point(load.second)
-        (x, y), (bx, by) = kin.position(first), kin.position(second)
-        (vx, vy), (ux, uy) = kin.velocity(first), kin.velocity(second)
+        apart = kin.position(first) - kin.position(second)
+        moving = kin.velocity(first) - kin.velocity(second)
         numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
-        texts = [write.text(t) for t in (*numbers, x - bx, y - by, vx - ux, vy - uy)]
+        texts = [write.text(t) for t in (*numbers, *apart, *moving)]
         made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
         write.line(f"{', '.join(made)} = spring_force({', '.join(texts)})")
         fx, fy, power = map(named, made)
-        self.balance.pulls += [Pull(load.first, (fx, fy)), Pull(load.second, (-fx, -fy))]
+        force = Vector(fx, fy)
+        self.balance.pulls += [Pull(load.first, force), Pull(load.second, -force)]
         self.load_power = self.load_power + power
 
     def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:

@@ -9,17 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import Bend
-from hpcclear.dynamics.linkage.expression import (
-    NOWHERE,
-    ONE,
-    ZERO,
-    Term,
-    Vector,
-    Writer,
-    across,
-    named,
-    plus,
-)
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     ConstantSpeed,
@@ -166,8 +156,8 @@ class Kinematics:
     def trig(self, frame: str) -> Vector:
         """Cosine and sine of a frame's angle."""
         if frame == GROUND:
-            return ONE, ZERO
-        return named(f"c_{frame}"), named(f"s_{frame}")
+            return Vector(ONE, ZERO)
+        return Vector(named(f"c_{frame}"), named(f"s_{frame}"))
 
     def spin(self, frame: str) -> Term:
         """Angular velocity of a frame."""
@@ -200,7 +190,7 @@ class Kinematics:
             shorter = self.bends[body].shortening()
             x = x - shorter if ends > 0 else x + shorter
         cosine, sine = self.offset(body)
-        return cosine * x - sine * y, sine * x + cosine * y
+        return Vector(cosine * x - sine * y, sine * x + cosine * y)
 
     def _shortened(self, body: str, start: str, end: str) -> int:
         """Whether bending takes away from an arm (1) or adds to it (-1): a bar's end b comes nearer."""
@@ -215,7 +205,7 @@ class Kinematics:
         bend, moves = self.bends[body], list(point.moves)
         for mode, kind in zip(bend.modes, bend.kinds, strict=True):
             first, second = (-term if sign > 0 else term for term in bend.nearer(mode))
-            moves.append(Move(kind, body, frame, (first, ZERO), (second, ZERO)))
+            moves.append(Move(kind, body, frame, Vector(first, ZERO), Vector(second, ZERO)))
         return Point(point.arms, tuple(moves))
 
     def end_spin(self, place: str) -> Term:
@@ -227,9 +217,9 @@ class Kinematics:
     def offset(self, body: str) -> Vector:
         """Cosine and sine of the angle by which a body is turned against its frame."""
         if self.forest.offsets[body] == 0.0:
-            return ONE, ZERO
+            return Vector(ONE, ZERO)
         write = self.writer
-        return write.parameter(f"{body}_offset_cos"), write.parameter(f"{body}_offset_sin")
+        return Vector(write.parameter(f"{body}_offset_cos"), write.parameter(f"{body}_offset_sin"))
 
     def center(self, body: str) -> Point:
         """Mass centre of a body."""
@@ -246,27 +236,26 @@ class Kinematics:
         forest = self.forest
         if body == GROUND:
             x, y = forest.mechanism.ground[point]
-            fixed = (
-                self._number(f"ground_{point}_x", x),
-                self._number(f"ground_{point}_y", y),
+            fixed = Vector(
+                self._number(f"ground_{point}_x", x), self._number(f"ground_{point}_y", y)
             )
             return Point({GROUND: fixed} if any(fixed) else {}, ())
         hang, frame = forest.hangs[body], forest.frames[body]
         if hang.joint is None:
             moves = tuple(
                 Move(kind, body, GROUND, direction)
-                for kind, direction in (("x", (ONE, ZERO)), ("y", (ZERO, ONE)))
+                for kind, direction in (("x", Vector(ONE, ZERO)), ("y", Vector(ZERO, ONE)))
             )
-            root = Point({GROUND: (named(f"x_{body}"), named(f"y_{body}"))}, moves)
+            root = Point({GROUND: Vector(named(f"x_{body}"), named(f"y_{body}"))}, moves)
             return self._reached(root, frame, body, (CENTER, point))
         parent = self.point(hang.parent)
         if isinstance(hang.joint, Slide):
             along = self.offset(split(hang.joint.point)[0])
             if hang.own != hang.joint.point:
-                along = (-along[0], -along[1])
+                along = -along
             s = named(f"slide_{body}")
-            moved = _extended(parent, frame, (along[0] * s, along[1] * s))
-            guide = (Move("slide", body, frame, along), Move("across", body, frame, across(along)))
+            moved = _extended(parent, frame, along.times(s))
+            guide = (Move("slide", body, frame, along), Move("across", body, frame, along.across()))
             parent = Point(moved.arms, (*moved.moves, *guide))
         return self._reached(parent, frame, body, (split(hang.own)[1], point))
 
@@ -275,13 +264,13 @@ class Kinematics:
         if frame == GROUND:
             return vector
         (cosine, sine), (x, y) = self.trig(frame), vector
-        return x * cosine - y * sine, x * sine + y * cosine
+        return Vector(x * cosine - y * sine, x * sine + y * cosine)
 
     def position(self, point: Point) -> Vector:
         """Where a point is, along the ground's axes."""
         found = NOWHERE
         for frame, arm in point.arms.items():
-            found = plus(found, self.rotated(frame, arm))
+            found = found + self.rotated(frame, arm)
         return found
 
     def velocity(self, point: Point) -> Vector:
@@ -290,12 +279,10 @@ class Kinematics:
         for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
             for move in point.moves:
                 if move.frame == frame and move.kind != "across":
-                    name = self.speed_name((move.kind, move.body, ""))
-                    x, y = self.rotated(frame, move.direction)
-                    found = plus(found, (x * named(name), y * named(name)))
-            spin = self.spin(frame)
-            x, y = point.arms.get(frame, NOWHERE)
-            found = plus(found, self.rotated(frame, (-(y * spin), x * spin)))
+                    speed = named(self.speed_name((move.kind, move.body, "")))
+                    found = found + self.rotated(frame, move.direction).times(speed)
+            arm = point.arms.get(frame, NOWHERE)
+            found = found + self.rotated(frame, arm.times(self.spin(frame)).across())
         return found
 
     def acceleration(self, point: Point, second: Callable[[Column], Term]) -> Vector:
@@ -308,21 +295,19 @@ class Kinematics:
                 if move.frame == frame and move.kind != "across":
                     speed = named(self.speed_name((move.kind, move.body, "")))
                     rate = second(Column(move.kind, move.body))
-                    x, y = move.direction
                     twice = spin * speed + spin * speed  # Coriolis
-                    moved = (x * rate - y * twice, y * rate + x * twice)
-                    x, y = move.changing
-                    moved = plus(moved, (x * speed * speed, y * speed * speed))
-                    found = plus(found, self.rotated(frame, moved))
-            x, y = point.arms.get(frame, NOWHERE)
-            turned = (-(y * turn) - x * spin * spin, x * turn - y * spin * spin)
-            found = plus(found, self.rotated(frame, turned))
+                    moved = move.direction.times(rate) + move.direction.times(twice).across()
+                    moved = moved + move.changing.times(speed, speed)
+                    found = found + self.rotated(frame, moved)
+            arm = point.arms.get(frame, NOWHERE)
+            turned = arm.times(turn).across() - arm.times(spin, spin)
+            found = found + self.rotated(frame, turned)
         return found
 
     def columns(self, point: Point) -> dict[Column, tuple[str, Vector]]:
         """Derivatives of a point by all that moves it: frame, and vector in it."""
         found = {
-            Column("angle", frame): (frame, across(arm))
+            Column("angle", frame): (frame, arm.across())
             for frame, arm in point.arms.items()
             if frame != GROUND and self.forest.turning(frame)
         }
@@ -330,12 +315,12 @@ class Kinematics:
             Column(move.kind, move.body): (move.frame, move.direction) for move in point.moves
         }
 
-    def projected(self, vector: tuple[str, Vector], axis: int) -> Term:
-        """A frame's vector along the ground's x (0) or y (1)."""
-        return self.rotated(*vector)[axis]
+    def raised(self, frame: str, vector: Vector) -> Term:
+        """A frame's vector along the ground's y."""
+        return self.rotated(frame, vector).y
 
 
 def _extended(point: Point, frame: str, arm: Vector) -> Point:
     if not any(arm):
         return point
-    return Point(point.arms | {frame: plus(point.arms.get(frame, NOWHERE), arm)}, point.moves)
+    return Point(point.arms | {frame: point.arms.get(frame, NOWHERE) + arm}, point.moves)

@@ -61,10 +61,7 @@ def either_product(flag, other, a, b):
 @lane_function
 def swept(spin, arm):
     """Speed at the end of an arm, 0 of what never turns (None)."""
-    if spin is not None:
-        return spin * arm
-    else:
-        return 0.0
+    return product(spin, spin, arm)
 
 
 @lane_function

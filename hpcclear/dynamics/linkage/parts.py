@@ -72,37 +72,33 @@ class GuideFriction:
 
 
 @dataclass(frozen=True)
-class Slide:
-    """A guide: the point moves along a line of the ground or of another body, its body keeping its x axis along the line.
+class Aligned:
+    """A body whose x axis keeps the direction of a line through a place of another body or of the ground.
 
-    `line` is a place on the carrier; `angle` the line's direction in the carrier's axes, rad.
+    `line` is that place, on the carrier; `angle` the line's direction in the carrier's axes, rad.
     """
 
     name: str
     point: str
     line: str
     angle: float = 0.0
-    friction: GuideFriction | None = None
 
     @property
     def places(self) -> tuple[str, str]:
-        """Both places: of the body that slides, of the one that carries the line."""
+        """Both places: of the body, of the one that carries the line."""
         return self.point, self.line
 
 
 @dataclass(frozen=True)
-class Fixed:
-    """A body held on the ground, its x axis at an angle (rad) to the ground's."""
+class Slide(Aligned):
+    """A guide: the point moves along the line."""
 
-    name: str
-    point: str
-    line: str
-    angle: float = 0.0
+    friction: GuideFriction | None = None
 
-    @property
-    def places(self) -> tuple[str, str]:
-        """Both places: of the body, of the ground."""
-        return self.point, self.line
+
+@dataclass(frozen=True)
+class Fixed(Aligned):
+    """A body held on the ground: the point stays where the line begins."""
 
 
 Joint = Revolute | Clearance | Slide | Fixed

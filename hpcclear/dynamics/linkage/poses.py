@@ -56,9 +56,8 @@ class Poses:
         first = 6 * len(forest.mechanism.bodies)
         for k, joint in enumerate(forest.mechanism.clearances):
             journal, bearing = (kin.position(kin.point(place)) for place in joint.places)
-            for axis in (0, 1):
-                text = writer.text(journal[axis] - bearing[axis])
-                lines.append(f"out[{first + 2 * k + axis}] = {text}")
+            for axis, apart in enumerate(journal - bearing):
+                lines.append(f"out[{first + 2 * k + axis}] = {writer.text(apart)}")
         self.size = first + 2 * len(forest.mechanism.clearances)
         names: dict[str, Any] = WORDS | words_of(forest.mechanism)
         body_text = "\n    ".join([*writer.lines, *lines, "pass"])

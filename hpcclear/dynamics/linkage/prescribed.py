@@ -29,33 +29,25 @@ _NEWTON = 12
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A motion that the drives prescribe, over instants (t,).
-
-    Attributes
-    ----------
-    assembly : Assembly
-    times : ndarray, shape (t,)
-    q, v, a : ndarray, shape (t, n)
-        Mass centres and angles of all bodies, velocities and accelerations, SI; the order of ``assembly.loops.forest``.
-    holds : dict
-        By constraint: ``"NAME_x"`` and ``"NAME_y"`` are the force of a pin on its journal's body, ``"NAME_across"`` that of a
-        guide across its line, ``"NAME_angle"`` the moment of a guide or of a drive; each (t,), N or N m.
-    power, loss, load_power : ndarray, shape (t,)
-        Of all drives, of friction, of the loads, W.
-    margin : ndarray, shape (t,)
-        Smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre.
-    """
+    """A motion that the drives prescribe, over instants (t,)."""
 
     assembly: Assembly
     times: Array
+    """Shape (t,)."""
     q: Array
     v: Array
     a: Array
+    """q, v and a, shape (t, n): mass centres and angles of all bodies, velocities and accelerations, SI; the order of
+    ``assembly.loops.forest``."""
     holds: dict[str, Array]
+    """By constraint: ``"NAME_x"`` and ``"NAME_y"`` are the force of a pin on its journal's body, ``"NAME_across"`` that of
+    a guide across its line, ``"NAME_angle"`` the moment of a guide or of a drive; each (t,), N or N m."""
     power: Array
     loss: Array
     load_power: Array
+    """power, loss and load_power, shape (t,): of all drives, of friction, of the loads, W."""
     margin: Array
+    """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
 
 
 def prescribed_motion(

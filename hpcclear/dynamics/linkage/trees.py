@@ -38,31 +38,21 @@ class Hang(NamedTuple):
 
 @dataclass(frozen=True)
 class Forest:
-    """Trees, coordinates and frames of a mechanism.
-
-    Attributes
-    ----------
-    hangs : dict
-        How each body hangs, parents before children.
-    frames : dict
-        Which body's angle each body has, or the ground's.
-    offsets : dict
-        By how much each body is turned against its frame, rad.
-    coordinates : tuple of Coordinate
-        Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last.
-    prescribed : dict
-        Drives by frame, where the angle is given.
-    closures : tuple of Joint or Drive
-        What is left as a constraint.
-    """
+    """Trees, coordinates and frames of a mechanism."""
 
     mechanism: Mechanism
     hangs: dict[str, Hang]
+    """How each body hangs, parents before children."""
     frames: dict[str, str]
+    """Which body's angle each body has, or the ground's."""
     offsets: dict[str, float]
+    """By how much each body is turned against its frame, rad."""
     coordinates: tuple[Coordinate, ...]
+    """Modes of bending first, then in the bodies' order; the angle of the body that the period's drive turns comes last."""
     prescribed: dict[str, Drive]
+    """Drives by frame, where the angle is given."""
     closures: tuple[Joint | Drive, ...]
+    """What is left as a constraint."""
 
     def index(self, kind: str, body: str) -> int | None:
         """Which coordinate it is, if it is one."""

@@ -72,14 +72,20 @@ def film_thickness(depth, floor):
 
 
 @lane_function
-def short_impedance(a, b, s2):
-    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle, the short film's force along w and across; sin(psi/2)."""
+def half_circle(a, s2):
+    """What integrals over the half circle are made of: a^2 + s^2, 1/s^2, 1/s^4, psi/s^5 and sin(psi/2)."""
     s = math.sqrt(s2)
     r2 = s2 + a * a
     psi, sine = half_circle_angle(a, s, math.sqrt(r2))
     q = 1.0 / s2
     q2 = q * q
-    turned = psi * (q2 / s)
+    return r2, q, q2, psi * (q2 / s), sine
+
+
+@lane_function
+def short_impedance(a, b, s2):
+    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle, the short film's force along w and across; sin(psi/2)."""
+    r2, _, q2, turned, sine = half_circle(a, s2)
     along = 3.0 * a * q2 + turned * (s2 + 3.0 * a * a)
     across = b * (2.0 + a * a / r2) * q2 + 3.0 * a * b * turned
     return along, across, sine
@@ -92,12 +98,7 @@ def long_impedance(a, b, s2, along, across):
 
     From R dp/dtheta = 12 mu R^3/h^3 (w.t + C), whose C makes the pressure periodic, by parts.
     """
-    s = math.sqrt(s2)
-    r2 = s2 + a * a
-    psi, _ = half_circle_angle(a, s, math.sqrt(r2))
-    q = 1.0 / s2
-    q2 = q * q
-    turned = psi * (q2 / s)
+    r2, q, q2, turned, _ = half_circle(a, s2)
     # of Phi: its first derivatives, and half of the second
     first_a = 2.0 * (q + a * turned * s2)
     over = a / r2

@@ -60,45 +60,29 @@ class Stretch:
 
 @dataclass
 class Mean:
-    """What was found.
-
-    Attributes
-    ----------
-    regime : Regime
-    limit : float
-        Half-width of the limits of f, m; NaN where there is no steady mean.
-    outcomes : Outcome, shape (stretches, copies)
-        What the average is made of.
-    stretch : int
-        Revolutions of each of these.
-    rtol : float
-        The looser of the two tolerances, the other one is `STRICTER` times tighter.
-    period : int or None
-    growth : float
-        Of a kick, per revolution: mean of the logarithm, as far as the look told.
-    growth_limit : float
-        Half-width of its limits, if it was measured on purpose.
-    attractors : int or None
-        Kinds of motion found from several starts, if they were looked for.
-    met : bool
-    status : Status
-    revolutions, evaluations : int
-        All that was simulated.
-    """
+    """What was found."""
 
     regime: Regime
     limit: float
+    """Half-width of the limits of f, m; NaN where there is no steady mean."""
     outcomes: Outcome
+    """Shape (stretches, copies): what the average is made of."""
     stretch: int
+    """Revolutions of each of these."""
     rtol: float
+    """The looser of the two tolerances, the other one is `STRICTER` times tighter."""
     met: bool
     period: int | None = None
     growth: float = np.nan
+    """Of a kick, per revolution: mean of the logarithm, as far as the look told."""
     growth_limit: float = np.nan
+    """Half-width of its limits, if it was measured on purpose."""
     attractors: int | None = None
+    """Kinds of motion found from several starts, if they were looked for."""
     status: Status = Status.OK
     revolutions: int = 0
     evaluations: float = 0.0
+    """revolutions and evaluations: all that was simulated."""
 
     @property
     def tightest(self) -> float:

@@ -23,33 +23,22 @@ DRIFT = 3.5
 
 @dataclass(frozen=True)
 class Windows:
-    """Averages over the latest revolutions of a few copies, and what they still may be off by, m.
-
-    Attributes
-    ----------
-    period : int or None
-        Revolutions after which every copy repeats itself, to a quarter of the target; None: none was found.
-    length : int
-        Revolutions of the later window: about half of them, whole periods.
-    gaps : ndarray, shape (copies, 2)
-        Mean gaps over it.
-    settling : float
-        How far the average may still move if it goes on as it did.
-    moved : float
-        How far it moved over the latest quarter of the revolutions.
-    apart : float
-        How far the copies' averages are apart, over the latest quarter.
-    joining : bool
-        Whether that is much less than over the quarter before.
-    """
+    """Averages over the latest revolutions of a few copies, and what they still may be off by, m."""
 
     period: int | None
+    """Revolutions after which every copy repeats itself, to a quarter of the target; None: none was found."""
     length: int
+    """Revolutions of the later window: about half of them, whole periods."""
     gaps: Array
+    """Shape (copies, 2): mean gaps over it."""
     settling: float
+    """How far the average may still move if it goes on as it did."""
     moved: float
+    """How far it moved over the latest quarter of the revolutions."""
     apart: float
+    """How far the copies' averages are apart, over the latest quarter."""
     joining: bool
+    """Whether that is much less than over the quarter before."""
 
 
 def period_of(f: Array, tolerance: float) -> int | None:

@@ -23,24 +23,17 @@ from hpcclear.scene.points import Points
 
 @dataclass(frozen=True)
 class Joints:
-    """Worn joints of one life, or of several; arrays of shape (..., joints).
-
-    Attributes
-    ----------
-    clearance, bearing_radius : ndarray
-        When new, m.
-    bearing, journal : ndarray
-        Depth of wear for each joule of sliding work, m/J, once run in.
-    excess, fading : ndarray
-        a - 1 and W0, J, of running in; 0 and 1 without.
-    """
+    """Worn joints of one life, or of several; arrays of shape (..., joints)."""
 
     clearance: Array
     bearing_radius: Array
+    """clearance and bearing_radius: when new, m."""
     bearing: Array
     journal: Array
+    """bearing and journal: depth of wear for each joule of sliding work, m/J, once run in."""
     excess: Array
     fading: Array
+    """excess and fading: a - 1 and W0, J, of running in; 0 and 1 without."""
 
     def __getitem__(self, life: Any) -> "Joints":
         return Joints(*(array[life] for array in vars(self).values()))

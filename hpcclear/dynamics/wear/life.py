@@ -36,25 +36,18 @@ _SHRINK, _GROW, _SAFETY = 0.2, 4.0, 0.9
 
 @dataclass(frozen=True)
 class Plan:
-    """How lives are followed.
-
-    Attributes
-    ----------
-    cycles : float
-        Revolutions of a life.
-    tolerance : float
-        Of a jump in each clearance and in f, relative.
-    shortest : float
-        Revolutions of a jump, at least.
-    copies, most_copies : int
-        Simulations at a state of wear: at first, and where limits are wider than the tolerance allows.
-    """
+    """How lives are followed."""
 
     cycles: float
+    """Revolutions of a life."""
     tolerance: float
+    """Of a jump in each clearance and in f, relative."""
     shortest: float
+    """Revolutions of a jump, at least."""
     copies: int
     most_copies: int
+    """copies and most_copies: simulations at a state of wear: at first, and where limits are wider than the tolerance
+    allows."""
 
 
 @dataclass(frozen=True)

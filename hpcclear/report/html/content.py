@@ -11,26 +11,17 @@ from hpcclear.results import dataset
 
 @dataclass(frozen=True)
 class Content:
-    """Results to report.
-
-    Attributes
-    ----------
-    directory : Path
-    files : dict of str to xarray.Dataset
-        By kind; responses are apart.
-    names : dict of str to str
-        The file each came from, by kind.
-    responses : dict of str to xarray.Dataset
-        By the name of the design.
-    troubles : tuple of str
-        What could not be read or does not belong together, a sentence each.
-    """
+    """Results to report."""
 
     directory: Path
     files: dict[str, xr.Dataset]
+    """By kind; responses are apart."""
     names: dict[str, str]
+    """The file each came from, by kind."""
     responses: dict[str, xr.Dataset] = field(default_factory=dict)
+    """By the name of the design."""
     troubles: tuple[str, ...] = ()
+    """What could not be read or does not belong together, a sentence each."""
 
     def get(self, kind: str) -> xr.Dataset | None:
         """The dataset of a kind, or None."""

@@ -32,22 +32,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page.
-
-    Attributes
-    ----------
-    name, title : str
-        Its anchor, and its heading.
-    template : str
-        File in ``templates`` that shows its content.
-    content : object
-        For the template; None where there is nothing to show.
-    """
+    """A section of the page."""
 
     name: str
     title: str
+    """name and title: its anchor, and its heading."""
     template: str
+    """File in ``templates`` that shows its content."""
     content: Any
+    """For the template; None where there is nothing to show."""
 
 
 def preformatted(text: str, summary: str = "") -> dict[str, str]:

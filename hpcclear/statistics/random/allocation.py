@@ -35,35 +35,23 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a pilot has measured; all errors relative, of mean and deviation.
-
-    Attributes
-    ----------
-    rtol : array, shape (r,)
-        Loosest first; biases are against the last one.
-    evaluations : array, shape (r,)
-        Of the equations of motion, a simulation.
-    bias : array, shape (r - 1, 2)
-        Root mean square over designs, without what chance adds to it; with that of the last one (`FALL`).
-    doubt : array, shape (r - 1, 2)
-        Standard error of the mean bias of all designs.
-    pairs, points : int
-        Simulations of a design that biases, and `reach`, are of.
-    reach : array, shape (d, 2)
-        Half-widths of confidence limits of each design.
-    power : array, shape (2,)
-        By which power of the simulations they fall.
-    confidence : float
-    """
+    """What a pilot has measured; all errors relative, of mean and deviation."""
 
     rtol: Array
+    """Shape (r,): loosest first; biases are against the last one."""
     evaluations: Array
+    """Shape (r,): of the equations of motion, a simulation."""
     bias: Array
+    """Shape (r - 1, 2): root mean square over designs, without what chance adds to it; with that of the last one (`FALL`)."""
     doubt: Array
+    """Shape (r - 1, 2): standard error of the mean bias of all designs."""
     pairs: int
     points: int
+    """pairs and points: simulations of a design that biases, and `reach`, are of."""
     reach: Array
+    """Shape (d, 2): half-widths of confidence limits of each design."""
     power: Array
+    """Shape (2,): by which power of the simulations they fall."""
     confidence: float
 
     def tolerance_shares(self, doubtful: bool) -> Array:
@@ -85,30 +73,20 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Split:
-    """One way to share out an accuracy.
-
-    Attributes
-    ----------
-    rung : int
-        Of the evidence's tolerances.
-    rtol : float
-    tolerance, samples : array, shape (2,)
-        What each may take of the accuracy, of mean and deviation; their squares add up.
-    points : float
-        Simulations that a verified design will take, on average.
-    evaluations : float
-        Of the equations of motion, in the whole study.
-    sure : bool
-        Whether what is not known about the tolerance's bias is within its share.
-    """
+    """One way to share out an accuracy."""
 
     rung: int
+    """Of the evidence's tolerances."""
     rtol: float
     tolerance: Array
     samples: Array
+    """tolerance and samples, shape (2,): what each may take of the accuracy, of mean and deviation; their squares add up."""
     points: float
+    """Simulations that a verified design will take, on average."""
     evaluations: float
+    """Of the equations of motion, in the whole study."""
     sure: bool
+    """Whether what is not known about the tolerance's bias is within its share."""
 
 
 def evidence(

@@ -11,41 +11,27 @@ from hpcclear.statistics.random.distributions import Distribution
 
 @dataclass(frozen=True)
 class RandomVariable:
-    """An input that scatters, independently of the others.
-
-    Attributes
-    ----------
-    name : str
-    distribution : Uniform, Normal, TruncatedNormal or Tabled
-        Of the value, or of the offset from the design.
-    about_design : bool
-        Whether the distribution is an offset added to the design variable of this name.
-    """
+    """An input that scatters, independently of the others."""
 
     name: str
     distribution: Distribution
+    """Of the value, or of the offset from the design."""
     about_design: bool = False
+    """Whether the distribution is an offset added to the design variable of this name."""
 
 
 @dataclass(frozen=True)
 class Derived:
-    """A model input computed from others.
-
-    Attributes
-    ----------
-    name : str
-        The model's input.
-    of : tuple of str
-        What it depends on: design variables, random or fixed inputs.
-    function : callable
-        Arrays of those, in this order, to an array of the same (broadcast) shape. It must take its
-        extremes at the corners of the random inputs' box (be monotone in each), since there it
-        is checked that the support stays inside the model's domain.
-    """
+    """A model input computed from others."""
 
     name: str
+    """The model's input."""
     of: tuple[str, ...]
+    """What it depends on: design variables, random or fixed inputs."""
     function: Callable[..., np.ndarray]
+    """Arrays of those, in this order, to an array of the same (broadcast) shape. It must take its extremes at the corners
+    of the random inputs' box (be monotone in each), since there it is checked that the support stays inside the model's
+    domain."""
 
 
 @dataclass(frozen=True)

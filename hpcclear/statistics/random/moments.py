@@ -27,19 +27,13 @@ from hpcclear.statistics.surrogate.kriging import inside
 
 @dataclass(frozen=True, eq=False)
 class SampledMoments:
-    """Monte Carlo estimates, an array over the designs each.
-
-    Attributes
-    ----------
-    mean, deviation : (n,) arrays
-    mean_error, deviation_error : (n,) arrays
-        Standard errors.
-    """
+    """Monte Carlo estimates, an array over the designs each."""
 
     mean: np.ndarray
     deviation: np.ndarray
     mean_error: np.ndarray
     deviation_error: np.ndarray
+    """mean_error and deviation_error: standard errors."""
 
 
 def sample_moments(values: np.ndarray) -> SampledMoments:

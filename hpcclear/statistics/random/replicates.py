@@ -26,18 +26,11 @@ FEWEST = 4
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number that was estimated from replicates.
-
-    Attributes
-    ----------
-    value : float
-    shifts : array, shape (r,)
-        By how much each replicate would move it (its influence), of mean 0; NaN for a replicate
-        without a value.
-    """
+    """A number that was estimated from replicates."""
 
     value: float
     shifts: Array
+    """Shape (r,): by how much each replicate would move it (its influence), of mean 0; NaN for a replicate without a value."""
 
     @property
     def error(self) -> float:
@@ -103,16 +96,11 @@ def _shifts(sums: Array, counts: Array) -> Array:
 
 @dataclass(frozen=True)
 class Limited(Estimate):
-    """An estimate whose limits are not symmetric.
-
-    Attributes
-    ----------
-    lower, upper : float
-        Confidence limits; NaN where the sample does not reach that far.
-    """
+    """An estimate whose limits are not symmetric."""
 
     lower: float
     upper: float
+    """lower and upper: confidence limits; NaN where the sample does not reach that far."""
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:

@@ -36,34 +36,24 @@ from hpcclear.statistics.surrogate.metrics import check_confidence
 
 @dataclass(frozen=True)
 class ConvergenceIntervals:
-    """Where the sensitivities stopped changing; the rule is in the module's text.
-
-    Attributes
-    ----------
-    found : numpy.ndarray of bool, shape (c, d)
-        Interval found and derivative determined; False is "not determined".
-    interval : numpy.ndarray of int, shape (c, d)
-        Index of the convergence interval in the history, -1 where not determined.
-    plateau : numpy.ndarray of int, shape (c, d)
-        Index of the widest interval from which on the estimates agree, -1 if not even the last two
-        do. Not determined with a plateau: not distinguishable from 0. Without: still changing.
-    sensitivity, uncertainty : numpy.ndarray, shape (c, d)
-        There, in units of f per unit of the variable; the uncertainty holds the standard error and
-        the truncation that may be left. NaN where not determined.
-    converged : numpy.ndarray of bool, shape (k, c, d)
-        The convergence interval and all shorter ones.
-    confidence, tolerance : float
-        The rule's settings.
-    """
+    """Where the sensitivities stopped changing; the rule is in the module's text."""
 
     found: Booleans
+    """Shape (c, d): interval found and derivative determined; False is "not determined"."""
     interval: Integers
+    """Shape (c, d): index of the convergence interval in the history, -1 where not determined."""
     plateau: Integers
+    """Shape (c, d): index of the widest interval from which on the estimates agree, -1 if not even the last two do. Not
+    determined with a plateau: not distinguishable from 0. Without: still changing."""
     sensitivity: Array
     uncertainty: Array
+    """sensitivity and uncertainty, shape (c, d): there, in units of f per unit of the variable; the uncertainty holds the
+    standard error and the truncation that may be left. NaN where not determined."""
     converged: Booleans
+    """Shape (k, c, d): the convergence interval and all shorter ones."""
     confidence: float
     tolerance: float
+    """confidence and tolerance: the rule's settings."""
 
 
 def convergence_intervals(

@@ -27,16 +27,6 @@ from hpcclear.statistics.surrogate.response_surface import (
 class IntervalSettings:
     """Size of an interval study; the defaults for a surface in two variables follow the paper.
 
-    Attributes
-    ----------
-    steps : int
-        Number of intervals; 1 gives the sensitivity over the global interval alone.
-    shrink : float
-        Fraction of its length by which every interval is shortened from one step to the next,
-        in (0, 1).
-    n_points, n_test, order : int
-        Training points, test points and total order of each surface.
-
     Raises
     ------
     InputError
@@ -44,10 +34,13 @@ class IntervalSettings:
     """
 
     steps: int = 6
+    """Number of intervals; 1 gives the sensitivity over the global interval alone."""
     shrink: float = 0.3
+    """Fraction of its length by which every interval is shortened from one step to the next, in (0, 1)."""
     n_points: int = 45
     n_test: int = 5
     order: int = 3
+    """n_points, n_test and order: training points, test points and total order of each surface."""
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -65,55 +58,40 @@ DEFAULTS = IntervalSettings()
 
 @dataclass(frozen=True)
 class IntervalDesign:
-    """Points to simulate for every interval and clearance, all known beforehand.
-
-    Attributes
-    ----------
-    points : numpy.ndarray, shape (n, d + 1)
-        The d variables and, last, the clearance. By interval, then clearance, then the training
-        points followed by the test points.
-    intervals : numpy.ndarray, shape (k, d, 2)
-        Limits of the variables, the widest first.
-    clearances : numpy.ndarray, shape (c,)
-    settings : IntervalSettings
-    """
+    """Points to simulate for every interval and clearance, all known beforehand."""
 
     points: Array
+    """Shape (n, d + 1): the d variables and, last, the clearance. By interval, then clearance, then the training points
+    followed by the test points."""
     intervals: Array
+    """Shape (k, d, 2): limits of the variables, the widest first."""
     clearances: Array
+    """Shape (c,)."""
     settings: IntervalSettings
 
 
 @dataclass(frozen=True)
 class SensitivityHistory:
-    """Midpoint derivatives of every surface; NaN where too few simulations succeeded.
-
-    Attributes
-    ----------
-    intervals : numpy.ndarray, shape (k, d, 2)
-        Limits of the variables, the widest first.
-    clearances : numpy.ndarray, shape (c,)
-    sensitivity, standard_error : numpy.ndarray, shape (k, c, d)
-        Derivatives at the midpoint, in units of f per unit of the variable.
-    r2, rmae : numpy.ndarray, shape (k, c)
-        Accuracy on the test points (`hpcclear.statistics.surrogate.metrics`).
-    leave_one_out_r2 : numpy.ndarray, shape (k, c)
-    degrees_of_freedom, failed : numpy.ndarray of int, shape (k, c)
-        Of the residuals (0 where no surface was fitted); simulations that failed.
-    order : int
-        Total order of the surfaces.
-    """
+    """Midpoint derivatives of every surface; NaN where too few simulations succeeded."""
 
     intervals: Array
+    """Shape (k, d, 2): limits of the variables, the widest first."""
     clearances: Array
+    """Shape (c,)."""
     sensitivity: Array
     standard_error: Array
+    """sensitivity and standard_error, shape (k, c, d): derivatives at the midpoint, in units of f per unit of the variable."""
     r2: Array
     rmae: Array
+    """r2 and rmae, shape (k, c): accuracy on the test points (`hpcclear.statistics.surrogate.metrics`)."""
     leave_one_out_r2: Array
+    """Shape (k, c)."""
     degrees_of_freedom: Integers
     failed: Integers
+    """degrees_of_freedom and failed, shape (k, c): of the residuals (0 where no surface was fitted); simulations that
+    failed."""
     order: int
+    """Total order of the surfaces."""
 
 
 def design_intervals(

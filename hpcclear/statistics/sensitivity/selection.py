@@ -44,36 +44,24 @@ class Influence(IntEnum):
 
 @dataclass(frozen=True)
 class Selection:
-    """Ranking and selection; m columns, each a variable in a surface.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Variable of each column.
-    effect, effect_error : numpy.ndarray, shape (c, m)
-        Magnitude of the derivative times the interval length, and its standard error, in the
-        unit of f.
-    influence : numpy.ndarray of int, shape (c, m)
-        `Influence` at each clearance.
-    rank : numpy.ndarray of int, shape (c, m)
-        1 for the largest effect; 0 without an estimate.
-    share : numpy.ndarray, shape (m,)
-        Share of the clearances with an estimate at which the column is influential; NaN if none.
-    selected : tuple of str
-        X_G-I, each name once, the largest mean relative effect first.
-    order_stable : bool
-        No two columns change their order from one clearance to another by more than z standard
-        errors at both.
-    """
+    """Ranking and selection; m columns, each a variable in a surface."""
 
     names: tuple[str, ...]
+    """Variable of each column."""
     effect: Array
     effect_error: Array
+    """effect and effect_error, shape (c, m): magnitude of the derivative times the interval length, and its standard error,
+    in the unit of f."""
     influence: NDArray[np.int8]
+    """Shape (c, m): `Influence` at each clearance."""
     rank: Integers
+    """Shape (c, m): 1 for the largest effect; 0 without an estimate."""
     share: Array
+    """Shape (m,): share of the clearances with an estimate at which the column is influential; NaN if none."""
     selected: tuple[str, ...]
+    """X_G-I, each name once, the largest mean relative effect first."""
     order_stable: bool
+    """No two columns change their order from one clearance to another by more than z standard errors at both."""
 
 
 def select_influential(

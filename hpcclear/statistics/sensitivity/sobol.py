@@ -23,30 +23,22 @@ from hpcclear.statistics.surrogate.response_surface import check_bounds
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """Shares of the variance, without unit; NaN where f does not vary.
-
-    Attributes
-    ----------
-    first, total : numpy.ndarray, shape (d,)
-    first_limits, total_limits : numpy.ndarray, shape (d, 2)
-        Bootstrap percentiles. They treat the points as random, so for Sobol points, which cover the
-        box more evenly, they are wider than the error.
-    mean, variance : float
-        Of f over the box, in its unit and its square.
-    n_rows, n_dropped : int
-        Rows (d + 2 simulations each) that counted, and rows dropped whole because a simulation in
-        them failed. Dropping leaves that corner of the box out: many of them are a warning.
-    confidence : float
-    """
+    """Shares of the variance, without unit; NaN where f does not vary."""
 
     first: Array
     total: Array
+    """first and total: shape (d,)."""
     first_limits: Array
     total_limits: Array
+    """first_limits and total_limits, shape (d, 2): bootstrap percentiles. They treat the points as random, so for Sobol
+    points, which cover the box more evenly, they are wider than the error."""
     mean: float
     variance: float
+    """mean and variance: of f over the box, in its unit and its square."""
     n_rows: int
     n_dropped: int
+    """n_rows and n_dropped: rows (d + 2 simulations each) that counted, and rows dropped whole because a simulation in them
+    failed. Dropping leaves that corner of the box out: many of them are a warning."""
     confidence: float
 
 

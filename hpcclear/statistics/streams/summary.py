@@ -32,30 +32,21 @@ ROWS = tuple((name, k) for name in QUANTITIES for k in range(max(1, *OUTCOME[nam
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of some samples; of none, when made by `empty`.
-
-    Attributes
-    ----------
-    count : ndarray of int64, shape (rows,)
-        Finite numbers, for each of `ROWS`.
-    mean, squares, minimum, maximum : ndarray of float, shape (rows,)
-        Mean, sum of squared deviations from it, extremes; SI.
-    histogram : ndarray of int64, shape (rows, bins + 2)
-        Numbers below the edges, between each two, and at or above the last.
-    status : ndarray of int64, shape (outcomes,)
-        Samples by `hpcclear.base.outcome.Status`.
-    flags : ndarray of int64, shape (flags,)
-        Samples by `hpcclear.base.outcome.Flag`.
-    """
+    """Statistics of some samples; of none, when made by `empty`."""
 
     count: Integers
+    """Shape (rows,): finite numbers, for each of `ROWS`."""
     mean: Array
     squares: Array
     minimum: Array
     maximum: Array
+    """mean, squares, minimum and maximum, shape (rows,): mean, sum of squared deviations from it, extremes; SI."""
     histogram: Integers
+    """Shape (rows, bins + 2): numbers below the edges, between each two, and at or above the last."""
     status: Integers
+    """Shape (outcomes,): samples by `hpcclear.base.outcome.Status`."""
     flags: Integers
+    """Shape (flags,): samples by `hpcclear.base.outcome.Flag`."""
 
     @property
     def deviation(self) -> Array:
