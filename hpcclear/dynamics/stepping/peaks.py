@@ -74,7 +74,11 @@ def peak_force(d0, r0, d1, r1, lift, c, h, f0, f1):
         bend = 2.0 * c2 + 6.0 * s * c3 + 2.0 * lift * (tilt * tilt - 2.0 * turn)
         slope = force_slope(d, rate, bend, c, h)
         if slope > 0.0:
-            low, above, below = s, slope, 0.5 * below  # halved, or one end would stay for ever (Illinois)
+            low, above, below = (
+                s,
+                slope,
+                0.5 * below,
+            )  # halved, or one end would stay for ever (Illinois)
         else:
             high, below, above = s, slope, 0.5 * above
     force, end, rate_there = (f0, d0, r0) if f0 > f1 else (f1, d1, r1)
