@@ -36,8 +36,8 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-LOOSE = 1e-4
-"""Relative tolerance up to which "auto" integrates a single response by collocation: it is faster there, and more accurate."""
+TIGHT = 1e-9
+"""Relative tolerance from which "auto" integrates a single response by collocation: two methods agree to about this."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -306,9 +306,10 @@ def _bars_of(scene: Scene) -> Mechanism:
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
 
-    Looser than `LOOSE` the pair is faster. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
+    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digits that either
+    knows. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
     where the motion may be stiff, implicit steps are called for.
 
     Raises
@@ -336,7 +337,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         )
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
-    return single and automatic and smooth and scene.numerics.rtol <= LOOSE
+    return single and automatic and smooth and scene.numerics.rtol <= TIGHT
 
 
 def _cells_of_curves(
