@@ -72,8 +72,9 @@ def setup(chosen: Scene, par: Array) -> Setup:
 
 
 def single(chosen: Scene) -> Setup:
-    """One sample: the scene itself."""
-    return setup(chosen, parameters(chosen))
+    """One sample: the scene itself, by the method that a single response of it takes."""
+    one = setup(chosen, parameters(chosen))
+    return one._replace(problem=problem_of(chosen, single=True))
 
 
 def ensemble(chosen: Scene, samples: int) -> Setup:

@@ -12,7 +12,7 @@ from hpcclear.dynamics.stepping.events import hermite, root
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 
-from scenes import ensemble, scene  # noqa: E402
+from scenes import ensemble, scene
 
 
 def cubics(count: int):

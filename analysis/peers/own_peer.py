@@ -34,14 +34,15 @@ _PROBLEMS: dict[tuple, Problem] = {}
 
 
 def _solver(name: str) -> Callable[[Setup, int], float]:
-    """By collocation, or by one of the pairs."""
+    """By what `simulate` chooses, by collocation, or by one of the pairs."""
     tableau = TABLEAUS.get(name)
 
     def solve(setup: Setup, sample: int = 0) -> float:
-        if tableau is None:
-            problem = replace(setup.problem, collocation=True)
-        else:
-            problem = replace(setup.problem, tableau=tableau)
+        problem = setup.problem
+        if tableau is not None:
+            problem = replace(problem, tableau=tableau, collocation=False)
+        elif name == "lobatto":
+            problem = replace(problem, collocation=True)
         key = (problem.effects, name, problem.rtol, problem.atol)
         _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
@@ -70,7 +71,7 @@ def plain_positions(setup: Setup) -> Array:
     return found[:, 1]
 
 
-SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("lobatto", *TABLEAUS)} | {
+SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("auto", "lobatto", *TABLEAUS)} | {
     "plain loop": plain
 }
 BATCH = {

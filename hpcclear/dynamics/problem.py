@@ -36,8 +36,9 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-TIGHT = 1e-9
-"""Relative tolerance from which "auto" integrates a single response by collocation: two methods agree to about this."""
+TIGHT = 5e-7
+"""Relative tolerance from which "auto" integrates a single response by collocation. It is faster from 1e-4 on; but at the
+default tolerance and looser a response is its ensemble's sample, step by step."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -308,8 +309,8 @@ def _bars_of(scene: Scene) -> Mechanism:
 def takes_collocation(scene: Scene, single: bool) -> bool:
     """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
 
-    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digits that either
-    knows. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
+    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digit, also where the
+    motion is chaotic. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
     where the motion may be stiff, implicit steps are called for.
 
     Raises

@@ -76,7 +76,7 @@ def range_of(work, m, rate):
 
 @lane_function
 def may_change(latched, work, m, p, settings):
-    """Whether joint p's contact may begin or end in this step: for most steps its extremes at the nodes say that it does not."""
+    """Whether joint p's contact may begin or end in this step: mostly its extremes at the nodes say that it does not."""
     low, high = range_of(work, m, at.GAP + p)
     flight = latched and work[at.ACTIVE + p] == 0.0
     strikes = flight and high >= -settings[GAP_TOLERANCE]

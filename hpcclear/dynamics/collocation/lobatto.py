@@ -46,7 +46,9 @@ GAP_COEFFICIENT = COEFFICIENT + MOST_COORDINATES  # and of a gap
 BASE = GAP_COEFFICIENT + 1  # row: coefficient of degree 0, lane by lane a coordinate
 START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
 WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
-SQUARES = WEIGHT + 1  # rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
+SQUARES = (
+    WEIGHT + 1
+)  # rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
 SCALARS = SQUARES + 3
 (
     POLYNOMIAL_STEP,  # s, of the step whose coefficients are kept; 0 when there are none
@@ -221,8 +223,11 @@ def keep_change(m, n):
 
 @lane_function
 def take_accelerations(m, work, n, h, first):
-    """Stages of the next sweep from what this one found, with Anderson's acceleration (1965, doi:10.1145/321296.321305) over two
-    sweeps: what changes along the change before falls to nothing. Returns the scaled size of the change."""
+    """Stages of the next sweep from what this one found. Returns the scaled size of the change.
+
+    With Anderson's acceleration (1965, doi:10.1145/321296.321305) over two sweeps: what changes along the change before
+    falls to nothing.
+    """
     compare(m, n)
     turn = sum_of(m, SQUARES + 2)
     back = sum_of(m, SQUARES + 1) / (turn + 1e-300)

@@ -138,7 +138,9 @@ def sweep(motion, work, m, tables, n):
 @lane_function
 def gap_tail(work, m, p, rtol):
     """Squares of the last two coefficients of joint p's gap and of the two before, scaled as its integral's error is."""
-    row = lob.GAP_COEFFICIENT  # the same for all joints: into one that goes by p the compiler would not store a vector
+    row = (
+        lob.GAP_COEFFICIENT
+    )  # the same for all joints: into one that goes by p the compiler would not store a vector
     lob.coefficients_of(m, at.RATE_NOW + at.GAP + p, work[at.RATE_OLD + at.GAP + p], row)
     clearance = lob.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
     scale = work[at.STEP] / (rtol * m[clearance * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])

@@ -56,7 +56,9 @@ def root(d0, m0, d1, m1, end):
         change = step / (1.0 - step * bend)
         new = s - change
         if low <= new <= high and abs(step * bend) < 0.5:  # beyond, it would settle on an extremum
-            left = change * change * (bend * bend + abs(c3 * inverse))  # of the change, if it is small
+            left = (
+                change * change * (bend * bend + abs(c3 * inverse))
+            )  # of the change, if it is small
             if left <= 1e-6 and left * abs(change) <= 1e-16 * end:
                 return new
         else:

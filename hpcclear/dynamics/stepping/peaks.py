@@ -1,7 +1,7 @@
-"""Peaks of contact forces and penetrations inside a step: at its ends they would be too low by a fifth of a per cent, and more.
+"""Peaks of contact forces and penetrations inside a step: at its ends they are too low by a fifth of a per cent, and more.
 
-Between two instants a gap is the cubic through its values and rates there. The contact force goes with d**1.5 (1 + c d'), c from
-the law's damping, so that its largest value inside is known from that at either end.
+Between two instants a gap is the cubic through its values and rates there. The contact force goes with d**1.5 (1 + c d'),
+c from the law's damping, so that its largest value inside is known from that at either end.
 """
 
 import math
