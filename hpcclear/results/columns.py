@@ -127,6 +127,7 @@ KRIGING: Columns = {
     "weight": number(("model", "point"), "1", "weight of the training point in a prediction", required=True),
     "length_scale": number(("model", "parameter"), "1", "correlation length, in the unit cube", required=True),
     "used": flag(("model", "parameter"), "whether the parameter is an input of the model"),
+    "kernel": text(("model",), "covariance function, where it is not the squared exponential"),
     "signal_variance": number(("model",), "1", "variance of the process, in output_scale^2"),
     "noise_variance": number(("model",), "1", "variance of the noise, in output_scale^2"),
     "output_mean": number(("model",), "objective", "mean taken off before the fit"),

@@ -21,7 +21,7 @@ from hpcclear.statistics.sensitivity import (
     sobol_design,
 )
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
+from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.statistics.surrogate.surface_search import (
     SearchSettings,
     SurfaceSearch,
@@ -121,18 +121,22 @@ def _designs(run: StudyRun) -> list[IntervalDesign]:
 
 def _layouts(study: Study) -> list[IntervalSettings]:
     """How many points each surface gets."""
-    settings = study.sensitivity
-    separate = [False] * len(study.groups)
-    return [
-        IntervalSettings(
-            steps=settings.rounds,
-            shrink=settings.shrink,
-            n_points=settings.together_samples if together else settings.samples,
-            n_test=max(settings.test_samples, 20) if together else settings.test_samples,
-            order=settings.together_order if together else settings.order,
+    settings, found = study.sensitivity, []
+    for k, names in enumerate(surfaces(study)):
+        together = k == len(study.groups)
+        order = settings.together_order if together else settings.order
+        points = settings.together_samples if together else settings.samples
+        found.append(
+            IntervalSettings(
+                steps=settings.rounds,
+                shrink=settings.shrink,
+                n_points=points,
+                n_test=max(settings.test_samples, 20) if together else settings.test_samples,
+                order=order,
+                chosen=settings.chooses(len(names), order, points),
+            )
         )
-        for together in (separate if len(separate) < 2 else [*separate, True])
-    ]
+    return found
 
 
 def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
@@ -265,8 +269,10 @@ def _surface(
     bounds, cut = design.intervals[0], laid_out.n_points
     finite = np.isfinite(outcomes)
     reached, count = None, int(finite[:cut].sum())
-    if count >= n_terms(variables, laid_out.order) and finite[cut:].sum() >= 2:
-        surface = fit_response_surface(points[:cut], outcomes[:cut], bounds, laid_out.order)
+    if count >= laid_out.terms(variables) and finite[cut:].sum() >= 2:
+        surface = fit_response_surface(
+            points[:cut], outcomes[:cut], bounds, laid_out.order, chosen=laid_out.chosen
+        )
         reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
         if reached.meets(settings.r2, settings.rmae):
             return reached, laid_out.order, count, True
@@ -291,6 +297,7 @@ def _searched(
             max_points=laid_out.n_points * 2**settings.resamplings,
             r2_min=settings.r2,
             rmae_max=settings.rmae,
+            chosen=laid_out.chosen,
         )
         rng = run.rng("surface", " ".join(inputs[k]), str(level))
         searches.append(search(designs[k].intervals[0], rng, tried))

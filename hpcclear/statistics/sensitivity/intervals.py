@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
     Sampler,
     check_bounds,
     fit_response_surface,
     latin_hypercube,
-    n_terms,
 )
 
 
@@ -36,6 +36,8 @@ class IntervalSettings:
         in (0, 1).
     n_points, n_test, order : int
         Training points, test points and total order of each surface.
+    chosen : bool
+        Whether surfaces choose their terms (`fit_response_surface`).
 
     Raises
     ------
@@ -48,6 +50,7 @@ class IntervalSettings:
     n_points: int = 45
     n_test: int = 5
     order: int = 3
+    chosen: bool = False
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -58,6 +61,10 @@ class IntervalSettings:
             raise InputError("order", self.order, "a constant has no slope", "take at least 1")
         if self.n_test < 2:
             raise InputError("n_test", self.n_test, "R2 needs two test points", "take at least 2")
+
+    def terms(self, variables: int) -> int:
+        """Terms that every surface in so many variables has."""
+        return n_terms(variables, 1 if self.chosen else self.order)
 
 
 DEFAULTS = IntervalSettings()
@@ -146,7 +153,7 @@ def design_intervals(
     """
     limits = check_bounds(bounds)
     gaps = np.asarray(clearances, float)
-    _check_design(gaps, settings, n_terms(len(limits), settings.order))
+    _check_design(gaps, settings, settings.terms(len(limits)))
     fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
     middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
     lower = middle - fractions[:, np.newaxis] * half
@@ -227,9 +234,10 @@ def _surface(
     """Surface over interval k on its training points; None if failures left too few of them."""
     limits, settings = design.intervals[k], design.settings
     values = values[: settings.n_points]
-    if np.count_nonzero(np.isfinite(values)) <= n_terms(len(limits), settings.order):
+    if np.count_nonzero(np.isfinite(values)) <= settings.terms(len(limits)):
         return None
-    return fit_response_surface(points[: len(values)], values, limits, settings.order)
+    at = points[: len(values)]
+    return fit_response_surface(at, values, limits, settings.order, chosen=settings.chosen)
 
 
 def _tested(

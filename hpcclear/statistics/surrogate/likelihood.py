@@ -1,8 +1,9 @@
 """Maximum likelihood of Kriging's length scales and variances, with gradients that cost no more than the likelihood.
 
-For W = (alpha alpha' - K^-1) * S, elementwise, S the covariance without noise, the derivative by the logarithm of a
-length scale is half the sum of W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is
-a product of W and z for all length scales at once, in place of a matrix of derivatives for each.
+For W = (alpha alpha' - K^-1) * S, elementwise, S the covariance without noise (of another kernel than the squared exponential,
+what stands in its place: `kernels.with_slopes`), the derivative by the logarithm of a length scale is half the sum of
+W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is a product of W and z for all
+length scales at once, in place of a matrix of derivatives for each.
 
 Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 5.8 and 5.9; the search
 is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, further starts uniform in these).
@@ -16,6 +17,12 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array
+from hpcclear.statistics.surrogate.kernels import (
+    SQUARED_EXPONENTIAL,
+    Kernel,
+    correlation,
+    with_slopes,
+)
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,13 @@ class Fitted:
 
 
 def maximise(
-    unit: Array, values: Array, start: Array, bounds: Array, restarts: int, seed: int
+    unit: Array,
+    values: Array,
+    start: Array,
+    bounds: Array,
+    restarts: int,
+    seed: int,
+    kernel: Kernel = SQUARED_EXPONENTIAL,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values at points.
 
@@ -66,7 +79,7 @@ def maximise(
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
     found = [
         minimize(
-            lambda theta: negative_likelihood(theta, centred, values),
+            lambda theta: negative_likelihood(theta, centred, values, kernel),
             one,
             method="L-BFGS-B",
             jac=True,
@@ -76,14 +89,16 @@ def maximise(
     ]
     best = np.exp(min(found, key=lambda one: float(one.fun)).x)
     scaled = unit / best[1:-1]
-    covariance = best[0] * np.exp(-0.5 * cdist(scaled, scaled, "sqeuclidean"))
+    covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
     covariance[np.diag_indices_from(covariance)] += best[-1]
     factor, _ = dpotrf(covariance, lower=1)
     alpha, _ = dpotrs(factor, values, lower=1)
     return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
 
 
-def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[float, Array]:
+def negative_likelihood(
+    theta: Array, centred: Array, values: Array, kernel: Kernel = SQUARED_EXPONENTIAL
+) -> tuple[float, Array]:
     """Minus the log likelihood, and its gradient.
 
     Parameters
@@ -93,6 +108,7 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
     centred : array, shape (n, d)
         Points.
     values : array, shape (n,)
+    kernel : str
 
     Returns
     -------
@@ -100,15 +116,14 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
         Infinite, and 0, where the covariance matrix cannot be factored.
     """
     noise, count = np.exp(theta[-1]), len(values)
+    level = theta[0] if kernel == SQUARED_EXPONENTIAL else 0.0
     scaled = centred / np.exp(theta[1:-1])
     halves, ones = -0.5 * np.einsum("ij,ij->i", scaled, scaled), np.ones(count)
-    # the exponents, -|z_i - z_j|^2 / 2 + log signal, as one product
-    smooth = np.column_stack([scaled, halves + theta[0], ones]) @ np.vstack(
+    # -|z_i - z_j|^2 / 2, with the logarithm of the signal where that is an exponent, as one product
+    exponents = np.column_stack([scaled, halves + level, ones]) @ np.vstack(
         [scaled.T, ones, halves]
     )
-    np.minimum(smooth, theta[0], out=smooth)
-    np.exp(smooth, out=smooth)
-    np.fill_diagonal(smooth, np.exp(theta[0]))
+    smooth, slopes = with_slopes(exponents, theta[0], kernel)
     covariance = smooth.copy()
     covariance[np.diag_indices(count)] += noise
     # LAPACK and BLAS take the transpose without a copy, and touch its lower triangle only
@@ -118,13 +133,15 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
     alpha, _ = dpotrs(factor, values, lower=1)
     logarithm = np.log(np.diag(factor)).sum()
     inverse, _ = dpotri(factor, lower=1, overwrite_c=1)
-    trace = np.trace(inverse)
+    noisy = noise * (alpha @ alpha - np.trace(inverse))
     weights = dsyr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)  # K^-1 - alpha alpha'
-    weights *= smooth.T
+    weights *= slopes.T
     table = np.column_stack([scaled, ones])
     products = dsymm(-1.0, weights, table, lower=1)
     rows = products[:, -1]
     lengths = rows @ scaled**2 - np.einsum("ij,ij->j", scaled, products[:, :-1])
-    gradient = [0.5 * rows.sum(), *lengths, 0.5 * noise * (alpha @ alpha - trace)]
+    # the sum of (alpha alpha' - K^-1) * S: all of K but its noise
+    signal = rows.sum() if kernel == SQUARED_EXPONENTIAL else values @ alpha - count - noisy
+    gradient = [0.5 * signal, *lengths, 0.5 * noisy]
     constant = 0.5 * count * np.log(2.0 * np.pi)
     return float(0.5 * values @ alpha + logarithm + constant), -np.array(gradient)
