@@ -5,6 +5,10 @@ what stands in its place: `kernels.with_slopes`), the derivative by the logarith
 W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is a product of W and z for all
 length scales at once, in place of a matrix of derivatives for each.
 
+Of many points the search begins on a part, where more starts cost little, and goes on with twice as many from the best that was
+found. An input that a part sees no influence of has a length scale so long that nothing would ever shorten it again: where
+the search leaves the first part, length scales are cut.
+
 Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 5.8 and 5.9; the search
 is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, further starts uniform in these).
 """
@@ -16,13 +20,23 @@ from scipy.linalg.blas import dsymm, dsyr
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.spatial.distance import cdist
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.statistics.surrogate.kernels import (
     SQUARED_EXPONENTIAL,
     Kernel,
     correlation,
     with_slopes,
 )
+
+PART = 250
+"""Points that the first part of many has at least; fewer than twice as many are searched as a whole."""
+FURTHER = 6
+"""Starts more on the first part, between these limits of signal variance, length scales and noise variance."""
+SPANS = (0.3, 10.0), (0.15, 3.0), (1e-5, 0.3)
+LONGEST = 1.0
+"""Length scales are cut there when the search leaves the first part."""
+CLOSE = 1e-7
+"""Relative change of the likelihood at which a search by parts ends."""
 
 
 @dataclass(frozen=True)
@@ -70,13 +84,53 @@ def maximise(
         Further starts.
     seed : int
         Of these.
+    kernel : str
     """
-    from scipy.optimize import minimize  # only fitting needs it
-
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
     starts = [np.log(start)]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
+    parts = _parts(len(values), draws)
+    if len(parts) == 1:
+        top = _climbed(starts, centred, values, limits, kernel)
+    else:
+        low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
+        starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
+        top = _climbed(starts, centred[parts[0]], values[parts[0]], limits, kernel, CLOSE)
+        top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
+        for part in parts[1:]:
+            top = _climbed([top], centred[part], values[part], limits, kernel, CLOSE)
+    best = np.exp(top)
+    scaled = unit / best[1:-1]
+    covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
+    covariance[np.diag_indices_from(covariance)] += best[-1]
+    factor, _ = dpotrf(covariance, lower=1)
+    alpha, _ = dpotrs(factor, values, lower=1)
+    return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
+
+
+def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
+    """Which points the search sees one time after the other, each twice as many; all of them at last."""
+    sizes = [count]
+    while sizes[0] >= 2 * PART:
+        sizes.insert(0, sizes[0] // 2)
+    if len(sizes) == 1:
+        return [np.arange(count)]
+    order = draws.permutation(count)
+    return [np.sort(order[:size]) for size in sizes]
+
+
+def _climbed(
+    starts: list[Array],
+    centred: Array,
+    values: Array,
+    limits: Array,
+    kernel: Kernel,
+    close: float | None = None,
+) -> Array:
+    """The best that is found from these starts, logarithms as in `negative_likelihood`, shape (d + 2,)."""
+    from scipy.optimize import minimize  # only fitting needs it
+
     found = [
         minimize(
             lambda theta: negative_likelihood(theta, centred, values, kernel),
@@ -84,16 +138,11 @@ def maximise(
             method="L-BFGS-B",
             jac=True,
             bounds=limits,
+            options={} if close is None else {"ftol": close},
         )
         for one in starts
     ]
-    best = np.exp(min(found, key=lambda one: float(one.fun)).x)
-    scaled = unit / best[1:-1]
-    covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
-    covariance[np.diag_indices_from(covariance)] += best[-1]
-    factor, _ = dpotrf(covariance, lower=1)
-    alpha, _ = dpotrs(factor, values, lower=1)
-    return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
+    return np.asarray(min(found, key=lambda one: float(one.fun)).x)
 
 
 def negative_likelihood(
