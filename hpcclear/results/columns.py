@@ -107,6 +107,7 @@ SENSITIVITY: Columns = {
     "surface_rmae_mean": number(("surface", "clearance"), "1", "largest test error over their mean, eq. 27"),
     "surface_order": count(("surface", "clearance"), "order of the global surface"),
     "surface_points": count(("surface", "clearance"), "points it was fitted to"),
+    "surface_terms": count(("surface", "clearance"), "its terms, where some surface chose them; 0 where none was fitted"),
     "surface_accepted": flag(("surface", "clearance"), "whether it passed on its test points"),
     "mean_objective": number(("clearance",), "objective", "mean of the objective over the box"),
     "mean_objective_error": number(("clearance",), "objective", "standard error of it"),

@@ -245,38 +245,44 @@ def _accepted(
         for k, c in np.ndindex(*shape)
     }
     if run.study.sensitivity.resamplings > 0:
-        refused = [place for place, one in made.items() if not one[3]]
+        refused = [place for place, one in made.items() if not one[-1]]
         for place, one in zip(refused, _searched(run, inputs, designs, refused), strict=True):
-            made[place] = one.accuracy, one.surface.order, one.surface.n_points, one.accepted
-    for (k, c), (reached, order, count, accepted) in made.items():
+            surface = one.surface
+            counts = surface.order, surface.n_points, len(surface.coefficients)
+            made[place] = one.accuracy, *counts, one.accepted
+    if any(design.settings.chosen for design in designs):
+        result["surface_terms"] = np.zeros(shape, np.int64)
+    for (k, c), (reached, order, count, terms, accepted) in made.items():
         if reached is not None:
             result["surface_r2"][k, c], result["surface_rmae"][k, c] = reached.r2, reached.rmae
             result["surface_r2_explained"][k, c] = reached.r2_explained
             result["surface_rmae_mean"][k, c] = reached.rmae_mean
         result["surface_order"][k, c], result["surface_points"][k, c] = order, count
         result["surface_accepted"][k, c] = accepted
+        if "surface_terms" in result:
+            result["surface_terms"][k, c] = terms
     return result
 
 
 def _surface(
     run: StudyRun, variables: int, design: IntervalDesign, values: Array, level: int
-) -> tuple[Accuracy | None, int, int, bool]:
-    """Accuracy, order and points of a surface of so many variables, and whether it was accepted."""
+) -> tuple[Accuracy | None, int, int, int, bool]:
+    """Accuracy, order, points and terms of a surface of so many variables, and whether it was accepted."""
     settings, laid_out = run.study.sensitivity, design.settings
     size = laid_out.n_points + laid_out.n_test
     rows = slice(level * size, (level + 1) * size)
     points, outcomes = design.points[rows, :-1], values[rows]
     bounds, cut = design.intervals[0], laid_out.n_points
     finite = np.isfinite(outcomes)
-    reached, count = None, int(finite[:cut].sum())
-    if count >= laid_out.terms(variables) and finite[cut:].sum() >= 2:
+    reached, count, terms = None, int(finite[:cut].sum()), 0
+    if count >= laid_out.needed(variables) and finite[cut:].sum() >= 2:
         surface = fit_response_surface(
             points[:cut], outcomes[:cut], bounds, laid_out.order, chosen=laid_out.chosen
         )
         reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
-        if reached.meets(settings.r2, settings.rmae):
-            return reached, laid_out.order, count, True
-    return reached, laid_out.order, count, False
+        terms = len(surface.coefficients)
+    accepted = reached is not None and reached.meets(settings.r2, settings.rmae)
+    return reached, laid_out.order, count, terms, accepted
 
 
 def _searched(

@@ -21,6 +21,7 @@ from hpcclear.statistics.surrogate.response_surface import (
     fit_response_surface,
     latin_hypercube,
 )
+from hpcclear.statistics.surrogate.term_choice import least_points
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,9 @@ class IntervalSettings:
         if self.n_test < 2:
             raise InputError("n_test", self.n_test, "R2 needs two test points", "take at least 2")
 
-    def terms(self, variables: int) -> int:
-        """Terms that every surface in so many variables has."""
-        return n_terms(variables, 1 if self.chosen else self.order)
+    def needed(self, variables: int) -> int:
+        """Points without which there is no surface in so many variables."""
+        return least_points(variables) if self.chosen else n_terms(variables, self.order)
 
 
 DEFAULTS = IntervalSettings()
@@ -153,7 +154,7 @@ def design_intervals(
     """
     limits = check_bounds(bounds)
     gaps = np.asarray(clearances, float)
-    _check_design(gaps, settings, settings.terms(len(limits)))
+    _check_design(gaps, settings, settings.needed(len(limits)))
     fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
     middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
     lower = middle - fractions[:, np.newaxis] * half
@@ -234,7 +235,7 @@ def _surface(
     """Surface over interval k on its training points; None if failures left too few of them."""
     limits, settings = design.intervals[k], design.settings
     values = values[: settings.n_points]
-    if np.count_nonzero(np.isfinite(values)) <= settings.terms(len(limits)):
+    if np.count_nonzero(np.isfinite(values)) <= settings.needed(len(limits)):
         return None
     at = points[: len(values)]
     return fit_response_surface(at, values, limits, settings.order, chosen=settings.chosen)
@@ -251,15 +252,15 @@ def _tested(
     return reached.r2, reached.rmae
 
 
-def _check_design(clearances: Array, settings: IntervalSettings, terms: int) -> None:
+def _check_design(clearances: Array, settings: IntervalSettings, needed: int) -> None:
     if clearances.ndim != 1 or clearances.size == 0 or not np.isfinite(clearances).all():
         raise InputError(
             "clearances", clearances.tolist(), "not a list of numbers", "give at least one"
         )
-    if settings.n_points <= terms:
+    if settings.n_points <= needed:
         raise InputError(
             "n_points",
             settings.n_points,
-            f"a surface of {terms} terms leaves nothing to estimate the scatter from",
-            f"take at least {terms + 1}, better {2 * terms}",
+            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
+            f"take at least {needed + 1}, better {2 * needed}",
         )

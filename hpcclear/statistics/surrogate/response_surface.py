@@ -43,13 +43,15 @@ class ResponseSurface:
         (X'X)^-1; times `residual_variance` it is the covariance of the coefficients.
     residual_variance : float
         SSE / degrees of freedom, no less than the rounding of the values; NaN without any
-        degrees of freedom.
+        degrees of freedom. Of chosen terms no less than the mean square error at points left out
+        of the choice.
     degrees_of_freedom : int
         Points that counted minus terms.
     leave_one_out_errors : numpy.ndarray, shape (n,)
-        Error at each point of the surface fitted without it.
+        Error at each point of the surface fitted without it, its terms as they stand.
     leave_one_out_r2 : float
-        1 - sum of squares of those errors / SST; NaN if the values do not vary.
+        1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms
+        that of points left out of the choice as well.
     condition : float
         Condition number of the design matrix.
     n_points, n_dropped : int
@@ -201,12 +203,13 @@ def fit_response_surface(
     -----
     Solved through the singular value decomposition, not the normal equations of section 4.2,
     which square the condition number. Values are taken relative to one of them, so that a
-    constant gives coefficients of exactly 0. Standard errors and leave-one-out errors are those of the
-    terms as they stand: where these were chosen by the same values, both are somewhat too small.
+    constant gives coefficients of exactly 0.
     """
     limits = check_bounds(bounds)
     z, y, n_dropped = _finite_rows(scale_inputs(points, limits), values)
-    exponents = choose_terms(z, y, order) if chosen else exponents_up_to(len(limits), order)
+    exponents, least = exponents_up_to(len(limits), order), 0.0
+    if chosen:
+        exponents, least = choose_terms(z, y, order)
     design, offset = monomials(z, exponents), y[0] if len(y) else 0.0
     left, singular, right = _decomposed(design, order, n_dropped)
     inverse = right.T / singular
@@ -223,12 +226,12 @@ def fit_response_surface(
         exponents=exponents,
         coefficients=coefficients,
         unscaled_covariance=inverse @ inverse.T,
-        residual_variance=max(float(residuals @ residuals) / freedom, rounding)
+        residual_variance=max(float(residuals @ residuals) / freedom, rounding, least)
         if freedom
         else float("nan"),
         degrees_of_freedom=freedom,
         leave_one_out_errors=errors,
-        leave_one_out_r2=float(1 - np.sum(errors**2) / total)
+        leave_one_out_r2=float(1 - (least * len(y) if chosen else np.sum(errors**2)) / total)
         if total > len(y) * rounding
         else float("nan"),
         condition=float(singular[0] / singular[-1]),

@@ -30,8 +30,8 @@ DEPENDENT = 1e-8
 """Share of a term's length, beyond what other terms say, below which the points do not determine it."""
 
 
-def choose_terms(z: Array, values: Array, order: int) -> Integers:
-    """Exponents of the terms that values speak for.
+def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
+    """Exponents of the terms that values speak for, and how far off such a surface is.
 
     Parameters
     ----------
@@ -46,6 +46,8 @@ def choose_terms(z: Array, values: Array, order: int) -> Integers:
     -------
     array of int, shape (t, d)
         The constant first, all linear terms, then others as they were found.
+    float
+        Mean square error at points that had no part in the choice.
 
     Raises
     ------
@@ -55,7 +57,7 @@ def choose_terms(z: Array, values: Array, order: int) -> Integers:
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     count, dims = z.shape
-    least = int((dims + 2) / MOST_SHARE * FOLDS / (FOLDS - 1)) + 1
+    least = least_points(dims)
     if count < least:
         raise InputError(
             "points",
@@ -65,7 +67,7 @@ def choose_terms(z: Array, values: Array, order: int) -> Integers:
         )
     linear = exponents_up_to(dims, min(order, 1))
     if order < 2 or np.linalg.matrix_rank(monomials(z, linear)) < len(linear):
-        return linear  # which the fit refuses if the points do not determine them
+        return linear, 0.0  # which the fit refuses if the points do not determine them
     with threadpool_limits(limits=1, user_api="blas"):  # the same bits on any machine of a kind
         fold = np.arange(count) % FOLDS
         found = [_followed(z, values, order, fold != k)[1] for k in range(FOLDS)]
@@ -76,8 +78,15 @@ def choose_terms(z: Array, values: Array, order: int) -> Integers:
         return _or_all(z, values, order, float(errors[chosen]), terms[chosen])
 
 
-def _or_all(z: Array, values: Array, order: int, least: float, chosen: list[Term]) -> Integers:
-    """The chosen terms, whose mean square error is given, or all up to an order, if their own error is less."""
+def least_points(n_inputs: int) -> int:
+    """Points without which no terms are chosen: each fold leaves enough for the linear ones and one more."""
+    return int((n_inputs + 2) / MOST_SHARE * FOLDS / (FOLDS - 1)) + 1
+
+
+def _or_all(
+    z: Array, values: Array, order: int, least: float, chosen: list[Term]
+) -> tuple[Integers, float]:
+    """The chosen terms, whose mean square error is given, or all up to an order, if their own error is less; with the error."""
     best = np.array(chosen, dtype=np.int64)
     for whole in range(2, order + 1):
         if n_terms(z.shape[1], whole) >= len(z):
@@ -87,7 +96,7 @@ def _or_all(z: Array, values: Array, order: int, least: float, chosen: list[Term
         errors = leave_one_out(values - basis @ (basis.T @ values), np.sum(basis**2, axis=1))
         if np.mean(errors**2) < least:  # not where one is NaN
             best, least = exponents, float(np.mean(errors**2))
-    return best
+    return best, least
 
 
 def _followed(
