@@ -3,7 +3,7 @@
     python analysis/benchmark_surrogates.py                 # all of it, about 10 min
     python analysis/benchmark_surrogates.py fits --seeds 1  # a look: fits, kernels or surfaces
 
-fits: Kriging of five functions by scikit-learn's GaussianProcessRegressor (same kernel, bounds, first start and number of starts,
+fits: Kriging by scikit-learn's GaussianProcessRegressor (same kernel, bounds, first start and number of starts,
 one thread) and by `fit_kriging`: seconds of processor time, log likelihood by the same formula, held-out error.
 kernels: held-out error of the squared exponential and of Matern 5/2 on the same functions.
 surfaces: polynomials of 20 variables, all terms up to an order beside those that are chosen of a cubic's 1771.
