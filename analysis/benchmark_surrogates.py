@@ -102,6 +102,7 @@ def fits(seeds: int) -> None:
     """Kriging by scikit-learn and by `fit_kriging`."""
     welcher = (welch, friedman)  # of 20 inputs
     sizes = [(5, 200, FIVE), (20, 200, welcher), (5, 1000, FIVE)]
+    _both(friedman, 5, 30, 0)  # loads and compiles what both need
     for dims, count, functions in sizes:
         for function in functions:
             rows = np.array([_both(function, dims, count, seed) for seed in range(seeds)])

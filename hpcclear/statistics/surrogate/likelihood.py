@@ -32,11 +32,9 @@ PART = 250
 """Points that the first part of many has at least; fewer than twice as many are searched as a whole."""
 FURTHER = 6
 """Starts more on the first part, between these limits of signal variance, length scales and noise variance."""
-SPANS = (0.3, 10.0), (0.15, 3.0), (1e-5, 0.3)
+SPANS = (0.3, 10.0), (0.1, 1.0), (1e-6, 1e-3)
 LONGEST = 1.0
 """Length scales are cut there when the search leaves the first part."""
-CLOSE = 1e-7
-"""Relative change of the likelihood at which a search by parts ends."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +94,10 @@ def maximise(
     else:
         low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
         starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
-        top = _climbed(starts, centred[parts[0]], values[parts[0]], limits, kernel, CLOSE)
+        top = _climbed(starts, centred[parts[0]], values[parts[0]], limits, kernel)
         top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
         for part in parts[1:]:
-            top = _climbed([top], centred[part], values[part], limits, kernel, CLOSE)
+            top = _climbed([top], centred[part], values[part], limits, kernel)
     best = np.exp(top)
     scaled = unit / best[1:-1]
     covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
@@ -121,12 +119,7 @@ def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
 
 
 def _climbed(
-    starts: list[Array],
-    centred: Array,
-    values: Array,
-    limits: Array,
-    kernel: Kernel,
-    close: float | None = None,
+    starts: list[Array], centred: Array, values: Array, limits: Array, kernel: Kernel
 ) -> Array:
     """The best that is found from these starts, logarithms as in `negative_likelihood`, shape (d + 2,)."""
     from scipy.optimize import minimize  # only fitting needs it
@@ -138,7 +131,6 @@ def _climbed(
             method="L-BFGS-B",
             jac=True,
             bounds=limits,
-            options={} if close is None else {"ftol": close},
         )
         for one in starts
     ]
