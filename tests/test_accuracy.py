@@ -272,6 +272,26 @@ def test_leave_one_out_is_what_a_model_without_the_point_predicts():
     np.testing.assert_allclose(surrogate.leave_one_out(model), expected, rtol=1e-5, atol=1e-9)
 
 
+def test_a_study_with_another_kernel_is_shown_both():
+    variables = {"m2": {"range": [0.1, 0.4]}, "C": {"range": ["0.3 mm", "1 mm"]}}
+    scene, case, _ = with_case(PAPER.with_({"study": {"seed": 1, "variables": variables}}))
+    for kernel, names in (
+        (None, ("response surface", "Kriging")),
+        ("squared-exponential", ("response surface", "Kriging")),
+        ("matern-5/2", ("response surface", "Kriging", "Kriging, matern-5/2")),
+    ):
+        asked = scene.with_({"study.surrogate.kernel": kernel})
+        region = surrogate.region_of(asked, case)
+        designs = surrogate.designs_of(asked, case, TINY, surrogate._generator(asked))
+        unit = (np.concatenate(designs) - region.lower) / (region.upper - region.lower)
+        found = surrogate.measure(asked, case, TINY, np.abs(unit[:, 0] - 0.4) + unit[:, 1], 1.0)
+        assert found.names == names
+        assert found.r2.shape == found.fit_seconds.shape == (len(names), 2)
+        assert np.isfinite(found.leave_one_out).all()
+        assert found.model.kernel == "squared-exponential"
+    assert found.rmae[2, 1] < found.rmae[1, 1]  # of a kink
+
+
 def test_limits_of_a_root_mean_square_hold_as_often_as_they_say(shift):
     rng = np.random.default_rng(4 + shift)
     errors = 0.3 * rng.standard_normal((12, 4000))

@@ -19,7 +19,7 @@ from matplotlib.transforms import Bbox
 from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import accuracy as accuracy_figures
-from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.figures import labels, motion, style, surrogates
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.stored import models_in
 
@@ -73,6 +73,13 @@ def _guided() -> xr.Dataset:
     moved = {"body_y": made["slider_position"], "body_vy": made["slider_velocity"]}
     bodies = {name: one.expand_dims(body=["ram"], axis=1) for name, one in {**gone, **still, **moved}.items()}  # fmt: skip
     return made.drop_vars(["slider_position", "slider_velocity"]).assign(bodies)
+
+
+def test_a_model_with_another_kernel_says_so() -> None:
+    made = data.kriging()
+    made["kernel"] = ("model", np.array(["matern-5/2", "squared-exponential", "matern-5/2"]))
+    titles = [panel.get_title(loc="left") for panel in surrogates.parity_figure(made).axes[:3]]
+    assert ["matern" in title for title in titles] == [True, False, True]
 
 
 def test_what_slides_is_drawn_by_its_place() -> None:

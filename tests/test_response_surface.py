@@ -12,11 +12,11 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import accuracy, leave_one_out
+from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
     fit_response_surface,
     latin_hypercube,
-    n_terms,
 )
 from hpcclear.statistics.surrogate.surface_search import (
     Search,

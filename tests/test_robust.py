@@ -1,10 +1,13 @@
 """Moments under random inputs: three routes against each other and against known answers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from margins import at_least, at_most
 from scipy import stats
 from scipy.integrate import quad
+from sklearn.gaussian_process.kernels import Matern
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.distributions import (
@@ -16,6 +19,7 @@ from hpcclear.statistics.random.distributions import (
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, sample_moments
+from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 
@@ -418,3 +422,31 @@ def test_an_input_over_many_length_scales_is_refused():
     with pytest.raises(InputError, match="length scales") as caught:
         RobustObjective(rough, DESIGN, UNIFORM[:1])
     assert caught.value.key == "C"
+
+
+# A kernel that is no product of its inputs
+
+
+def test_matern_has_no_tensor_rule_and_no_closed_form():
+    rough = replace(surrogate(), kernel=MATERN)
+    with pytest.raises(InputError, match="no product") as caught:
+        RobustObjective(rough, DESIGN, UNIFORM[:1])
+    assert caught.value.key == "kernel"
+    averaged = RobustObjective(rough, DESIGN, UNIFORM[:1], draws=(64, np.random.default_rng(0)))
+    with pytest.raises(InputError, match="no closed form"):
+        averaged.closed_form(designs(1))
+
+
+def test_moments_under_matern_are_those_of_a_dense_grid():
+    """Draws in equal steps of probability, against a Gauss rule through scikit-learn's kernel."""
+    rough = replace(surrogate(), kernel=MATERN)
+    steps = (np.arange(4000) + 0.5) / 4000
+    objective = RobustObjective(rough, DESIGN, UNIFORM[:1], draws={"C": 3e-4 + 7e-4 * steps})
+    (place,) = designs(1)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    at = np.column_stack([np.tile(place, (40, 1)), 6.5e-4 + 3.5e-4 * nodes])
+    peer = Matern(rough.length_scales, nu=2.5)(rough.to_unit(at), rough.to_unit(rough.inputs))
+    values = rough.mean + rough.scale * rough.signal_variance * peer @ rough.alpha
+    mean = weights @ values / 2
+    deviation = np.sqrt(weights @ (values - mean) ** 2 / 2)
+    np.testing.assert_allclose(objective(place[None]), [[mean, deviation]], rtol=3e-4)

@@ -202,6 +202,36 @@ def test_a_user_can_go_on_from_the_models(results):
         model.predict(np.array([[m2, m3, u2, 9.0, c]]))
 
 
+def test_another_kernel_and_chosen_terms_go_through_to_the_files(results, tmp_path):
+    """A cubic in seven inputs has 120 terms, twice as many as there are points."""
+    scene = scene_of(
+        "study.surrogate.kernel=matern-5/2", "study.sensitivity.together_order=3",
+        "study.verification.audit_samples=0", "study.verification.infill_rounds=0",
+    )  # fmt: skip
+    place = tmp_path / "out"
+    run_study(scene, place, alone(), progress_style="quiet")
+    models = surrogates.read_kriging(place / "kriging.nc")
+    assert {leaf.kernel for model in models.values() for leaf in model.leaves} == {"matern-5/2"}
+    model, other = models["m2 m3 C"], surrogates.read_kriging(results / "kriging.nc")["m2 m3 C"]
+    assert {leaf.kernel for leaf in other.leaves} == {"squared-exponential"}
+    at = np.array([[0.3, 0.1, 6e-4]])
+    assert model.predict(at) == pytest.approx(other.predict(at), rel=0.05)
+    assert (model.predict(at) != other.predict(at)).all()
+    assert np.isfinite(dataset.read(place / "front.nc", "front")["deviation"]).any()
+    found = dataset.read(place / "sensitivity.nc", "sensitivity")
+    terms = found["surface_terms"].isel(surface=-1).to_numpy()
+    assert (terms >= 8).all()
+    assert (terms < 60).all()
+    assert (found["surface_order"].isel(surface=-1) >= 2).all()
+    default = dataset.read(results / "sensitivity.nc", "sensitivity")
+    assert "surface_terms" not in default  # all of them, everywhere
+    assert "kernel" not in dataset.read(results / "kriging.nc", "kriging")
+    for name in ("m2", "m3"):  # the formula is linear in both
+        where = {"parameter": name, "surface": default["surface"][-1]}
+        known = default["best_sensitivity"].sel(where).to_numpy()
+        np.testing.assert_allclose(found["best_sensitivity"].sel(where), known, rtol=0.02)
+
+
 def test_samples_are_numbered_through_and_tell_their_designs(results):
     found = dataset.read(results / "samples.nc", "samples")
     assert (np.diff(found["sample"]) == 1).all()

@@ -244,7 +244,7 @@ def _averaging(found: averaging.Averaging) -> Values:
 def _surrogates(found: surrogate.Surrogates) -> Values:
     names = ("r2", "rmae", "leave_one_out", "fit_seconds", "sample_seconds")
     return {
-        "surrogate": np.array(surrogate.SURROGATES),
+        "surrogate": np.array(found.names),
         "training": found.training,
         **{name: getattr(found, name) for name in names},
     }

@@ -6,6 +6,7 @@ its node load from disk.
 
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,9 @@ def _statistics(payload: Mapping[str, Any]) -> None:
     bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
     model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
     model.predict(points)
+    study = load_scene(payload["scene"]).study
+    if study is not None and study.surrogate.kernel not in (None, model.kernel):
+        replace(model, kernel=study.surrogate.kernel).predict(points)
     objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.0, 1.0))])
     minimise(objective, bounds[:1], iterations=4, rng=rng, size=2)
 

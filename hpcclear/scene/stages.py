@@ -4,6 +4,7 @@ Sizes and weights default to the values of the paper this program began with whe
 them; names never decide a default, only what a variable drives does.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -36,6 +37,9 @@ class Sensitivity(Table):
     """Points it is tested on."""
     order: Annotated[int, Count(1, 6)] = 3
     """Order of the polynomial."""
+    terms: Literal["all", "chosen"] | None = None
+    """Terms of each surface: "all" up to its order, or "chosen", all linear ones and those besides that its points speak for.
+    Default all where there are more points than terms, chosen elsewhere."""
     together_samples: Annotated[int, Count(1, 10**6)] = 150
     """Points for the surface in all inputs at once."""
     together_order: Annotated[int, Count(1, 6)] = 2
@@ -56,6 +60,12 @@ class Sensitivity(Table):
     sobol_samples: Annotated[int, Count(0, 2**24)] = 2**10
     """Base samples of the global indices, a power of two, each as many simulations as there are
     variables and two more; 0 leaves the indices out."""
+
+    def chooses(self, inputs: int, order: int, samples: int) -> bool:
+        """Whether a surface of that order on so many samples chooses its terms."""
+        return self.terms == "chosen" or (
+            self.terms is None and math.comb(inputs + order, order) >= samples
+        )
 
     def check(self) -> None:
         """Contradictions between the entries; PydanticCustomError with a key below the study."""
@@ -84,6 +94,9 @@ class Surrogate(Table):
     """How often an interval may be halved where a model is refused."""
     restarts: Annotated[int, Count(0, 100)] = 2
     """Further starts of the likelihood search."""
+    kernel: Literal["squared-exponential", "matern-5/2"] | None = None
+    """Covariance function: "squared-exponential", the default, for what is smooth, or "matern-5/2", which can be differentiated
+    twice, for what has kinks or bends fast in places; under it the swarm averages over 256 points of a Sobol sequence."""
 
 
 class CertificateOfEffects(Table):

@@ -25,6 +25,8 @@ from hpcclear.scene.stages import (
 from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
 
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
+LEAST_PER_INPUT = 3
+"""Samples of a surface that chooses its terms for each of its linear ones, at least."""
 _LINK_NUMBERS = ("mass", "mass_center", "inertia")
 
 
@@ -274,17 +276,13 @@ class Study(Table):
                 )
 
     def _check_sizes(self) -> None:
+        stage = self.sensitivity
         for group in self.groups:
-            _enough(
-                len(group), self.sensitivity.order, self.sensitivity.samples, "sensitivity.samples"
-            )
+            _enough(stage, len(group), stage.order, stage.samples, "samples")
         together = len({name for group in self.groups for name in group})
         if together:
             _enough(
-                together,
-                self.sensitivity.together_order,
-                self.sensitivity.together_samples,
-                "sensitivity.together_samples",
+                stage, together, stage.together_order, stage.together_samples, "together_samples"
             )
         if self.cases:
             inputs = max(len(model) for model in self.models)
@@ -395,13 +393,19 @@ def _only_clearance(variables: Mapping[str, Any]) -> str | None:
     return found[0] if len(found) == 1 else None
 
 
-def _enough(inputs: int, order: int, samples: int, key: str) -> None:
+def _enough(stage: Sensitivity, inputs: int, order: int, samples: int, entry: str) -> None:
+    """Refuse fewer samples than a surface has terms; of one that chooses them, than its linear ones and a few."""
+    chosen = stage.chooses(inputs, order, samples)
     terms = math.comb(inputs + order, order)
-    if samples < terms:
+    least = LEAST_PER_INPUT * (inputs + 1) if chosen else terms
+    if samples < least:
         raise invalid(
-            f"a surface of order {order} in {inputs} inputs has {terms} terms, "
+            f"a surface in {inputs} inputs that chooses its terms needs {least} samples at least"
+            if chosen
+            else f"a surface of order {order} in {inputs} inputs has {terms} terms, "
             f"more than the {samples} samples",
-            f"Ask for at least {2 * terms} samples, or lower the order",
-            key=key,
+            f"Ask for at least {10 * inputs if chosen else 2 * terms} samples"
+            + ("" if chosen else ", or lower the order"),
+            key=f"sensitivity.{entry}",
             value=samples,
         )

@@ -26,7 +26,7 @@ from hpcclear.statistics.random.distributions import (
     Uniform,
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
-from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.random.moments import RobustObjective, separable
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
@@ -42,8 +42,8 @@ PROBES = 64
 
 
 TOGETHER = 256
-"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, and for all that is not mean and
-deviation."""
+"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
+them, and for all that is not mean and deviation."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,8 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
     the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
     for inputs that vary together, or for a model whose length scales are a small part of a random input's range (it has
-    found noise). Such a case is averaged by Monte Carlo.
+    found noise). Such a case is averaged by Monte Carlo; one on a kernel that is no product of its inputs over points of a
+    Sobol sequence.
     """
     study = scene.required_study
     names = study.design_variables(case)
@@ -132,6 +133,8 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
         def joint(count: int, rng: np.random.Generator) -> dict[str, Array]:
             return offsets(scene, random, list(rng.random((len(random), count)) + 2.0**-54))
 
+    elif study.swarm.statistics == "quadrature" and not separable(model):
+        draws = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
     elif askew or study.swarm.statistics == "monte-carlo":
         draws = (study.swarm.monte_carlo_samples, rng)
 

@@ -12,7 +12,7 @@ from hpcclear.scene.domain import box
 from hpcclear.scene.study import Study
 from hpcclear.statistics import sensitivity
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.response_surface import fit_response_surface, n_terms
+from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.statistics.surrogate.surface_search import (
     SearchSettings,
     SurfaceSearch,
@@ -121,18 +121,22 @@ def _designs(run: StudyRun) -> list[sensitivity.IntervalDesign]:
 
 def _layouts(study: Study) -> list[sensitivity.IntervalSettings]:
     """How many points each surface gets."""
-    settings = study.sensitivity
-    separate = [False] * len(study.groups)
-    return [
-        sensitivity.IntervalSettings(
-            steps=settings.rounds,
-            shrink=settings.shrink,
-            n_points=settings.together_samples if together else settings.samples,
-            n_test=max(settings.test_samples, 20) if together else settings.test_samples,
-            order=settings.together_order if together else settings.order,
+    settings, found = study.sensitivity, []
+    for k, names in enumerate(surfaces(study)):
+        together = k == len(study.groups)
+        order = settings.together_order if together else settings.order
+        points = settings.together_samples if together else settings.samples
+        found.append(
+            sensitivity.IntervalSettings(
+                steps=settings.rounds,
+                shrink=settings.shrink,
+                n_points=points,
+                n_test=max(settings.test_samples, 20) if together else settings.test_samples,
+                order=order,
+                chosen=settings.chooses(len(names), order, points),
+            )
         )
-        for together in (separate if len(separate) < 2 else [*separate, True])
-    ]
+    return found
 
 
 def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
@@ -229,21 +233,29 @@ def _accepted(run: StudyRun, sampled: Sequence[Sampled]) -> Result:
     result["surface_accepted"] = np.zeros(shape, np.int8)
     made = {(k, c): _surface(run, sampled[k], c) for k, c in np.ndindex(*shape)}
     if run.study.sensitivity.resamplings > 0:
-        refused = [place for place, one in made.items() if not one[3]]
+        refused = [place for place, one in made.items() if not one[-1]]
         for place, one in zip(refused, _searched(run, sampled, refused), strict=True):
-            made[place] = one.accuracy, one.surface.order, one.surface.n_points, one.accepted
-    for (k, c), (reached, order, count, accepted) in made.items():
+            surface = one.surface
+            counts = surface.order, surface.n_points, len(surface.coefficients)
+            made[place] = one.accuracy, *counts, one.accepted
+    if any(one.design.settings.chosen for one in sampled):
+        result["surface_terms"] = np.zeros(shape, np.int64)
+    for (k, c), (reached, order, count, terms, accepted) in made.items():
         if reached is not None:
             result["surface_r2"][k, c], result["surface_rmae"][k, c] = reached.r2, reached.rmae
             result["surface_r2_explained"][k, c] = reached.r2_explained
             result["surface_rmae_mean"][k, c] = reached.rmae_mean
         result["surface_order"][k, c], result["surface_points"][k, c] = order, count
         result["surface_accepted"][k, c] = accepted
+        if "surface_terms" in result:
+            result["surface_terms"][k, c] = terms
     return result
 
 
-def _surface(run: StudyRun, sampled: Sampled, level: int) -> tuple[Accuracy | None, int, int, bool]:
-    """Accuracy, order and points of a surface at a level, and whether it was accepted."""
+def _surface(
+    run: StudyRun, sampled: Sampled, level: int
+) -> tuple[Accuracy | None, int, int, int, bool]:
+    """Accuracy, order, points and terms of a surface at a level, and whether it was accepted."""
     inputs, design, values = sampled
     settings, laid_out = run.study.sensitivity, design.settings
     size = laid_out.n_points + laid_out.n_test
@@ -251,13 +263,15 @@ def _surface(run: StudyRun, sampled: Sampled, level: int) -> tuple[Accuracy | No
     points, outcomes = design.points[rows, :-1], values[rows]
     bounds, cut = design.intervals[0], laid_out.n_points
     finite = np.isfinite(outcomes)
-    reached, count = None, int(finite[:cut].sum())
-    if count >= n_terms(len(inputs), laid_out.order) and finite[cut:].sum() >= 2:
-        surface = fit_response_surface(points[:cut], outcomes[:cut], bounds, laid_out.order)
+    reached, count, terms = None, int(finite[:cut].sum()), 0
+    if count >= laid_out.needed(len(inputs)) and finite[cut:].sum() >= 2:
+        surface = fit_response_surface(
+            points[:cut], outcomes[:cut], bounds, laid_out.order, chosen=laid_out.chosen
+        )
         reached = accuracy(outcomes[cut:], surface.predict(points[cut:]))
-        if reached.meets(settings.r2, settings.rmae):
-            return reached, laid_out.order, count, True
-    return reached, laid_out.order, count, False
+        terms = len(surface.coefficients)
+    accepted = reached is not None and reached.meets(settings.r2, settings.rmae)
+    return reached, laid_out.order, count, terms, accepted
 
 
 def _searched(
@@ -276,6 +290,7 @@ def _searched(
             max_points=laid_out.n_points * 2**settings.resamplings,
             r2_min=settings.r2,
             rmae_max=settings.rmae,
+            chosen=laid_out.chosen,
         )
         rng = run.rng("surface", " ".join(sampled[k].inputs), str(level))
         searches.append(search(design.intervals[0], rng, tried))

@@ -10,10 +10,11 @@ from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
-from hpcclear.statistics.surrogate.stored import SCALARS, models_in
+from hpcclear.statistics.surrogate.stored import KERNEL, SCALARS, models_in
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 from hpcclear.study.run import Result, StudyRun
 
@@ -54,6 +55,7 @@ def fit_all(run: StudyRun) -> Result:
                 max_resamples=settings.resamplings,
                 max_depth=settings.cuts,
                 restarts=settings.restarts,
+                kernel=settings.kernel or SQUARED_EXPONENTIAL,
             ),
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
@@ -125,6 +127,8 @@ def write(run: StudyRun, result: Result) -> None:
             data[f"{name}_upper"][row] = leaf.upper[column]
     for name, field in SCALARS.items():
         data[name] = np.array([getattr(leaf, field) for _, leaf in leaves])
+    if any(leaf.kernel != SQUARED_EXPONENTIAL for _, leaf in leaves):
+        data[KERNEL] = np.array([leaf.kernel for _, leaf in leaves])
     data["points"] = np.array([len(leaf.values) for _, leaf in leaves])
     data["accepted"] = np.concatenate([model.accepted for model in models]).astype(np.int8)
     checks = np.array([result[f"model{k}_check"] for k, _ in leaves])

@@ -322,7 +322,7 @@ def next_sample(n, block, queue, settings, m):
 def advance(n, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample."""
     block, queue, method = borrowed_all(block, queue, method, 1)
-    m = borrowed(m)
+    m = borrowed(m)  # type: ignore[call-arg]
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book = block.work, block.stages, block.book

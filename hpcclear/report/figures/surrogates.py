@@ -227,6 +227,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     kriging : xarray.Dataset
         Kind ``kriging``.
     """
+    from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
     found = models_in(kriging)
@@ -240,7 +241,9 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
         worst = float(kriging["r2"].to_numpy()[family == name].min())
-        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {worst:.3f}")
+        kernels = {leaf.kernel for leaf in model.leaves} - {SQUARED_EXPONENTIAL}
+        told = "".join(f", {kernel}" for kernel in sorted(kernels))
+        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {worst:.3f}{told}")
     limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(limits)[0], max(high for _, high in limits))
     for panel in axes.flat:

@@ -4,7 +4,7 @@ Three ways, each a check on the others:
 
 - tensor Gauss rules (`RobustObjective`, the default): the kernel is a product over the inputs, so
   N1 x N2 x ... nodes cost little more than N1 + N2 + ... kernels; no sampling noise;
-- Monte Carlo with standard errors, the paper's way;
+- Monte Carlo with standard errors, the paper's way, and the one of a kernel that is no product (Matern);
 - the closed form in error functions, for independent inputs of one model.
 
 Random inputs are independent, unless their draws are given. They may stand for the model's inputs themselves or act through
@@ -22,6 +22,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import inside
 
 
@@ -67,6 +68,11 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
     return SampledMoments(mean, deviation, deviation / sqrt(count), np.sqrt(spread) / twice)
 
 
+def separable(model: Surrogate) -> bool:
+    """Whether the model's kernel is a product over its inputs, which tensor rules need."""
+    return all(leaf.kernel == SQUARED_EXPONENTIAL for leaf in model.leaves)
+
+
 class RobustObjective:
     """Mean and deviation of a surrogate under random inputs, for whole swarms of designs.
 
@@ -108,7 +114,8 @@ class RobustObjective:
     ------
     InputError
         Names that do not fit together, a random input too wide for the tolerance, derived random
-        inputs on a piecewise model; and on a call, a support that leaves the surrogate's domain.
+        inputs on a piecewise model, a kernel that is no product of the inputs; and on a call, a
+        support that leaves the surrogate's domain.
     """
 
     def __init__(
@@ -133,6 +140,9 @@ class RobustObjective:
             self._draws = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
         elif draws is not None:
             self._draws = self._drawn(*draws)
+        elif not separable(model):
+            kernel = model.leaves[0].kernel
+            raise InputError("kernel", kernel, "no product of the inputs", 'use "monte-carlo"')
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes) for leaf in model.leaves
@@ -171,9 +181,10 @@ class RobustObjective:
         return sample_moments(self._sampled(designs, self._drawn(samples, rng)))
 
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
-        """The same in error functions, ``(n, 2)``: one `Kriging` model, no derived inputs."""
+        """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
         designs = self._checked(designs)
-        if len(self.model.leaves) > 1 or self._wiring.derived or self._joint is not None:
+        simple = len(self.model.leaves) == 1 and separable(self.model)
+        if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
                 "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
             )

@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
     Sampler,
     check_bounds,
     fit_response_surface,
     latin_hypercube,
-    n_terms,
 )
+from hpcclear.statistics.surrogate.term_choice import least_points
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ class IntervalSettings:
     n_test: int = 5
     order: int = 3
     """n_points, n_test and order: training points, test points and total order of each surface."""
+    chosen: bool = False
+    """Whether surfaces choose their terms (`fit_response_surface`)."""
 
     def __post_init__(self) -> None:
         if self.steps < 1:
@@ -51,6 +54,10 @@ class IntervalSettings:
             raise InputError("order", self.order, "a constant has no slope", "take at least 1")
         if self.n_test < 2:
             raise InputError("n_test", self.n_test, "R2 needs two test points", "take at least 2")
+
+    def needed(self, variables: int) -> int:
+        """Points without which there is no surface in so many variables."""
+        return least_points(variables) if self.chosen else n_terms(variables, self.order)
 
 
 DEFAULTS = IntervalSettings()
@@ -124,7 +131,7 @@ def design_intervals(
     """
     limits = check_bounds(bounds)
     gaps = np.asarray(clearances, float)
-    _check_design(gaps, settings, n_terms(len(limits), settings.order))
+    _check_design(gaps, settings, settings.needed(len(limits)))
     fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
     middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
     lower = middle - fractions[:, np.newaxis] * half
@@ -205,9 +212,10 @@ def _surface(
     """Surface over interval k on its training points; None if failures left too few of them."""
     limits, settings = design.intervals[k], design.settings
     values = values[: settings.n_points]
-    if np.count_nonzero(np.isfinite(values)) <= n_terms(len(limits), settings.order):
+    if np.count_nonzero(np.isfinite(values)) <= settings.needed(len(limits)):
         return None
-    return fit_response_surface(points[: len(values)], values, limits, settings.order)
+    at = points[: len(values)]
+    return fit_response_surface(at, values, limits, settings.order, chosen=settings.chosen)
 
 
 def _tested(
@@ -221,15 +229,15 @@ def _tested(
     return reached.r2, reached.rmae
 
 
-def _check_design(clearances: Array, settings: IntervalSettings, terms: int) -> None:
+def _check_design(clearances: Array, settings: IntervalSettings, needed: int) -> None:
     if clearances.ndim != 1 or clearances.size == 0 or not np.isfinite(clearances).all():
         raise InputError(
             "clearances", clearances.tolist(), "not a list of numbers", "give at least one"
         )
-    if settings.n_points <= terms:
+    if settings.n_points <= needed:
         raise InputError(
             "n_points",
             settings.n_points,
-            f"a surface of {terms} terms leaves nothing to estimate the scatter from",
-            f"take at least {terms + 1}, better {2 * terms}",
+            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
+            f"take at least {needed + 1}, better {2 * needed}",
         )

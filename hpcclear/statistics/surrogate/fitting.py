@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.kernels import KERNELS, SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging, inside
 from hpcclear.statistics.surrogate.likelihood import maximise
 
@@ -27,6 +28,7 @@ def fit_kriging(
     names: Sequence[str] | None = None,
     restarts: int = 3,
     lengths: tuple[float, float] = LENGTH_BOUNDS,
+    kernel: Kernel = SQUARED_EXPONENTIAL,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -46,6 +48,8 @@ def fit_kriging(
         Starting points of the likelihood's maximisation besides the first.
     lengths : (float, float)
         Between which the length scales are, in the unit cube.
+    kernel : str
+        "squared-exponential" or "matern-5/2".
 
     Returns
     -------
@@ -54,9 +58,11 @@ def fit_kriging(
     Raises
     ------
     InputError
-        Crossed bounds, points that are not finite or outside the bounds, infinite values, or fewer
-        valid samples than parameters to fit (d + 3).
+        Crossed bounds, points that are not finite or outside the bounds, infinite values, fewer
+        valid samples than parameters to fit (d + 3), or a kernel that is not known.
     """
+    if kernel not in KERNELS:
+        raise InputError("kernel", kernel, "not known", f"take {' or '.join(KERNELS)}")
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     labels = _check_shapes(points, values, bounds, names)
     valid = _check_samples(points, values, labels, bounds)
@@ -67,9 +73,9 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts, lengths)
+    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel)
     samples = {"inputs": inputs, "values": values[valid], "dropped": int((~valid).sum())}
-    return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples)
+    return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples, kernel=kernel)
 
 
 def _maximise_likelihood(
@@ -78,6 +84,7 @@ def _maximise_likelihood(
     rng: np.random.Generator,
     restarts: int,
     lengths: tuple[float, float],
+    kernel: Kernel,
 ) -> dict[str, Any]:
     """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
@@ -88,7 +95,7 @@ def _maximise_likelihood(
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = maximise(unit, normalised, start, bounds, restarts, seed)
+        found = maximise(unit, normalised, start, bounds, restarts, seed, kernel)
     return asdict(found)
 
 

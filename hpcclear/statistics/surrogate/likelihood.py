@@ -1,8 +1,13 @@
 """Maximum likelihood of Kriging's length scales and variances, with gradients that cost no more than the likelihood.
 
-For W = (alpha alpha' - K^-1) * S, elementwise, S the covariance without noise, the derivative by the logarithm of a
-length scale is half the sum of W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is
-a product of W and z for all length scales at once, in place of a matrix of derivatives for each.
+For W = (alpha alpha' - K^-1) * S, elementwise, S the covariance without noise (of another kernel than the squared exponential,
+what stands in its place: `kernels.with_slopes`), the derivative by the logarithm of a length scale is half the sum of
+W_ij (z_i - z_j)^2 over all pairs, z that input over its length scale. Multiplied out, that is a product of W and z for all
+length scales at once, in place of a matrix of derivatives for each.
+
+Of many points the search begins on a part, where more starts cost little, and goes on with twice as many from the best that was
+found. An input that a part sees no influence of has a length scale so long that nothing would ever shorten it again: where
+the search leaves the first part, length scales are cut.
 
 Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 5.8 and 5.9; the search
 is that of scikit-learn's GaussianProcessRegressor (L-BFGS-B over logarithms, further starts uniform in these).
@@ -15,7 +20,21 @@ from scipy.linalg.blas import dsymm, dsyr
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.spatial.distance import cdist
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
+from hpcclear.statistics.surrogate.kernels import (
+    SQUARED_EXPONENTIAL,
+    Kernel,
+    correlation,
+    with_slopes,
+)
+
+PART = 250
+"""Points that the first part of many has at least; fewer than twice as many are searched as a whole."""
+FURTHER = 6
+"""Starts more on the first part, between these limits of signal variance, length scales and noise variance."""
+SPANS = (0.3, 10.0), (0.1, 1.0), (1e-6, 1e-3)
+LONGEST = 1.0
+"""Length scales are cut there when the search leaves the first part."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +58,13 @@ class Fitted:
 
 
 def maximise(
-    unit: Array, values: Array, start: Array, bounds: Array, restarts: int, seed: int
+    unit: Array,
+    values: Array,
+    start: Array,
+    bounds: Array,
+    restarts: int,
+    seed: int,
+    kernel: Kernel = SQUARED_EXPONENTIAL,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values at points.
 
@@ -57,16 +82,51 @@ def maximise(
         Further starts.
     seed : int
         Of these.
+    kernel : str
     """
-    from scipy.optimize import minimize  # only fitting needs it
-
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
     starts = [np.log(start)]
     starts += [draws.uniform(limits[:, 0], limits[:, 1]) for _ in range(restarts)]
+    parts = _parts(len(values), draws)
+    if len(parts) == 1:
+        top = _climbed(starts, centred, values, limits, kernel)
+    else:
+        low, high = np.log([SPANS[0], *[SPANS[1]] * unit.shape[1], SPANS[2]]).T
+        starts += [np.clip(draws.uniform(low, high), *limits.T) for _ in range(FURTHER)]
+        top = _climbed(starts, centred[parts[0]], values[parts[0]], limits, kernel)
+        top[1:-1] = np.minimum(top[1:-1], np.log(LONGEST))
+        for part in parts[1:]:
+            top = _climbed([top], centred[part], values[part], limits, kernel)
+    best = np.exp(top)
+    scaled = unit / best[1:-1]
+    covariance = best[0] * correlation(cdist(scaled, scaled, "sqeuclidean"), kernel)
+    covariance[np.diag_indices_from(covariance)] += best[-1]
+    factor, _ = dpotrf(covariance, lower=1)
+    alpha, _ = dpotrs(factor, values, lower=1)
+    return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
+
+
+def _parts(count: int, draws: np.random.RandomState) -> list[Integers]:
+    """Which points the search sees one time after the other, each twice as many; all of them at last."""
+    sizes = [count]
+    while sizes[0] >= 2 * PART:
+        sizes.insert(0, sizes[0] // 2)
+    if len(sizes) == 1:
+        return [np.arange(count)]
+    order = draws.permutation(count)
+    return [np.sort(order[:size]) for size in sizes]
+
+
+def _climbed(
+    starts: list[Array], centred: Array, values: Array, limits: Array, kernel: Kernel
+) -> Array:
+    """The best that is found from these starts, logarithms as in `negative_likelihood`, shape (d + 2,)."""
+    from scipy.optimize import minimize  # only fitting needs it
+
     found = [
         minimize(
-            lambda theta: negative_likelihood(theta, centred, values),
+            lambda theta: negative_likelihood(theta, centred, values, kernel),
             one,
             method="L-BFGS-B",
             jac=True,
@@ -74,16 +134,12 @@ def maximise(
         )
         for one in starts
     ]
-    best = np.exp(min(found, key=lambda one: float(one.fun)).x)
-    scaled = unit / best[1:-1]
-    covariance = best[0] * np.exp(-0.5 * cdist(scaled, scaled, "sqeuclidean"))
-    covariance[np.diag_indices_from(covariance)] += best[-1]
-    factor, _ = dpotrf(covariance, lower=1)
-    alpha, _ = dpotrs(factor, values, lower=1)
-    return Fitted(best[1:-1], float(best[0]), float(best[-1]), alpha)
+    return np.asarray(min(found, key=lambda one: float(one.fun)).x)
 
 
-def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[float, Array]:
+def negative_likelihood(
+    theta: Array, centred: Array, values: Array, kernel: Kernel = SQUARED_EXPONENTIAL
+) -> tuple[float, Array]:
     """Minus the log likelihood, and its gradient.
 
     Parameters
@@ -93,6 +149,7 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
     centred : array, shape (n, d)
         Points.
     values : array, shape (n,)
+    kernel : str
 
     Returns
     -------
@@ -100,15 +157,14 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
         Infinite, and 0, where the covariance matrix cannot be factored.
     """
     noise, count = np.exp(theta[-1]), len(values)
+    level = theta[0] if kernel == SQUARED_EXPONENTIAL else 0.0
     scaled = centred / np.exp(theta[1:-1])
     halves, ones = -0.5 * np.einsum("ij,ij->i", scaled, scaled), np.ones(count)
-    # the exponents, -|z_i - z_j|^2 / 2 + log signal, as one product
-    smooth = np.column_stack([scaled, halves + theta[0], ones]) @ np.vstack(
+    # -|z_i - z_j|^2 / 2, with the logarithm of the signal where that is an exponent, as one product
+    exponents = np.column_stack([scaled, halves + level, ones]) @ np.vstack(
         [scaled.T, ones, halves]
     )
-    np.minimum(smooth, theta[0], out=smooth)
-    np.exp(smooth, out=smooth)
-    np.fill_diagonal(smooth, np.exp(theta[0]))
+    smooth, slopes = with_slopes(exponents, theta[0], kernel)
     covariance = smooth.copy()
     covariance[np.diag_indices(count)] += noise
     # LAPACK and BLAS take the transpose without a copy, and touch its lower triangle only
@@ -118,13 +174,15 @@ def negative_likelihood(theta: Array, centred: Array, values: Array) -> tuple[fl
     alpha, _ = dpotrs(factor, values, lower=1)
     logarithm = np.log(np.diag(factor)).sum()
     inverse, _ = dpotri(factor, lower=1, overwrite_c=1)
-    trace = np.trace(inverse)
+    noisy = noise * (alpha @ alpha - np.trace(inverse))
     weights = dsyr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)  # K^-1 - alpha alpha'
-    weights *= smooth.T
+    weights *= slopes.T
     table = np.column_stack([scaled, ones])
     products = dsymm(-1.0, weights, table, lower=1)
     rows = products[:, -1]
     lengths = rows @ scaled**2 - np.einsum("ij,ij->j", scaled, products[:, :-1])
-    gradient = [0.5 * rows.sum(), *lengths, 0.5 * noise * (alpha @ alpha - trace)]
+    # the sum of (alpha alpha' - K^-1) * S: all of K but its noise
+    signal = rows.sum() if kernel == SQUARED_EXPONENTIAL else values @ alpha - count - noisy
+    gradient = [0.5 * signal, *lengths, 0.5 * noisy]
     constant = 0.5 * count * np.log(2.0 * np.pi)
     return float(0.5 * values @ alpha + logarithm + constant), -np.array(gradient)

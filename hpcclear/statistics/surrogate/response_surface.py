@@ -7,8 +7,6 @@ With n inputs and total order m a surface has C(n + m, m) terms: 10 for a cubic 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
-from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +14,8 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.metrics import ROUNDING, leave_one_out
+from hpcclear.statistics.surrogate.polynomial import exponents_up_to, monomials, slopes
+from hpcclear.statistics.surrogate.term_choice import choose_terms
 
 Evaluate = Callable[[Array], Array]
 """True function: points of shape (n, d) -> values of shape (n,), NaN where it failed."""
@@ -43,13 +43,15 @@ class ResponseSurface:
         (X'X)^-1; times `residual_variance` it is the covariance of the coefficients.
     residual_variance : float
         SSE / degrees of freedom, no less than the rounding of the values; NaN without any
-        degrees of freedom.
+        degrees of freedom. Of chosen terms no less than the mean square error at points left out
+        of the choice.
     degrees_of_freedom : int
         Points that counted minus terms.
     leave_one_out_errors : numpy.ndarray, shape (n,)
-        Error at each point of the surface fitted without it.
+        Error at each point of the surface fitted without it, its terms as they stand.
     leave_one_out_r2 : float
-        1 - sum of squares of those errors / SST; NaN if the values do not vary.
+        1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms
+        that of points left out of the choice as well.
     condition : float
         Condition number of the design matrix.
     n_points, n_dropped : int
@@ -78,7 +80,7 @@ class ResponseSurface:
             If a point is not finite or lies outside the bounds: a surface never extrapolates.
         """
         z = scale_inputs(points, self.bounds)
-        return np.asarray(_terms(z, self.exponents) @ self.coefficients)
+        return np.asarray(monomials(z, self.exponents) @ self.coefficients)
 
     def gradient(self, point: ArrayLike) -> tuple[Array, Array]:
         """First derivatives at one point and their standard errors (eq. 14).
@@ -101,15 +103,10 @@ class ResponseSurface:
             As in `predict`.
         """
         z = scale_inputs(np.asarray(point, float)[np.newaxis], self.bounds)
-        rows = np.vstack([_slopes(z, self.exponents, j) for j in range(len(self.bounds))])
+        rows = np.vstack([slopes(z, self.exponents, j) for j in range(len(self.bounds))])
         rows *= (2.0 / np.ptp(self.bounds, axis=1))[:, np.newaxis]  # dz/dx
         spread = np.einsum("ij,jk,ik->i", rows, self.unscaled_covariance, rows)
         return rows @ self.coefficients, np.sqrt(self.residual_variance * spread)
-
-
-def n_terms(n_inputs: int, order: int) -> int:
-    """Number of terms of a polynomial of total order `order` in `n_inputs` inputs."""
-    return comb(n_inputs + order, order)
 
 
 def check_bounds(bounds: ArrayLike) -> Array:
@@ -169,7 +166,12 @@ def latin_hypercube(n: int, bounds: Array, rng: np.random.Generator) -> Array:
 
 
 def fit_response_surface(
-    points: ArrayLike, values: ArrayLike, bounds: ArrayLike, order: int
+    points: ArrayLike,
+    values: ArrayLike,
+    bounds: ArrayLike,
+    order: int,
+    *,
+    chosen: bool = False,
 ) -> ResponseSurface:
     """Least-squares polynomial of total order `order` through points and values.
 
@@ -183,6 +185,9 @@ def fit_response_surface(
         Limits of the inputs; they fix the scaling.
     order : int
         Total order, at least 0.
+    chosen : bool
+        Not with all terms up to that order, but with those that the values speak for
+        (`hpcclear.statistics.surrogate.term_choice`): fewer points than terms will do then.
 
     Returns
     -------
@@ -202,8 +207,10 @@ def fit_response_surface(
     """
     limits = check_bounds(bounds)
     z, y, n_dropped = _finite_rows(scale_inputs(points, limits), values)
-    exponents = _exponents(len(limits), order)
-    design, offset = _terms(z, exponents), y[0] if len(y) else 0.0
+    exponents, least = exponents_up_to(len(limits), order), 0.0
+    if chosen:
+        exponents, least = choose_terms(z, y, order)
+    design, offset = monomials(z, exponents), y[0] if len(y) else 0.0
     left, singular, right = _decomposed(design, order, n_dropped)
     inverse = right.T / singular
     coefficients = inverse @ (left.T @ (y - offset))
@@ -219,12 +226,12 @@ def fit_response_surface(
         exponents=exponents,
         coefficients=coefficients,
         unscaled_covariance=inverse @ inverse.T,
-        residual_variance=max(float(residuals @ residuals) / freedom, rounding)
+        residual_variance=max(float(residuals @ residuals) / freedom, rounding, least)
         if freedom
         else float("nan"),
         degrees_of_freedom=freedom,
         leave_one_out_errors=errors,
-        leave_one_out_r2=float(1 - np.sum(errors**2) / total)
+        leave_one_out_r2=float(1 - (least * len(y) if chosen else np.sum(errors**2)) / total)
         if total > len(y) * rounding
         else float("nan"),
         condition=float(singular[0] / singular[-1]),
@@ -261,28 +268,3 @@ def _finite_rows(z: Array, values: ArrayLike) -> tuple[Array, Array, int]:
         raise InputError("values", y.shape, f"not one value for {len(z)} points", "pass shape (n,)")
     finite = np.isfinite(y)
     return z[finite], y[finite], int(np.count_nonzero(~finite))
-
-
-def _exponents(n_inputs: int, order: int) -> Integers:
-    """Exponents of all terms up to a total order, shape (t, d), the constant first."""
-    if order < 0:
-        raise InputError("order", order, "a polynomial has no negative order", "take 0 or more")
-    chosen = (
-        c for k in range(order + 1) for c in combinations_with_replacement(range(n_inputs), k)
-    )
-    return np.array([[c.count(j) for j in range(n_inputs)] for c in chosen], dtype=np.int64)
-
-
-def _terms(z: Array, exponents: Integers) -> Array:
-    """All terms at scaled points, shape (n, t)."""
-    terms = np.ones((len(z), len(exponents)))
-    for j in range(z.shape[1]):  # input by input: no array of n x t x d
-        terms *= z[:, j, np.newaxis] ** exponents[:, j]
-    return terms
-
-
-def _slopes(z: Array, exponents: Integers, j: int) -> Array:
-    """Derivatives of all terms with respect to scaled input j, shape (n, t)."""
-    lowered = exponents.copy()
-    lowered[:, j] = np.maximum(exponents[:, j] - 1, 0)
-    return exponents[:, j] * _terms(z, lowered)

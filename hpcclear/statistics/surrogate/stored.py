@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 
@@ -17,6 +18,8 @@ SCALARS = {
     "dropped": "dropped",
 }
 """Variables of the dataset and the attributes of `Kriging` they hold."""
+KERNEL = "kernel"
+"""The same of its kernel; left out where all models have the squared exponential."""
 
 
 def models_in(content: xr.Dataset) -> dict[str, PiecewiseKriging]:
@@ -49,6 +52,7 @@ def _family(content: xr.Dataset, family: str, rows: Sequence[int]) -> PiecewiseK
             "inputs": np.column_stack([one[name].to_numpy()[:size] for name in names]),
             "values": one["training_output"].to_numpy()[:size],
             "alpha": one["weight"].to_numpy()[:size],
+            "kernel": one[KERNEL].to_numpy() if KERNEL in one else np.array(SQUARED_EXPONENTIAL),
         }
         arrays |= {field: one[name].to_numpy() for name, field in SCALARS.items()}
         leaves.append(Kriging.from_arrays(arrays))

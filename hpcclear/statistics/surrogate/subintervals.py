@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
@@ -50,6 +51,7 @@ class SubintervalSettings:
     max_depth : int
         How often a box may be cut in half; a refused box at this depth stays, not accepted.
     restarts : int
+    kernel : str
         See `fit_kriging`.
     """
 
@@ -61,6 +63,7 @@ class SubintervalSettings:
     max_resamples: int = 1
     max_depth: int = 3
     restarts: int = 3
+    kernel: Kernel = SQUARED_EXPONENTIAL
 
 
 def fit_subintervals(
@@ -114,6 +117,7 @@ def fit_subintervals(
                 rng=box.rng,
                 names=names,
                 restarts=settings.restarts,
+                kernel=settings.kernel,
             )
             reached = accuracy(box.truths, model.predict(box.tests))
             accepted = reached.meets(settings.r2_min, settings.rmae_max)

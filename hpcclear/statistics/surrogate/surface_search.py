@@ -68,6 +68,8 @@ class SearchSettings:
         First training sample, test points, and the largest training sample.
     r2_min, rmae_max : float
         Targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`.
+    chosen : bool
+        Whether surfaces choose their terms (`fit_response_surface`).
     """
 
     orders: Sequence[int] = (3, 2, 4)
@@ -76,6 +78,7 @@ class SearchSettings:
     max_points: int = 360
     r2_min: float = 0.9
     rmae_max: float = 0.5
+    chosen: bool = False
 
 
 Search = Generator[Array, Array, SurfaceSearch]
@@ -156,7 +159,9 @@ def search(
         points, values = np.vstack([points, fresh]), np.append(values, (yield fresh))
         for order in orders:
             try:
-                surface = fit_response_surface(points, values, limits, order)
+                surface = fit_response_surface(
+                    points, values, limits, order, chosen=settings.chosen
+                )
             except InputError as refusal:
                 attempts.append(Attempt(order, len(points), None, str(refusal)))
                 continue

@@ -1,0 +1,61 @@
+"""Covariance functions of Kriging, by the squared distance of two points over the length scales.
+
+The squared exponential is smooth without end, the Matern function of order 5/2 can be differentiated twice: it suits what has
+kinks, and is less sure of itself between points.
+
+Sources: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 4.9 and 4.17;
+M. L. Stein, "Interpolation of Spatial Data" (1999), section 2.7.
+"""
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+
+Kernel = Literal["squared-exponential", "matern-5/2"]
+SQUARED_EXPONENTIAL: Kernel = "squared-exponential"
+"""A product over the inputs: moments under random inputs have tensor rules and a closed form."""
+MATERN: Kernel = "matern-5/2"
+"""A function of the distance over all inputs, and no product over them."""
+KERNELS: tuple[Kernel, ...] = get_args(Kernel)
+
+
+def correlation(squares: Array, kernel: Kernel) -> Array:
+    """Correlations at squared distances, arrays of one shape (...)."""
+    if kernel == SQUARED_EXPONENTIAL:
+        return np.asarray(np.exp(-0.5 * squares))
+    steps = np.sqrt(5.0 * squares)
+    return np.asarray((1.0 + steps + steps**2 / 3.0) * np.exp(-steps))
+
+
+def with_slopes(exponents: Array, level: float, kernel: Kernel) -> tuple[Array, Array]:
+    """Covariances and what their derivatives by the length scales are made of.
+
+    The derivative by the logarithm of a length scale is the second array times the squared difference of that input over its
+    length scale.
+
+    Parameters
+    ----------
+    exponents : array, shape (n, n)
+        Minus half the squared distances, plus `level` for the squared exponential; overwritten.
+    level : float
+        Logarithm of the variance.
+    kernel : str
+
+    Returns
+    -------
+    (array, array)
+        Both of shape (n, n); for the squared exponential they are one.
+    """
+    if kernel == SQUARED_EXPONENTIAL:
+        np.minimum(exponents, level, out=exponents)
+        np.exp(exponents, out=exponents)
+        np.fill_diagonal(exponents, np.exp(level))
+        return exponents, exponents
+    np.minimum(exponents, 0.0, out=exponents)
+    steps = np.sqrt(-10.0 * exponents)
+    falling = np.exp(level - steps)
+    covariance = (1.0 + steps + steps**2 / 3.0) * falling
+    np.fill_diagonal(covariance, np.exp(level))
+    return covariance, (5.0 / 3.0) * (1.0 + steps) * falling
