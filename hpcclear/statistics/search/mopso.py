@@ -17,9 +17,11 @@ setting for all problems:
 - **Constraints** (Deb 2000, doi:10.1016/S0045-7825(99)00389-8): feasible beats infeasible, among
   infeasible points the smaller total violation wins. A point whose objectives are not all finite
   is infeasible, without limit if no violation was given. Only feasible points enter the archive.
-  Once one was broken the feasible region may be thin or in pieces, which flying past it misses: then
-  `BROKEN_SHARE` of the particles continue from children, made by simulated binary crossover (Deb & Agrawal
-  1995), and `BROKEN_ANEW` of these get one coordinate anew from its whole range.
+  Once one was broken the feasible region may be thin or in pieces, which flying past it misses, and the front
+  lies on its borders: then `BROKEN_SHARE` of the particles continue from children, half of them made by
+  simulated binary crossover, half by steps along the front (`children`). A share of these, falling linearly
+  from `BROKEN_ANEW` to none, gets one coordinate anew from its whole range. Leaders and parents are then as many members
+  as there are particles, chosen as the front is; the one that the front would lose most without wins.
 - **Front**: the archive cut to the size asked for (`pareto.cut`).
 
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
@@ -34,6 +36,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.statistics.search import children
 from hpcclear.statistics.search import generator_state as rng_state
 from hpcclear.statistics.search.pareto import (
     Archive,
@@ -44,12 +47,10 @@ from hpcclear.statistics.search.pareto import (
 )
 
 _SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
-BROKEN_SHARE = 0.7
+BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""
 BROKEN_ANEW = 0.3
-"""Share of these children that get a coordinate anew."""
-CROSSOVER_INDEX = 15.0
-"""Of simulated binary crossover; larger is nearer to the parents."""
+"""Share of these children that get a coordinate anew, at the beginning."""
 
 _ARRAYS = (
     "positions",
@@ -300,19 +301,30 @@ class ParticleSwarm:
         self._personal_values[taken] = values[taken]
         self._personal_violations[taken] = total[taken]
 
-    def _leaders(self) -> tuple[Array, Array]:
-        """Positions that guide and how lonely each is; without an archive, the least violating."""
-        if len(self._archive):
-            return self._archive.positions, self._archive.loneliness()
-        return self._personal_positions, -self._personal_violations
+    def _leaders(self) -> tuple[Array, Array, Array]:
+        """Positions that guide, where they stand in objectives, and their merit.
+
+        Without an archive, the personal bests, where they are, and how little they violate.
+        """
+        archive = self._archive
+        if not len(archive):
+            own = self._personal_positions
+            return own, own, -self._personal_violations
+        if not self.infeasible:
+            return archive.positions, archive.values, archive.loneliness()
+        rows, merit = archive.elite(len(self._positions))
+        values = archive.values[rows]
+        extent = np.ptp(values, axis=0)
+        return archive.positions[rows], values / np.where(extent > 0.0, extent, 1.0), merit
 
     def _move(self) -> None:
-        """Equations 22 and 23, bounds and mutation."""
+        """Equations 22 and 23, bounds and children."""
         s, rng = self.settings, self._rng
         particles = len(self._positions)
-        elite, merit = self._leaders()
+        elite, places, merit = self._leaders()
         drawn = rng.integers(len(elite), size=(particles, s.tournament))
-        leader = elite[drawn[np.arange(particles), merit[drawn].argmax(axis=1)]]
+        winner = drawn[np.arange(particles), merit[drawn].argmax(axis=1)]
+        leader = elite[winner]
 
         fall = (s.inertia_first - s.inertia_last) * self.iteration / self.iterations
         r1, r2 = rng.random((2, particles, 1))  # one number a particle, as eq. 22 has it
@@ -327,22 +339,21 @@ class ParticleSwarm:
         self._velocities = np.where(left, -speed, speed)
         self._positions = np.clip(moved, 0.0, 1.0)
 
-        broken = self.infeasible > 0
-        share = (
-            max(s.mutation_share, BROKEN_SHARE) if broken and s.mutation_share else s.mutation_share
-        )
+        share = s.mutation_share
+        if self.infeasible and share:
+            share = max(share, BROKEN_SHARE)
         chosen = np.flatnonzero(rng.random(particles) < share)
         partner = elite[rng.integers(len(elite), size=len(chosen))]
-        if broken:
-            mixed = _crossed(leader[chosen], partner, rng)
-        else:
-            mixed = np.where(rng.random(partner.shape) < 0.5, leader[chosen], partner)
-        children = _mutated(mixed, s.mutation_index, rng)
-        if broken:
-            wild = np.flatnonzero(rng.random(len(chosen)) < BROKEN_ANEW)
-            columns = rng.integers(children.shape[1], size=len(wild))
-            children[wild, columns] = rng.random(len(wild))
-        self._positions[chosen] = children
+        if not self.infeasible:
+            born = children.mixed(leader[chosen], partner, rng)
+            self._positions[chosen] = children.mutated(born, s.mutation_index, rng)
+            return
+        across = children.crossed(leader[chosen], partner, rng)
+        along = children.stepped(elite, places, winner[chosen], rng)
+        born = np.where(rng.random((len(chosen), 1)) < 0.5, across, along)
+        born = children.mutated(born, s.mutation_index, rng)
+        anew = BROKEN_ANEW * (1.0 - self.iteration / self.iterations)
+        self._positions[chosen] = children.renewed(born, anew, rng)
 
     def _gain(self) -> float:
         """Share of the hypervolume won in the last tenth of the iterations."""
@@ -417,25 +428,3 @@ def _checked_bounds(bounds: ArrayLike) -> tuple[Array, Array]:
             remedy = "Give lower < upper, and leave out a variable that is fixed."
             raise InputError(f"bounds[{row}]", (float(lower), float(upper)), reason, remedy)
     return table[:, 0].copy(), table[:, 1].copy()
-
-
-def _crossed(first: Array, second: Array, rng: np.random.Generator) -> Array:
-    """Simulated binary crossover (Deb & Agrawal 1995) in the unit cube, of half the coordinates: the children near `first`."""
-    u = rng.random(first.shape)
-    power = 1.0 / (CROSSOVER_INDEX + 1.0)
-    spread = np.where(u < 0.5, 2.0 * u, 1.0 / (2.0 * (1.0 - u))) ** power
-    child = 0.5 * ((1.0 + spread) * first + (1.0 - spread) * second)
-    return np.clip(np.where(rng.random(first.shape) < 0.5, child, first), 0.0, 1.0)
-
-
-def _mutated(unit: Array, index: float, rng: np.random.Generator) -> Array:
-    """Polynomial mutation (Deb & Goyal 1996) in the unit cube, on one coordinate on average."""
-    hit = rng.random(unit.shape) < 1.0 / unit.shape[1]
-    u = rng.random(unit.shape)[hit]
-    x = unit[hit]
-    power = 1.0 / (index + 1.0)
-    down = (2.0 * u + (1.0 - 2.0 * u) * (1.0 - x) ** (index + 1.0)) ** power - 1.0
-    up = 1.0 - (2.0 * (1.0 - u) + (2.0 * u - 1.0) * x ** (index + 1.0)) ** power
-    result = unit.copy()
-    result[hit] = np.clip(x + np.where(u < 0.5, down, up), 0.0, 1.0)
-    return result

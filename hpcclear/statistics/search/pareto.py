@@ -65,6 +65,23 @@ class Archive:
         """Distance of each point to its nearest neighbour, objectives scaled to their extent."""
         return _thin(self.values, len(self.values))[1]
 
+    def elite(self, size: int) -> tuple[NDArray[np.intp], Array]:
+        """Rows of at most `size` members that spread best, and how much the front would lose without each.
+
+        With two objectives that is hypervolume, without limit for the best of each; with others the distance to the
+        nearest neighbour. Never fewer members than objectives.
+        """
+        size = max(size, self.values.shape[1])
+        if self.values.shape[1] != 2:
+            alive, lonely = _thin(self.values, size)
+            return np.flatnonzero(alive), lonely
+        rows = cut(self.values, size)
+        order = np.argsort(self.values[rows, 0])
+        first, second = self.values[rows[order]].T
+        lost = np.full(len(rows), np.inf)
+        lost[order[1:-1]] = (first[2:] - first[1:-1]) * (second[:-2] - second[1:-1])
+        return rows, lost
+
 
 def hypervolume(values: Array, reference: Array) -> float:
     """Hypervolume dominated by `values (k, m)` below `reference (m,)`; exact to five objectives.
