@@ -1,5 +1,7 @@
 """The swarm against known fronts, brute force and its own promises."""
 
+import itertools
+
 import moocore
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from margins import at_least, at_most
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
 from hpcclear.statistics.search.mopso import ParticleSwarm, SwarmSettings, minimise
-from hpcclear.statistics.search.pareto import Archive, cut, hypervolume, relative_gain
+from hpcclear.statistics.search.pareto import Archive, best_subset, cut, hypervolume, relative_gain
 
 
 def zdt1(x):
@@ -240,6 +242,26 @@ def test_cut_drops_the_least_hypervolume_contribution(objectives):
     assert cut(values, 8).tolist() == kept
 
 
+@pytest.mark.parametrize("size", [2, 3, 5, 11])
+def test_best_subset_is_the_best_of_all_subsets(size):
+    first = np.sort(np.random.default_rng(8).random(11))
+    values = np.stack([first, 40.0 * (1.0 - first**3)], axis=1)[::-1].copy()
+    reference = np.array([1.1, 44.0])
+    ends = {int(row) for row in values.argmin(axis=0)}
+    sets = [rows for rows in itertools.combinations(range(11), size) if ends <= set(rows)]
+    reached = [hypervolume(values[list(rows)], reference) for rows in sets]
+    assert best_subset(values, size).tolist() == list(sets[int(np.argmax(reached))])
+
+
+def test_elite_is_what_the_front_would_lose_most_without():
+    first = np.array([0.3, 0.0, 0.31, 1.0, 0.6])
+    archive = Archive(10, np.empty((0, 1)), np.empty((0, 0)))
+    archive.add(first[:, None], np.stack([first, 1000 * (1 - first)], axis=1))
+    rows, lost = archive.elite(4)
+    assert archive.positions[rows, 0].tolist() == [0.3, 0.0, 1.0, 0.6]  # 0.31: 10 * 0.29 below 300 * 0.01
+    assert np.allclose(lost, [300 * 0.3, np.inf, np.inf, 300 * 0.4])  # to the next, up to the last
+
+
 def test_cut_of_many_objectives_keeps_the_best_of_each():
     values = np.abs(np.random.default_rng(7).normal(size=(60, 5)))
     values /= np.linalg.norm(values, axis=1)[:, None]
@@ -310,6 +332,30 @@ def test_no_piece_of_the_front_of_osy_is_lost(shift):
         values, violations = osy(front.points)
         assert (violations == 0.0).all()
         np.testing.assert_array_equal(values, front.values)
+
+
+def tnk(x):
+    """Tanaka's problem: the objectives are the variables, and the front is a border of the feasible region in pieces."""
+    first, second = x.T
+    ring = first**2 + second**2 - 1 - 0.1 * np.cos(16 * np.arctan2(first, second))
+    disc = 0.5 - (first - 0.5) ** 2 - (second - 0.5) ** 2
+    return x, np.maximum(-np.stack([ring, disc], axis=1), 0.0)
+
+
+def test_front_on_a_curved_border_of_the_feasible_region(shift):
+    angle = np.linspace(0.0, np.pi / 2, 20_001)
+    radius = np.sqrt(1 + 0.1 * np.cos(16 * angle))
+    border = np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1)
+    known = border[tnk(border)[1][:, 1] == 0.0]
+    worst = np.full(2, 1.1)
+    whole = hypervolume(known, worst)
+    reached = []
+    for seed in range(5):
+        rng = np.random.default_rng(seed + shift)
+        front = minimise(tnk, [[1e-12, np.pi]] * 2, iterations=250, rng=rng)
+        assert (tnk(front.points)[1] == 0.0).all()
+        reached.append(hypervolume(front.values, worst) / whole)
+    at_least(np.median(reached), 0.99)
 
 
 def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):

@@ -22,7 +22,7 @@ setting for all problems:
   simulated binary crossover, half by steps along the front (`children`). A share of these, falling linearly
   from `BROKEN_ANEW` to none, gets one coordinate anew from its whole range. Leaders and parents are then as many members
   as there are particles, chosen as the front is; the one that the front would lose most without wins.
-- **Front**: the archive cut to the size asked for (`pareto.cut`).
+- **Front**: the archive cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken).
 
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
 """
@@ -41,6 +41,7 @@ from hpcclear.statistics.search import generator_state as rng_state
 from hpcclear.statistics.search.pareto import (
     Archive,
     Front,
+    best_subset,
     cut,
     hypervolume,
     relative_gain,
@@ -197,7 +198,7 @@ class ParticleSwarm:
         objectives = self._archive.values.shape[1]
         if size < max(1, objectives):
             raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
-        kept = cut(self._archive.values, size)
+        kept = (best_subset if self.infeasible else cut)(self._archive.values, size)
         if len(kept):
             kept = kept[np.lexsort(self._archive.values[kept].T[::-1])]
         gain = self._gain()
