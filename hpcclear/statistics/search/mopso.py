@@ -18,10 +18,10 @@ setting for all problems:
   infeasible points the smaller total violation wins. A point whose objectives are not all finite
   is infeasible, without limit if no violation was given. Only feasible points enter the archive.
   Once one was broken the feasible region may be thin or in pieces, which flying past it misses, and the front
-  lies on its borders: then `BROKEN_SHARE` of the particles continue from children, half of them made by
-  simulated binary crossover, half by steps along the front (`children`). A share of these, falling linearly
-  from `BROKEN_ANEW` to none, gets one coordinate anew from its whole range. Leaders and parents are then as many members
-  as there are particles, chosen as the front is; the one that the front would lose most without wins.
+  may lie on its borders: then `BROKEN_SHARE` of the particles continue from children, of which `BROKEN_ANEW` get
+  one coordinate anew from its whole range. Half of them are made by simulated binary crossover, half by steps along the front
+  (`children`); before any feasible point is known, as without constraints, of the least violating. Leaders and parents are as
+  many members of the archive as there are particles (`Archive.elite`); the one that the front would lose most without wins.
 - **Front**: the archive cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken).
 
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
@@ -51,7 +51,7 @@ _SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iteratio
 BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""
 BROKEN_ANEW = 0.3
-"""Share of these children that get a coordinate anew, at the beginning."""
+"""Share of these children that get a coordinate anew."""
 
 _ARRAYS = (
     "positions",
@@ -345,16 +345,16 @@ class ParticleSwarm:
             share = max(share, BROKEN_SHARE)
         chosen = np.flatnonzero(rng.random(particles) < share)
         partner = elite[rng.integers(len(elite), size=len(chosen))]
-        if not self.infeasible:
+        if self.infeasible and len(self._archive):
+            across = children.crossed(leader[chosen], partner, rng)
+            along = children.stepped(elite, places, winner[chosen], rng)
+            born = np.where(rng.random((len(chosen), 1)) < 0.5, across, along)
+        else:
             born = children.mixed(leader[chosen], partner, rng)
-            self._positions[chosen] = children.mutated(born, s.mutation_index, rng)
-            return
-        across = children.crossed(leader[chosen], partner, rng)
-        along = children.stepped(elite, places, winner[chosen], rng)
-        born = np.where(rng.random((len(chosen), 1)) < 0.5, across, along)
         born = children.mutated(born, s.mutation_index, rng)
-        anew = BROKEN_ANEW * (1.0 - self.iteration / self.iterations)
-        self._positions[chosen] = children.renewed(born, anew, rng)
+        if self.infeasible:
+            born = children.renewed(born, BROKEN_ANEW, rng)
+        self._positions[chosen] = born
 
     def _gain(self) -> float:
         """Share of the hypervolume won in the last tenth of the iterations."""
