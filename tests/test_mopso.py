@@ -320,18 +320,21 @@ def osy(x):
 
 
 def test_no_piece_of_the_front_of_osy_is_lost(shift):
-    """16 700 for the reference (0, 80) is the whole front; two thirds of it is what one of five pieces alone comes to."""
+    """16 770 for the reference (0, 80) is the whole front; two thirds of it is what one of five pieces alone comes to.
+
+    With steps along the front half of all searches reach 0.998 of it, one in a hundred or two 0.985; without them 0.991
+    and 0.962.
+    """
     bounds = [[0, 10], [0, 10], [1, 5], [0, 6], [1, 5], [0, 10]]
-    for seed in (
-        0,
-        3,
-        10,
-    ):  # without children of their own these ended with 11 221, 11 234 and 11 134
+    reached = []
+    for seed in (0, 3, 5, 7, 10):
         front = minimise(osy, bounds, iterations=250, rng=np.random.default_rng(seed + shift))
-        at_least(hypervolume(front.values, np.array([0.0, 80.0])), 0.95 * 16700)
+        reached.append(hypervolume(front.values, np.array([0.0, 80.0])) / 16770)
         values, violations = osy(front.points)
         assert (violations == 0.0).all()
         np.testing.assert_array_equal(values, front.values)
+    at_least(min(reached), 0.95)
+    at_least(np.median(reached), 0.9955)
 
 
 def tnk(x):
@@ -343,6 +346,7 @@ def tnk(x):
 
 
 def test_front_on_a_curved_border_of_the_feasible_region(shift):
+    """Of the closed form's hypervolume half of all searches reach 0.9932, with crossover alone 0.9902."""
     angle = np.linspace(0.0, np.pi / 2, 20_001)
     radius = np.sqrt(1 + 0.1 * np.cos(16 * angle))
     border = np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1)
@@ -355,7 +359,7 @@ def test_front_on_a_curved_border_of_the_feasible_region(shift):
         front = minimise(tnk, [[1e-12, np.pi]] * 2, iterations=250, rng=rng)
         assert (tnk(front.points)[1] == 0.0).all()
         reached.append(hypervolume(front.values, worst) / whole)
-    at_least(np.median(reached), 0.99)
+    at_least(np.median(reached), 0.9923)
 
 
 def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
