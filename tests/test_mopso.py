@@ -9,8 +9,9 @@ from margins import at_least, at_most
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
-from hpcclear.statistics.search.mopso import ParticleSwarm, SwarmSettings, minimise
+from hpcclear.statistics.search.mopso import ParticleSwarm, minimise
 from hpcclear.statistics.search.pareto import Archive, best_subset, cut, hypervolume, relative_gain
+from hpcclear.statistics.search.settings import SwarmSettings
 
 
 def zdt1(x):

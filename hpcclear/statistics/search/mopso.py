@@ -28,7 +28,7 @@ All objectives are minimised. Positions live in the unit cube, so variables may 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Self
 
 import numpy as np
@@ -46,6 +46,7 @@ from hpcclear.statistics.search.pareto import (
     hypervolume,
     relative_gain,
 )
+from hpcclear.statistics.search.settings import SwarmSettings, checked_bounds, whole
 
 _SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
 BROKEN_SHARE = 0.85
@@ -66,30 +67,6 @@ _ARRAYS = (
     "reference",
 )
 _COUNTS = ("iterations", "iteration", "evaluations", "failed", "infeasible")
-
-
-@dataclass(frozen=True)
-class SwarmSettings:
-    """The defaults are the one documented setting; raises `InputError` for senseless values."""
-
-    particles: int = 100
-    c1: float = 1.8  # pull to the particle's own best
-    c2: float = 1.8  # pull to its leader
-    inertia_first: float = 1.2  # w_max of eq. 23
-    inertia_last: float = 0.1  # w_min of eq. 23
-    speed_limit: float = 0.5  # of each variable's range, per iteration
-    mutation_share: float = 0.2
-    mutation_index: float = 20.0  # of the polynomial distribution; larger is nearer
-    archive_capacity: int = 400
-    tournament: int = 3
-
-    def __post_init__(self) -> None:
-        for key in ("particles", "archive_capacity", "tournament"):
-            _whole(f"swarm.{key}", getattr(self, key))
-        for key in ("c1", "c2", "inertia_first", "inertia_last", "mutation_index"):
-            _within(f"swarm.{key}", getattr(self, key), np.inf)
-        _within("swarm.speed_limit", self.speed_limit, 1.0)
-        _within("swarm.mutation_share", self.mutation_share, 1.0)
 
 
 class ParticleSwarm:
@@ -125,9 +102,9 @@ class ParticleSwarm:
         start: ArrayLike | None = None,
         reference: ArrayLike | None = None,
     ) -> None:
-        _whole("iterations", iterations)
+        whole("iterations", iterations)
         self.settings = SwarmSettings() if settings is None else settings
-        self._lower, self._upper = _checked_bounds(bounds)
+        self._lower, self._upper = checked_bounds(bounds)
         self.iterations = int(iterations)
         self.iteration = 0
         self.evaluations = self.failed = self.infeasible = 0
@@ -407,25 +384,3 @@ def minimise(
         else:
             swarm.tell(told)
     return swarm.front(size)
-
-
-def _whole(key: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError(key, value, "not a positive whole number", "Use 1, 2, 3, …")
-
-
-def _within(key: str, value: float, most: float) -> None:
-    if not (np.isfinite(value) and 0.0 <= value <= most):
-        raise InputError(key, value, f"not between 0 and {most}", "See SwarmSettings.")
-
-
-def _checked_bounds(bounds: ArrayLike) -> tuple[Array, Array]:
-    table = np.array(bounds, dtype=float)
-    if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:
-        raise InputError("bounds", table.shape, "wrong shape", "Give (lower, upper) per variable.")
-    for row, (lower, upper) in enumerate(table):
-        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
-            reason = "lower bound not below the upper one, or not finite"
-            remedy = "Give lower < upper, and leave out a variable that is fixed."
-            raise InputError(f"bounds[{row}]", (float(lower), float(upper)), reason, remedy)
-    return table[:, 0].copy(), table[:, 1].copy()
