@@ -355,12 +355,12 @@ def test_front_on_a_curved_border_of_the_feasible_region(shift):
     worst = np.full(2, 1.1)
     whole = hypervolume(known, worst)
     reached = []
-    for seed in range(5):
+    for seed in range(9):
         rng = np.random.default_rng(seed + shift)
         front = minimise(tnk, [[1e-12, np.pi]] * 2, iterations=250, rng=rng)
         assert (tnk(front.points)[1] == 0.0).all()
         reached.append(hypervolume(front.values, worst) / whole)
-    at_least(np.median(reached), 0.9923)
+    at_least(np.median(reached), 0.9918)
 
 
 def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
