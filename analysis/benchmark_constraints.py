@@ -5,10 +5,10 @@
     python analysis/benchmark_constraints.py --seeds 3    # a look
 
 BNH, SRN, TNK, OSY, CTP1 and MW7 as pymoo has them, populations of 100 and fronts of 100 points: the peers' are their last
-populations, the swarm's the best of its archive of 400. Hypervolumes over that of the best of all that was found, reference point
-1.1 times its extent from its best corner. `--others`: CTP2 to 8, the other MW of two objectives, C1-DTLZ1, C1-DTLZ3 and C2-DTLZ2
-with two, DAS-CMOP1 to 6 at the fifth of their difficulties. The search was made on the first six; of the others MW1, MW6 and
-DAS-CMOP4 to 6 were looked at on the way: a seed of MW1 had no feasible point. Peers: pip install pymoo.
+populations, the swarm's the best of its archive of 400. Hypervolumes over that of the best of all that was found, reference
+point 1.1 times its extent from its best corner. `--others`: CTP2 to 8, the other MW of two objectives, C1-DTLZ1, C1-DTLZ3 and
+C2-DTLZ2 with two, DAS-CMOP1 to 6 at the fifth of their difficulties. The search was made on the first six; of the others MW1,
+MW6 and DAS-CMOP4 to 6 were looked at on the way: a seed of MW1 had no feasible point. Peers: pip install pymoo.
 """
 
 import argparse
