@@ -372,6 +372,26 @@ def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
     assert front.points.max() <= 0.02
 
 
+def mw1(x):
+    """Ma and Wang's first problem: feasible where 14 variables are near values of their own, flat elsewhere."""
+    well = x[:, 1:] ** 13 - 0.5 - np.arange(1, 15) / 30
+    g = 1 + (1 - np.exp(-10 * well**2)).sum(axis=1)
+    values = np.stack([x[:, 0], g - 0.85 * x[:, 0]], axis=1)
+    wave = np.sin(2 * np.pi * np.sqrt(2) * (values[:, 1] - values[:, 0])) ** 8
+    return values, values.sum(axis=1) - 1 - 0.5 * wave
+
+
+def test_a_first_feasible_point_is_put_together_of_coordinates(shift):
+    """Half of all searches need 37 iterations, with children along a front that is not there yet 100."""
+    needed = []
+    for seed in range(11):
+        swarm = ParticleSwarm(unit(15), 250, np.random.default_rng(seed + shift))
+        while not len(swarm.front().points) and not swarm.done:
+            swarm.tell(*mw1(swarm.ask()))
+        needed.append(swarm.iteration)
+    at_most(np.median(needed), 70)
+
+
 def test_no_feasible_point_is_said_and_not_invented():
     front = run(lambda x: (zdt1(x), np.full(len(x), 0.25)), 5, 1, 10)
     assert front.points.shape == (0, 5)
