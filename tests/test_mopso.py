@@ -1,5 +1,7 @@
 """The swarm against known fronts, brute force and its own promises."""
 
+import itertools
+
 import moocore
 import numpy as np
 import pytest
@@ -7,8 +9,9 @@ from margins import at_least, at_most
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import generator_state as rng_state
-from hpcclear.statistics.search.mopso import ParticleSwarm, SwarmSettings, minimise
-from hpcclear.statistics.search.pareto import Archive, cut, hypervolume, relative_gain
+from hpcclear.statistics.search.mopso import ParticleSwarm, minimise
+from hpcclear.statistics.search.pareto import Archive, best_subset, cut, hypervolume, relative_gain
+from hpcclear.statistics.search.settings import SwarmSettings
 
 
 def zdt1(x):
@@ -240,6 +243,26 @@ def test_cut_drops_the_least_hypervolume_contribution(objectives):
     assert cut(values, 8).tolist() == kept
 
 
+@pytest.mark.parametrize("size", [2, 3, 5, 11])
+def test_best_subset_is_the_best_of_all_subsets(size):
+    first = np.sort(np.random.default_rng(8).random(11))
+    values = np.stack([first, 40.0 * (1.0 - first**3)], axis=1)[::-1].copy()
+    reference = np.array([1.1, 44.0])
+    ends = {int(row) for row in values.argmin(axis=0)}
+    sets = [rows for rows in itertools.combinations(range(11), size) if ends <= set(rows)]
+    reached = [hypervolume(values[list(rows)], reference) for rows in sets]
+    assert best_subset(values, size).tolist() == list(sets[int(np.argmax(reached))])
+
+
+def test_elite_is_what_the_front_would_lose_most_without():
+    first = np.array([0.3, 0.0, 0.31, 1.0, 0.6])
+    archive = Archive(10, np.empty((0, 1)), np.empty((0, 0)))
+    archive.add(first[:, None], np.stack([first, 1000 * (1 - first)], axis=1))
+    rows, lost = archive.elite(4)
+    assert archive.positions[rows, 0].tolist() == [0.3, 0.0, 1.0, 0.6]  # 0.31 had least to lose
+    assert np.allclose(lost, [300 * 0.3, np.inf, np.inf, 300 * 0.4])  # to the next, up to the last
+
+
 def test_cut_of_many_objectives_keeps_the_best_of_each():
     values = np.abs(np.random.default_rng(7).normal(size=(60, 5)))
     values /= np.linalg.norm(values, axis=1)[:, None]
@@ -298,18 +321,46 @@ def osy(x):
 
 
 def test_no_piece_of_the_front_of_osy_is_lost(shift):
-    """16 700 for the reference (0, 80) is the whole front; two thirds of it is what one of five pieces alone comes to."""
+    """16 770 for the reference (0, 80) is the whole front; two thirds of it is what one of five pieces alone comes to.
+
+    With steps along the front half of all searches reach 0.998 of it, one in a hundred or two 0.985; without them 0.991
+    and 0.962.
+    """
     bounds = [[0, 10], [0, 10], [1, 5], [0, 6], [1, 5], [0, 10]]
-    for seed in (
-        0,
-        3,
-        10,
-    ):  # without children of their own these ended with 11 221, 11 234 and 11 134
+    reached = []
+    for seed in (0, 3, 5, 7, 10):
         front = minimise(osy, bounds, iterations=250, rng=np.random.default_rng(seed + shift))
-        at_least(hypervolume(front.values, np.array([0.0, 80.0])), 0.95 * 16700)
+        reached.append(hypervolume(front.values, np.array([0.0, 80.0])) / 16770)
         values, violations = osy(front.points)
         assert (violations == 0.0).all()
         np.testing.assert_array_equal(values, front.values)
+    at_least(min(reached), 0.95)
+    at_least(np.median(reached), 0.9955)
+
+
+def tnk(x):
+    """Tanaka's problem: the objectives are the variables, and the front is a border of the feasible region in pieces."""
+    first, second = x.T
+    ring = first**2 + second**2 - 1 - 0.1 * np.cos(16 * np.arctan2(first, second))
+    disc = 0.5 - (first - 0.5) ** 2 - (second - 0.5) ** 2
+    return x, np.maximum(-np.stack([ring, disc], axis=1), 0.0)
+
+
+def test_front_on_a_curved_border_of_the_feasible_region(shift):
+    """Of the closed form's hypervolume half of all searches reach 0.9932, with crossover alone 0.9902."""
+    angle = np.linspace(0.0, np.pi / 2, 20_001)
+    radius = np.sqrt(1 + 0.1 * np.cos(16 * angle))
+    border = np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=1)
+    known = border[tnk(border)[1][:, 1] == 0.0]
+    worst = np.full(2, 1.1)
+    whole = hypervolume(known, worst)
+    reached = []
+    for seed in range(9):
+        rng = np.random.default_rng(seed + shift)
+        front = minimise(tnk, [[1e-12, np.pi]] * 2, iterations=250, rng=rng)
+        assert (tnk(front.points)[1] == 0.0).all()
+        reached.append(hypervolume(front.values, worst) / whole)
+    at_least(np.median(reached), 0.9918)
 
 
 def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
@@ -319,6 +370,26 @@ def test_violations_lead_to_the_feasible_region_when_none_is_known(shift):
     front = run(far_corner, 10, 1 + shift, 100)
     assert len(front.points) >= 1
     assert front.points.max() <= 0.02
+
+
+def mw1(x):
+    """Ma and Wang's first problem: feasible where 14 variables are near values of their own, flat elsewhere."""
+    well = x[:, 1:] ** 13 - 0.5 - np.arange(1, 15) / 30
+    g = 1 + (1 - np.exp(-10 * well**2)).sum(axis=1)
+    values = np.stack([x[:, 0], g - 0.85 * x[:, 0]], axis=1)
+    wave = np.sin(2 * np.pi * np.sqrt(2) * (values[:, 1] - values[:, 0])) ** 8
+    return values, values.sum(axis=1) - 1 - 0.5 * wave
+
+
+def test_a_first_feasible_point_is_put_together_of_coordinates(shift):
+    """Half of all searches need 37 iterations, with children along a front that is not there yet 100."""
+    needed = []
+    for seed in range(11):
+        swarm = ParticleSwarm(unit(15), 250, np.random.default_rng(seed + shift))
+        while not len(swarm.front().points) and not swarm.done:
+            swarm.tell(*mw1(swarm.ask()))
+        needed.append(swarm.iteration)
+    at_most(np.median(needed), 70)
 
 
 def test_no_feasible_point_is_said_and_not_invented():

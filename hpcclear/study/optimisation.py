@@ -27,8 +27,9 @@ from hpcclear.statistics.random.distributions import (
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, separable
-from hpcclear.statistics.search.mopso import SwarmSettings, minimise
+from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.pareto import cut, hypervolume
+from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
 from hpcclear.study.goals import excess, guessed, names_of
 from hpcclear.study.run import Result, StudyRun

@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.search.mopso import SwarmSettings, minimise
+from hpcclear.statistics.search.mopso import minimise
+from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 BOLD = (0.0, 1.0, 2.0, 3.0)

@@ -17,16 +17,18 @@ setting for all problems:
 - **Constraints** (Deb 2000, doi:10.1016/S0045-7825(99)00389-8): feasible beats infeasible, among
   infeasible points the smaller total violation wins. A point whose objectives are not all finite
   is infeasible, without limit if no violation was given. Only feasible points enter the archive.
-  Once one was broken the feasible region may be thin or in pieces, which flying past it misses: then
-  `BROKEN_SHARE` of the particles continue from children, made by simulated binary crossover (Deb & Agrawal
-  1995), and `BROKEN_ANEW` of these get one coordinate anew from its whole range.
-- **Front**: the archive cut to the size asked for (`pareto.cut`).
+  Once one was broken the feasible region may be thin or in pieces, which flying past it misses, and the front
+  may lie on its borders: then `BROKEN_SHARE` of the particles continue from children, of which `BROKEN_ANEW` get
+  one coordinate anew from its whole range. Half of them are made by simulated binary crossover, half by steps along the front
+  (`children`); before any feasible point is known, as without constraints, of the least violating. Leaders and parents are as
+  many members of the archive as there are particles (`Archive.elite`); the one that the front would lose most without wins.
+- **Front**: the archive cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken).
 
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Self
 
 import numpy as np
@@ -34,22 +36,23 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.statistics.search import children
 from hpcclear.statistics.search import generator_state as rng_state
 from hpcclear.statistics.search.pareto import (
     Archive,
     Front,
+    best_subset,
     cut,
     hypervolume,
     relative_gain,
 )
+from hpcclear.statistics.search.settings import SwarmSettings, checked_bounds, whole
 
 _SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
-BROKEN_SHARE = 0.7
+BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""
 BROKEN_ANEW = 0.3
 """Share of these children that get a coordinate anew."""
-CROSSOVER_INDEX = 15.0
-"""Of simulated binary crossover; larger is nearer to the parents."""
 
 _ARRAYS = (
     "positions",
@@ -64,30 +67,6 @@ _ARRAYS = (
     "reference",
 )
 _COUNTS = ("iterations", "iteration", "evaluations", "failed", "infeasible")
-
-
-@dataclass(frozen=True)
-class SwarmSettings:
-    """The defaults are the one documented setting; raises `InputError` for senseless values."""
-
-    particles: int = 100
-    c1: float = 1.8  # pull to the particle's own best
-    c2: float = 1.8  # pull to its leader
-    inertia_first: float = 1.2  # w_max of eq. 23
-    inertia_last: float = 0.1  # w_min of eq. 23
-    speed_limit: float = 0.5  # of each variable's range, per iteration
-    mutation_share: float = 0.2
-    mutation_index: float = 20.0  # of the polynomial distribution; larger is nearer
-    archive_capacity: int = 400
-    tournament: int = 3
-
-    def __post_init__(self) -> None:
-        for key in ("particles", "archive_capacity", "tournament"):
-            _whole(f"swarm.{key}", getattr(self, key))
-        for key in ("c1", "c2", "inertia_first", "inertia_last", "mutation_index"):
-            _within(f"swarm.{key}", getattr(self, key), np.inf)
-        _within("swarm.speed_limit", self.speed_limit, 1.0)
-        _within("swarm.mutation_share", self.mutation_share, 1.0)
 
 
 class ParticleSwarm:
@@ -123,9 +102,9 @@ class ParticleSwarm:
         start: ArrayLike | None = None,
         reference: ArrayLike | None = None,
     ) -> None:
-        _whole("iterations", iterations)
+        whole("iterations", iterations)
         self.settings = SwarmSettings() if settings is None else settings
-        self._lower, self._upper = _checked_bounds(bounds)
+        self._lower, self._upper = checked_bounds(bounds)
         self.iterations = int(iterations)
         self.iteration = 0
         self.evaluations = self.failed = self.infeasible = 0
@@ -196,7 +175,7 @@ class ParticleSwarm:
         objectives = self._archive.values.shape[1]
         if size < max(1, objectives):
             raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
-        kept = cut(self._archive.values, size)
+        kept = (best_subset if self.infeasible else cut)(self._archive.values, size)
         if len(kept):
             kept = kept[np.lexsort(self._archive.values[kept].T[::-1])]
         gain = self._gain()
@@ -300,19 +279,30 @@ class ParticleSwarm:
         self._personal_values[taken] = values[taken]
         self._personal_violations[taken] = total[taken]
 
-    def _leaders(self) -> tuple[Array, Array]:
-        """Positions that guide and how lonely each is; without an archive, the least violating."""
-        if len(self._archive):
-            return self._archive.positions, self._archive.loneliness()
-        return self._personal_positions, -self._personal_violations
+    def _leaders(self) -> tuple[Array, Array, Array]:
+        """Positions that guide, where they stand in objectives, and their merit.
+
+        Without an archive, the personal bests, where they are, and how little they violate.
+        """
+        archive = self._archive
+        if not len(archive):
+            own = self._personal_positions
+            return own, own, -self._personal_violations
+        if not self.infeasible:
+            return archive.positions, archive.values, archive.loneliness()
+        rows, merit = archive.elite(len(self._positions))
+        values = archive.values[rows]
+        extent = np.ptp(values, axis=0)
+        return archive.positions[rows], values / np.where(extent > 0.0, extent, 1.0), merit
 
     def _move(self) -> None:
-        """Equations 22 and 23, bounds and mutation."""
+        """Equations 22 and 23, bounds and children."""
         s, rng = self.settings, self._rng
         particles = len(self._positions)
-        elite, merit = self._leaders()
+        elite, places, merit = self._leaders()
         drawn = rng.integers(len(elite), size=(particles, s.tournament))
-        leader = elite[drawn[np.arange(particles), merit[drawn].argmax(axis=1)]]
+        winner = drawn[np.arange(particles), merit[drawn].argmax(axis=1)]
+        leader = elite[winner]
 
         fall = (s.inertia_first - s.inertia_last) * self.iteration / self.iterations
         r1, r2 = rng.random((2, particles, 1))  # one number a particle, as eq. 22 has it
@@ -327,22 +317,21 @@ class ParticleSwarm:
         self._velocities = np.where(left, -speed, speed)
         self._positions = np.clip(moved, 0.0, 1.0)
 
-        broken = self.infeasible > 0
-        share = (
-            max(s.mutation_share, BROKEN_SHARE) if broken and s.mutation_share else s.mutation_share
-        )
+        share = s.mutation_share
+        if self.infeasible and share:
+            share = max(share, BROKEN_SHARE)
         chosen = np.flatnonzero(rng.random(particles) < share)
         partner = elite[rng.integers(len(elite), size=len(chosen))]
-        if broken:
-            mixed = _crossed(leader[chosen], partner, rng)
+        if self.infeasible and len(self._archive):
+            across = children.crossed(leader[chosen], partner, rng)
+            along = children.stepped(elite, places, winner[chosen], rng)
+            born = np.where(rng.random((len(chosen), 1)) < 0.5, across, along)
         else:
-            mixed = np.where(rng.random(partner.shape) < 0.5, leader[chosen], partner)
-        children = _mutated(mixed, s.mutation_index, rng)
-        if broken:
-            wild = np.flatnonzero(rng.random(len(chosen)) < BROKEN_ANEW)
-            columns = rng.integers(children.shape[1], size=len(wild))
-            children[wild, columns] = rng.random(len(wild))
-        self._positions[chosen] = children
+            born = children.mixed(leader[chosen], partner, rng)
+        born = children.mutated(born, s.mutation_index, rng)
+        if self.infeasible:
+            born = children.renewed(born, BROKEN_ANEW, rng)
+        self._positions[chosen] = born
 
     def _gain(self) -> float:
         """Share of the hypervolume won in the last tenth of the iterations."""
@@ -395,47 +384,3 @@ def minimise(
         else:
             swarm.tell(told)
     return swarm.front(size)
-
-
-def _whole(key: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError(key, value, "not a positive whole number", "Use 1, 2, 3, …")
-
-
-def _within(key: str, value: float, most: float) -> None:
-    if not (np.isfinite(value) and 0.0 <= value <= most):
-        raise InputError(key, value, f"not between 0 and {most}", "See SwarmSettings.")
-
-
-def _checked_bounds(bounds: ArrayLike) -> tuple[Array, Array]:
-    table = np.array(bounds, dtype=float)
-    if table.ndim != 2 or table.shape[1] != 2 or len(table) == 0:
-        raise InputError("bounds", table.shape, "wrong shape", "Give (lower, upper) per variable.")
-    for row, (lower, upper) in enumerate(table):
-        if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
-            reason = "lower bound not below the upper one, or not finite"
-            remedy = "Give lower < upper, and leave out a variable that is fixed."
-            raise InputError(f"bounds[{row}]", (float(lower), float(upper)), reason, remedy)
-    return table[:, 0].copy(), table[:, 1].copy()
-
-
-def _crossed(first: Array, second: Array, rng: np.random.Generator) -> Array:
-    """Simulated binary crossover (Deb & Agrawal 1995) in the unit cube, of half the coordinates: the children near `first`."""
-    u = rng.random(first.shape)
-    power = 1.0 / (CROSSOVER_INDEX + 1.0)
-    spread = np.where(u < 0.5, 2.0 * u, 1.0 / (2.0 * (1.0 - u))) ** power
-    child = 0.5 * ((1.0 + spread) * first + (1.0 - spread) * second)
-    return np.clip(np.where(rng.random(first.shape) < 0.5, child, first), 0.0, 1.0)
-
-
-def _mutated(unit: Array, index: float, rng: np.random.Generator) -> Array:
-    """Polynomial mutation (Deb & Goyal 1996) in the unit cube, on one coordinate on average."""
-    hit = rng.random(unit.shape) < 1.0 / unit.shape[1]
-    u = rng.random(unit.shape)[hit]
-    x = unit[hit]
-    power = 1.0 / (index + 1.0)
-    down = (2.0 * u + (1.0 - 2.0 * u) * (1.0 - x) ** (index + 1.0)) ** power - 1.0
-    up = 1.0 - (2.0 * (1.0 - u) + (2.0 * u - 1.0) * x ** (index + 1.0)) ** power
-    result = unit.copy()
-    result[hit] = np.clip(x + np.where(u < 0.5, down, up), 0.0, 1.0)
-    return result
