@@ -113,8 +113,14 @@ def test_the_speed_of_a_free_crank_shows_what_its_gaps_hide():
 
 def test_noise_alone_is_hardly_ever_cut():
     rng = np.random.default_rng(5)
-    cuts = [judging.spin_up(rng.standard_normal(12)) for _ in range(200)]
-    assert np.mean(cuts) < 1.2  # the least error itself cuts 1.3
+    noise = [rng.standard_normal(12) for _ in range(200)]
+    assert np.mean([judging.spin_up(one) for one in noise]) < 1.2  # the least error itself cuts 1.3
+    assert np.mean([judging.spin_up(one, 1.0) for one in noise]) < 0.6
+
+
+def test_noise_of_known_variance_hides_no_transient():
+    noise = np.random.default_rng(1).standard_normal(40)
+    assert judging.spin_up(noise + 20.0 * np.exp(-np.arange(40) / 3.0), 1.0) >= 8
 
 
 def test_the_projection_has_the_objective_for_its_mean():
@@ -214,4 +220,5 @@ def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():
     ("growth", "stretches"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
 )
 def test_slow_kicks_wait_longer_for_the_first_look(growth: float, stretches: int):
-    assert ensemble._first(growth) == stretches
+    assert ensemble._first(False, growth) == stretches
+    assert ensemble._first(True, growth) == 6

@@ -102,7 +102,7 @@ def ensemble(
 ) -> Generator[Stretch, Outcome, Mean]:
     """Go on with copies from kicked starts until the limits of their mean are narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
-    stretches, moved, restless = _first(growth), 0.0, 0
+    stretches, moved, restless = _first(effort.sample.free, growth), 0.0, 0
     while True:
         yield from _extend(effort, copies, rtol, stretches)
         if effort.failed is not None:
@@ -137,10 +137,12 @@ def ensemble(
             stretches = yield from _more(effort, copies, rtol, seen, level - seen.settling)
 
 
-def _first(growth: float) -> int:
-    """Stretches before the first look, from how fast a kick grows."""
-    parting = -np.log(KICK) / growth if growth > 0.0 else np.inf
-    return int(np.clip(np.ceil(min((parting + PARTED) / STRETCH, FIRST[1])), *FIRST))
+def _first(free: bool, growth: float) -> int:
+    """Stretches before the first look, from how fast a kick grows; the speed of a free crank takes its time in any case."""
+    if free or not growth > 0.0:
+        return FIRST[1]
+    parting = -np.log(KICK) / growth
+    return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
 
 
 def _new_copies(effort: Effort, count: int) -> _Copies:
@@ -220,7 +222,10 @@ def _limits(copies: _Copies, speeds: Array | None) -> _Limits:
     y = judging.projected(gaps)  # (stretches, copies)
     total = len(y)
     between = y.var(axis=1, ddof=1)
-    first = max(judging.spin_up(y.mean(axis=1)), min(judging.parted(between), total // 2), 1)
+    chance = float(np.median(between[total // 2 :])) / y.shape[1]  # of the mean over copies
+    first = max(
+        judging.spin_up(y.mean(axis=1), chance), min(judging.parted(between), total // 2), 1
+    )
     if speeds is not None:
         first = max(first, judging.spin_up(speeds.mean(axis=1)))
     first = min(first, total - 1)  # the budget may end at once

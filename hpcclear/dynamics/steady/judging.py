@@ -161,14 +161,15 @@ def projected(gaps: Array) -> Array:
     return gaps @ (mean / objective(mean))
 
 
-def spin_up(series: Array) -> int:
+def spin_up(series: Array, noise: float = 0.0) -> int:
     """Values at the start of a series (n,) to leave out, at most half of them: those that widen the limits of its mean.
 
     MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
-    first that makes it nearly so, since in noise the least is anywhere.
+    first that makes it nearly so, since in noise the least is anywhere. No cut makes the scatter of what is left less than
+    the variance of its noise, where that is known.
     """
     n = len(series)
-    errors = np.array([np.var(series[d:]) / (n - d) for d in range(n // 2 + 1)])
+    errors = np.array([max(np.var(series[d:]), noise) / (n - d) for d in range(n // 2 + 1)])
     return int(np.argmax(errors <= NEARLY * errors.min()))
 
 
