@@ -177,11 +177,14 @@ def test_copies_that_differ_for_good_count_alone():
     assert told == pytest.approx(float((means**2).sum()) / 30.0, rel=1e-12)
 
 
+def a_sample(latched: bool = False, free: bool = False) -> Sample:
+    return Sample(np.zeros((1, Parameters.size)), Start.at_rest(1), np.ones(4), latched, free)
+
+
 def found_of_noise(scatter: float, bias: float, seed: int, target: float = 1e-2) -> Mean:
     """What an ensemble finds where f is 1 and noise; the looser tolerance off by `bias`."""
     rng = np.random.default_rng(seed)
-    sample = Sample(np.zeros((1, Parameters.size)), Start.at_rest(1), np.ones(4), False, False)
-    asking = ensemble.ensemble(Effort(sample, 10**6), target, ensemble.LOOSEST, growth=10.0)
+    asking = ensemble.ensemble(Effort(a_sample(), 10**6), target, ensemble.LOOSEST, growth=10.0)
     stretch = next(asking)
     while True:
         tolerance = stretch.rtol / np.sqrt(Parameters(stretch.par).strictness)
@@ -220,5 +223,6 @@ def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():
     ("growth", "stretches"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
 )
 def test_slow_kicks_wait_longer_for_the_first_look(growth: float, stretches: int):
-    assert ensemble._first(False, growth) == stretches
-    assert ensemble._first(True, growth) == 6
+    assert ensemble._first(a_sample(), growth) == stretches
+    assert ensemble._first(a_sample(latched=True), growth) == 6
+    assert ensemble._first(a_sample(free=True), growth) == 6

@@ -9,7 +9,16 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import KICK
-from hpcclear.dynamics.steady.effort import SPEED, STEADY, STRICTER, TIGHTEST, Effort, Mean, Stretch
+from hpcclear.dynamics.steady.effort import (
+    SPEED,
+    STEADY,
+    STRICTER,
+    TIGHTEST,
+    Effort,
+    Mean,
+    Sample,
+    Stretch,
+)
 from hpcclear.dynamics.views import Outcome, Start
 
 LOOSEST = 1e-5
@@ -102,7 +111,7 @@ def ensemble(
 ) -> Generator[Stretch, Outcome, Mean]:
     """Go on with copies from kicked starts until the limits of their mean are narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
-    stretches, moved, restless = _first(effort.sample.free, growth), 0.0, 0
+    stretches, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
         yield from _extend(effort, copies, rtol, stretches)
         if effort.failed is not None:
@@ -137,9 +146,9 @@ def ensemble(
             stretches = yield from _more(effort, copies, rtol, seen, level - seen.settling)
 
 
-def _first(free: bool, growth: float) -> int:
-    """Stretches before the first look, from how fast a kick grows; the speed of a free crank takes its time in any case."""
-    if free or not growth > 0.0:
+def _first(sample: Sample, growth: float) -> int:
+    """Stretches before the first look: the faster kicks grow, the fewer, unless a speed or a latched damping lasts longer."""
+    if sample.free or sample.latched or not growth > 0.0:
         return FIRST[1]
     parting = -np.log(KICK) / growth
     return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
