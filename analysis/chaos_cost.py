@@ -5,7 +5,9 @@ python analysis/chaos_cost.py --scenes 5 8 14
 
 Splits are searched by brute force, their errors measured over groups of copies. The cheapest with hindsight: whose error is
 small enough, though nobody would know. The cheapest with limits: at least four copies, whose Student's limits come to 1 %.
-What is found here has to find tolerance and spin-up besides. Processor time; a busy machine slows all.
+With all known: revolutions that independent copies without spin-up take if their scatter is known, at the cheapest tolerance
+that is off by no more than a quarter of the target. What is found here has to find scatter, tolerance and spin-up besides.
+Processor time; a busy machine slows all.
 """
 
 import argparse
@@ -33,6 +35,8 @@ SCENES = (5, 8, 11, 30, 55, 59, 69, 85, 104, 111)
 TARGET = 1e-2
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6)
 COPIES, STRETCH = 64, 5
+SETTLED = 12
+"""Stretches after which nothing settles."""
 TOGETHER = 8
 """Designs in the lanes at once, as in a batch."""
 
@@ -100,6 +104,29 @@ def cheapest(
     return best
 
 
+def all_known(all_gaps: dict[float, tuple[np.ndarray, float]], truth: float) -> Split:
+    """What is paid where scatter and tolerance are known and nothing has to settle; late revolutions tell them."""
+    found = []
+    for rtol, (gaps, price) in all_gaps.items():
+        late = gaps[SETTLED:]
+        each = objective(late.mean(axis=0))
+        scatter = float(each.var(ddof=1)) * STRETCH * len(late) / truth**2
+        off = abs(float(objective(late.mean(axis=(0, 1)))) / truth - 1.0)
+        revolutions = int(np.ceil(scatter * (1.96 / TARGET) ** 2))
+        if off <= 0.25 * TARGET:
+            found.append(
+                Split(price * revolutions, rtol, revolutions, 0, revolutions, TARGET / 1.96)
+            )
+    return min(found)
+
+
+def difference(loose: np.ndarray, strict: np.ndarray) -> tuple[float, float]:
+    """Of the means at two tolerances, relative, and its standard error."""
+    first, second = (objective(gaps[SETTLED:].mean(axis=0)) for gaps in (loose, strict))
+    error = np.hypot(first.std(ddof=1), second.std(ddof=1)) / np.sqrt(COPIES)
+    return float(first.mean() / second.mean() - 1.0), float(error / second.mean())
+
+
 def ours(scene: Scene, number: int) -> tuple[np.ndarray, float]:
     """Records of designs that differ by 1e-9, and processor seconds of one."""
     mass = scene.number("mechanism.slider.mass") * (1.0 + 1e-9 * np.arange(number))
@@ -114,12 +141,16 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, nargs="*", default=SCENES)
     parser.add_argument("--stretches", type=int, default=60)
     options = parser.parse_args()
-    ratios: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    ratios: dict[str, list[tuple[float, float]]] = {
+        "with all known": [],
+        "with hindsight": [],
+        "with limits": [],
+    }
     for number in options.scenes:
         kind, scene = random_scene(number)
         ours(scene, 1)  # compiles
         found = {rtol: gaps_at(scene, rtol, options.stretches) for rtol in TOLERANCES}
-        late = found[1e-6][0][12:]
+        late = found[1e-6][0][SETTLED:]
         truth = float(objective(late.mean(axis=(0, 1))))
         one, alone = ours(scene, 1)
         many, each = ours(scene, TOGETHER)
@@ -131,23 +162,27 @@ def main() -> None:
             f"({spent:.0f} revolutions, off {off:.1e})",
             flush=True,
         )
-        for limits in (False, True):
-            split = cheapest(found, truth, limits)
-            what = "with limits" if limits else "with hindsight"
+        shift, doubt = difference(found[1e-5][0], found[1e-6][0])
+        print(f"     1e-5 and 1e-6 differ by {100.0 * shift:+.2f} +- {100.0 * doubt:.2f} %")
+        for what, split in (
+            ("with all known", all_known(found, truth)),
+            ("with hindsight", cheapest(found, truth, limits=False)),
+            ("with limits", cheapest(found, truth, limits=True)),
+        ):
             if split is None:
                 print(f"     {what}: no split that was tried reaches it")
                 continue
-            ratios[limits].append((alone / split.seconds, each / split.seconds))
+            ratios[what].append((alone / split.seconds, each / split.seconds))
             print(
                 f"     {what}: {split.seconds:.3f} s (rtol {split.rtol:.0e}, {split.copies} copies of {split.spin_up} + "
-                f"{split.revolutions // split.copies} revolutions): {ratios[limits][-1][0]:.1f} and "
-                f"{ratios[limits][-1][1]:.1f} times",
+                f"{split.revolutions // split.copies} revolutions): {ratios[what][-1][0]:.1f} and "
+                f"{ratios[what][-1][1]:.1f} times",
                 flush=True,
             )
-    for limits, both in ratios.items():
+    for what, both in ratios.items():
         found_ratio = np.array(both)
         print(
-            f"{'with limits' if limits else 'with hindsight'}: median {np.median(found_ratio, axis=0).round(1)}, "
+            f"{what}: median {np.median(found_ratio, axis=0).round(1)}, "
             f"most {found_ratio.max(axis=0).round(1)} times (alone, in a batch)"
         )
 

@@ -7,11 +7,13 @@ import pytest
 from scipy import stats
 
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady import judging
+from hpcclear.dynamics.steady import ensemble, judging
 from hpcclear.dynamics.steady.copies import scales
-from hpcclear.dynamics.steady.effort import Sample
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
 from hpcclear.dynamics.steady.procedure import loosest
+from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -111,8 +113,14 @@ def test_the_speed_of_a_free_crank_shows_what_its_gaps_hide():
 
 def test_noise_alone_is_hardly_ever_cut():
     rng = np.random.default_rng(5)
-    cuts = [judging.spin_up(rng.standard_normal(12)) for _ in range(200)]
-    assert np.mean(cuts) < 1.2  # the least error itself cuts 1.3
+    noise = [rng.standard_normal(12) for _ in range(200)]
+    assert np.mean([judging.spin_up(one) for one in noise]) < 1.2  # the least error itself cuts 1.3
+    assert np.mean([judging.spin_up(one, 1.0) for one in noise]) < 0.6
+
+
+def test_noise_of_known_variance_hides_no_transient():
+    noise = np.random.default_rng(1).standard_normal(40)
+    assert judging.spin_up(noise + 20.0 * np.exp(-np.arange(40) / 3.0), 1.0) >= 8
 
 
 def test_the_projection_has_the_objective_for_its_mean():
@@ -135,3 +143,86 @@ def test_a_joint_without_play_asks_for_nothing():
     scene = load_scene(JOBS / "hunt_crossley.toml").with_({"joints.rod_slider": {"kind": "ideal"}})
     par = parameters(scene)
     assert loosest(Sample(par, start_states(scene, par), scales(scene), False, False)) == 1e-5
+
+
+def noise_of_a_mean(seed: int, n: int, copies: int = 32) -> tuple[list[np.ndarray], float]:
+    """Two groups of copies, shape (n, copies / 2), neighbours correlated by 0.4; variance of the mean of one copy."""
+    drawn = np.random.default_rng(seed).standard_normal((n + 1, copies))
+    series = drawn[1:] + 0.5 * drawn[:-1]
+    return [series[:, ::2], 3.0 + series[:, 1::2]], (1.25 * n + (n - 1)) / n**2
+
+
+@pytest.mark.parametrize("n", [3, 7, 12, 50])
+def test_stretches_tell_the_variance_of_a_mean_more_surely_than_copies_alone(n: int):
+    found, sure, between = [], [], []
+    for seed in RNG_SEEDS:
+        groups, variance = noise_of_a_mean(seed, n)
+        told, freedom = judging.variance_of_mean(groups)
+        found.append(told / variance)
+        sure.append(freedom)
+        between.append(np.mean([group.mean(axis=0).var(ddof=1) for group in groups]) / variance)
+    assert np.mean(found) == pytest.approx(1.0, abs=0.06)
+    assert np.std(found) < 0.9 * np.std(between)
+    assert np.median(sure) > 50.0
+
+
+def test_copies_that_differ_for_good_count_alone():
+    groups, _ = noise_of_a_mean(0, 20)
+    places = np.random.default_rng(1).standard_normal((1, 16))
+    told, freedom = judging.variance_of_mean([group + places for group in groups])
+    means = np.concatenate(
+        [(group + places).mean(axis=0) - group.mean() - places.mean() for group in groups]
+    )
+    assert freedom == 30
+    assert told == pytest.approx(float((means**2).sum()) / 30.0, rel=1e-12)
+
+
+def a_sample(latched: bool = False, free: bool = False) -> Sample:
+    return Sample(np.zeros((1, Parameters.size)), Start.at_rest(1), np.ones(4), latched, free)
+
+
+def found_of_noise(scatter: float, bias: float, seed: int, target: float = 1e-2) -> Mean:
+    """What an ensemble finds where f is 1 and noise; the looser tolerance off by `bias`."""
+    rng = np.random.default_rng(seed)
+    asking = ensemble.ensemble(Effort(a_sample(), 10**6), target, ensemble.LOOSEST, growth=10.0)
+    stretch = next(asking)
+    while True:
+        tolerance = stretch.rtol / np.sqrt(Parameters(stretch.par).strictness)
+        outcome = Outcome(np.zeros((len(stretch.start), Outcome.size)))
+        off = bias * (tolerance > 0.5 * ensemble.LOOSEST)
+        noise = scatter / np.sqrt(stretch.revolutions) * rng.standard_normal(len(off))
+        outcome.mean_gap[:, 0] = 1.0 + off + noise
+        try:
+            stretch = asking.send(outcome)
+        except StopIteration as end:
+            return end.value
+
+
+@pytest.mark.parametrize(("scatter", "bias"), [(0.2, 0.0), (0.2, 2e-3), (0.05, 0.0)])
+def test_an_ensemble_of_noise_holds_its_mean_for_little_more_than_it_takes(scatter, bias):
+    found = [found_of_noise(scatter, bias, seed) for seed in range(200)]
+    f = np.array([objective(mean.gaps) for mean in found])
+    held = np.abs(f - 1.0) <= [mean.limit for mean in found]
+    assert all(mean.met for mean in found)
+    assert held.sum() >= stats.binom.ppf(0.001, 200, 0.93)
+    assert not held.all()
+    least = max(
+        (1.96 * scatter / 1e-2) ** 2, ensemble.FIRST[0] * ensemble.STRETCH * ensemble.COPIES
+    )
+    assert np.mean([mean.revolutions for mean in found]) < 1.7 * least
+
+
+def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():
+    found = [found_of_noise(0.05, 3e-2, seed) for seed in range(20)]
+    f = np.array([objective(mean.gaps) for mean in found])
+    assert abs(f.mean() - 1.0) < 3e-3  # half of it would be 1.5e-2
+    assert all(mean.rtol < ensemble.LOOSEST for mean in found)
+
+
+@pytest.mark.parametrize(
+    ("growth", "stretches"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
+)
+def test_slow_kicks_wait_longer_for_the_first_look(growth: float, stretches: int):
+    assert ensemble._first(a_sample(), growth) == stretches
+    assert ensemble._first(a_sample(latched=True), growth) == 6
+    assert ensemble._first(a_sample(free=True), growth) == 6

@@ -8,7 +8,17 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.effort import SPEED, STEADY, STRICTER, TIGHTEST, Effort, Mean, Stretch
+from hpcclear.dynamics.steady.copies import KICK
+from hpcclear.dynamics.steady.effort import (
+    SPEED,
+    STEADY,
+    STRICTER,
+    TIGHTEST,
+    Effort,
+    Mean,
+    Sample,
+    Stretch,
+)
 from hpcclear.dynamics.views import Outcome, Start
 
 LOOSEST = 1e-5
@@ -18,8 +28,17 @@ LOOSEST = 1e-5
 LOOSEST_LATCHED = 1e-6
 """Likewise with a damping that keeps the impact speed."""
 
+LEVEL = 0.96
+"""Of the limits that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
+
+SHIFT = 2e-3
+"""What the looser of these tolerances moves a mean by as a rule, relative."""
+
 POOLED = 2.0
-"""Standard errors that the means at both tolerances may differ by for both to be used."""
+"""Standard errors (and `SHIFT`) up to which the rest of a difference between the tolerances is chance."""
+
+LEFT = 0.3
+"""Of a difference that is none, what the stricter tolerance is still off by, at most."""
 
 DOUBTED = 3.5
 """Those from which on the looser tolerance is given up: at 2.5 more of them did so by chance, at twice the price."""
@@ -27,19 +46,22 @@ DOUBTED = 3.5
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
-STRETCH = 8
+STRETCH = 4
 """Revolutions between two looks at an ensemble, and those that its peaks are told for."""
 
-FIRST = 3
-"""Stretches before the first look at an ensemble."""
+PARTED = 12
+"""Revolutions before the first look at an ensemble, from when the kicks have grown to the size of the motion."""
 
-LASTING = 20
+FIRST = 4, 6
+"""Stretches before it, at least and at most."""
+
+LASTING = 40
 """Stretches before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
 
 APPROACH = 0.85
 """Revolutions until the next look over those that seem to be needed: limits scatter, and what is too much is not undone."""
 
-LEAST = 0.08
+LEAST = 0.05
 """Revolutions until the next look over those so far, at least: each look is another chance to stop too early."""
 
 RESTLESS = 4
@@ -89,7 +111,7 @@ def ensemble(
 ) -> Generator[Stretch, Outcome, Mean]:
     """Go on with copies from kicked starts until the limits of their mean are narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
-    stretches, moved, restless = FIRST, 0.0, 0
+    stretches, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
         yield from _extend(effort, copies, rtol, stretches)
         if effort.failed is not None:
@@ -122,6 +144,14 @@ def ensemble(
             stretches = 1 if seen.short else len(copies.outcomes)
         else:
             stretches = yield from _more(effort, copies, rtol, seen, level - seen.settling)
+
+
+def _first(sample: Sample, growth: float) -> int:
+    """Stretches before the first look: the faster kicks grow, the fewer, unless a speed or a latched damping lasts longer."""
+    if sample.free or sample.latched or not growth > 0.0:
+        return FIRST[1]
+    parting = -np.log(KICK) / growth
+    return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
 
 
 def _new_copies(effort: Effort, count: int) -> _Copies:
@@ -201,20 +231,29 @@ def _limits(copies: _Copies, speeds: Array | None) -> _Limits:
     y = judging.projected(gaps)  # (stretches, copies)
     total = len(y)
     between = y.var(axis=1, ddof=1)
-    first = max(judging.spin_up(y.mean(axis=1)), min(judging.parted(between), total // 2), 1)
+    chance = float(np.median(between[total // 2 :])) / y.shape[1]  # of the mean over copies
+    first = max(
+        judging.spin_up(y.mean(axis=1), chance), min(judging.parted(between), total // 2), 1
+    )
     if speeds is not None:
         first = max(first, judging.spin_up(speeds.mean(axis=1)))
     first = min(first, total - 1)  # the budget may end at once
     kept = y[first:]
-    loose, strict = (kept[:, k::2].mean(axis=0) for k in (0, 1))
-    doubt = float(
-        np.hypot(*(np.std(part, ddof=1) / np.sqrt(len(part)) for part in (loose, strict)))
-    )
+    loose, strict = kept[:, ::2], kept[:, 1::2]
+    variance, freedom = judging.variance_of_mean([loose, strict])
+    doubt = float(np.sqrt(2.0 * variance / strict.shape[1]))
     bias = float(loose.mean() - strict.mean())
-    pooled = abs(bias) <= POOLED * doubt
+    excess = _excess(bias, doubt, SHIFT * float(kept.mean()))
+    pooled = excess <= doubt**2  # else the stricter alone are nearer
+    if pooled:
+        error = np.sqrt(variance / kept.shape[1] + 0.25 * excess)
+    else:
+        kept, between = strict, y[:, 1::2].var(axis=1, ddof=1)
+        variance, freedom = judging.variance_of_mean([strict])
+        error = np.sqrt(variance / strict.shape[1])
+    mean, limit = float(kept.mean()), float(judging.quantile(freedom, LEVEL) * error)
     if not pooled:
-        kept, between = kept[:, 1::2], y[:, 1::2].var(axis=1, ddof=1)
-    mean, _, limit = judging.student(kept.mean(axis=0))
+        limit = float(np.hypot(limit, LEFT * np.sqrt(excess)))
     within = float(kept.var(axis=0, ddof=1).mean()) if len(kept) > 1 else np.nan
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)
@@ -222,8 +261,6 @@ def _limits(copies: _Copies, speeds: Array | None) -> _Limits:
         limit = judging.student(kept.mean(axis=1))[2]
     several = bool(len(kept) > 1 and apart > 4.0 * within / len(kept))
     regime = Regime.SEVERAL if several else Regime.CHAOTIC
-    excess = max(bias**2 - doubt**2, 0.0)  # over what chance alone makes of a bias that is none
-    limit = float(np.hypot(limit, 0.5 * excess**0.5))
     if coherent or max(apart, within if np.isfinite(within) else 0.0) < (1e-5 * mean) ** 2:
         regime = Regime.REGULAR
         limit += 0.5 * abs(bias)  # nothing else shows what tolerances do
@@ -234,3 +271,11 @@ def _limits(copies: _Copies, speeds: Array | None) -> _Limits:
         faster, further = judging.approach(speeds[first:])
         moved, settling = max(moved, by_speed * faster), max(settling, by_speed * further)
     return _Limits(first, pooled, mean, limit, bias, doubt, regime, moved, settling, several, short)
+
+
+def _excess(bias: float, doubt: float, usual: float) -> float:
+    """Square of what the tolerances differ by over what chance alone makes of a difference that is none, m^2."""
+    excess = max(bias**2 - doubt**2, 0.0)
+    if abs(bias) <= POOLED * np.hypot(doubt, usual):
+        excess = min(excess, usual**2)
+    return excess

@@ -11,6 +11,12 @@ LEVEL = 0.97
 """Of the limits that are called 95 %: a mean is looked at several times until its limits are narrow enough, and each look is
 one more chance to stop on limits that are too narrow."""
 
+PARTS = 8
+"""Of a copy's stretches, at most, whose scatter tells that of its mean: each as long as it can be."""
+
+APART = 1.5
+"""Variance between means of copies over that which their parts explain, from which on it alone counts."""
+
 NEARLY = 1.1
 """Square of a standard error over the least, that is as good."""
 
@@ -96,12 +102,46 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
 
 def student(values: Array) -> tuple[float, float, float]:
     """Mean of independent values (n,), its standard error, and the half-width of its limits."""
+    error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    return float(np.mean(values)), error, quantile(len(values) - 1, LEVEL) * error
+
+
+def quantile(freedom: float, level: float) -> float:
+    """Of Student's distribution with so many degrees of freedom: half-width of limits over the standard error."""
     # here, as it is loaded for a quarter of a second that a first result need not wait
     from scipy.special import stdtrit
 
-    error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    quantile = float(stdtrit(len(values) - 1, 0.5 + 0.5 * LEVEL))
-    return float(np.mean(values)), error, quantile * error
+    return float(stdtrit(freedom, 0.5 + 0.5 * level))
+
+
+def variance_of_mean(groups: list[Array]) -> tuple[float, float]:
+    """Variance of the mean over time of one copy, and its degrees of freedom.
+
+    Copies are independent of each other: how their means differ needs no model of how stretches depend on one another. Parts of
+    them say the same with more degrees of freedom where only neighbours depend on each other: variance of a part and twice
+    the covariance of two. Both count by their degrees of freedom; where copies differ by more than parts explain, they alone.
+
+    Parameters
+    ----------
+    groups : list of ndarray, shape (stretches, copies)
+        Of copies that share a mean; all of as many stretches.
+    """
+    off = np.concatenate([group - group.mean() for group in groups], axis=1)
+    n, copies = off.shape
+    means, free = off.mean(axis=0), copies - len(groups)
+    between = float((means**2).sum()) / free
+    length = -(-n // PARTS)
+    count = n // length
+    if count < 3:
+        return between, free
+    parts = off[n - count * length :].reshape(count, length, copies).mean(axis=1)
+    own = float((parts**2).mean())
+    shared = float((parts[1:] * parts[:-1]).mean())
+    within = (own + 2.0 * (1.0 - 1.0 / count) * shared) * length / n
+    if between > APART * within:
+        return between, free
+    more = count * copies / 3.0
+    return (between * free + within * more) / (free + more), free + more
 
 
 def projected(gaps: Array) -> Array:
@@ -110,14 +150,15 @@ def projected(gaps: Array) -> Array:
     return gaps @ (mean / objective(mean))
 
 
-def spin_up(series: Array) -> int:
+def spin_up(series: Array, noise: float = 0.0) -> int:
     """Values at the start of a series (n,) to leave out, at most half of them: those that widen the limits of its mean.
 
     MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
-    first that makes it nearly so, since in noise the least is anywhere.
+    first that makes it nearly so, since in noise the least is anywhere. No cut makes the scatter of what is left less than
+    the variance of its noise, where that is known.
     """
     n = len(series)
-    errors = np.array([np.var(series[d:]) / (n - d) for d in range(n // 2 + 1)])
+    errors = np.array([max(np.var(series[d:]), noise) / (n - d) for d in range(n // 2 + 1)])
     return int(np.argmax(errors <= NEARLY * errors.min()))
 
 
