@@ -77,7 +77,7 @@ class Problem:
         return to_physical(self.scene, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, goals); with constraints, by how much it breaks them, (n,), besides."""
+        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
         if self.case.plain:
             return self.objective(designs)
         drawn = self.objective.sampled(designs, self.draws)
