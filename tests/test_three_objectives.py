@@ -226,8 +226,8 @@ def test_the_answer_has_a_column_for_each_end(study: Path) -> None:
     told = [
         line.text for line in answer({"verification": found}, "out") if line.label == "asked for"
     ]
-    assert [text.split(" of f")[0] for text in told[:2]] == ["mean", "deviation"]
-    assert told[2].startswith(THIRD)
+    assert len(told) == 1  # mean and deviation have lines anyway
+    assert told[0].startswith(THIRD)
 
 
 def test_the_page_shows_any_two_of_the_three(study: Path) -> None:

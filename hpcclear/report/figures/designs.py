@@ -56,6 +56,9 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
     return figure
 
 
+NEAREST = 1e-3
+"""Relative length of an axis at least, where more than two things are made small: the least of one may be had with all."""
+
 NARROW = 20
 """Letters in a line of a label below a panel."""
 
@@ -167,6 +170,10 @@ def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, c
     sides = _SIDES if count > 2 else _SIDES[:1] * count
     if count > 2:
         panel.margins(0.15)  # room for letters beside marks at the border
+        for ends, widen in ((panel.get_xlim(), panel.set_xlim), (panel.get_ylim(), panel.set_ylim)):
+            least = NEAREST * max(map(abs, ends))
+            if ends[1] - ends[0] < least:  # all have the same but for round-off
+                widen(np.mean(ends) - 0.5 * least, np.mean(ends) + 0.5 * least)
     for end, letter, side in zip(ENDS, _GREEK, sides, strict=False):
         if f"{case} {end}" in names:
             one = verification.isel(design=names.index(f"{case} {end}"))

@@ -149,7 +149,12 @@ def minimise(
 
 
 def _begun(
-    name: str, objectives: int, variables: int, particles: int, iterations: int, rng: np.random.Generator
+    name: str,
+    objectives: int,
+    variables: int,
+    particles: int,
+    iterations: int,
+    rng: np.random.Generator,
 ) -> tuple[Any, Callable[[Any, Array, Array], None]]:
     """The algorithm at its start, and what tells it objectives (n, m) and violations (n,) of what it asked for."""
     from pymoo.core.problem import Problem
