@@ -1,7 +1,7 @@
 """Robust optimisation of each case: fronts of mean and deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import moocore
@@ -10,8 +10,7 @@ import numpy as np
 from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import ENDS, ORDINALS
-from hpcclear.results import dataset
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.cases import Case
@@ -28,10 +27,11 @@ from hpcclear.statistics.random.distributions import (
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.mopso import SwarmSettings, minimise
-from hpcclear.statistics.search.pareto import cut, hypervolume
+from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study.goals import ends_in_all, excess, guessed, most_of, names_of
+from hpcclear.study.goals import ends_in_all, excess, guessed
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
 
@@ -216,20 +216,33 @@ def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
             gains.append(front.gain)
         size = max(len(front) for front in fronts)
         padded = np.full((len(fronts), size, fronts[0].shape[1]), np.nan)
-        for k, front in enumerate(fronts):
-            padded[k, : len(front)] = front
+        for k, solutions in enumerate(fronts):
+            padded[k, : len(solutions)] = solutions
         count = len(case.goals)
         values = padded[..., -count:]
         reference = np.nanmax(values, axis=(0, 1)) * 1.1
         result[f"front_{index}"] = padded
         result[f"gain_{index}"] = np.array(gains)
         result[f"hypervolume_{index}"] = np.array(
-            [hypervolume(front[:, -count:], reference) for front in fronts]
+            [hypervolume(solutions[:, -count:], reference) for solutions in fronts]
         )
     return result
 
 
-def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def check(scene: Scene) -> None:
+    """That the search a study asks for can be had, before anything is simulated.
+
+    Raises
+    ------
+    InputError
+        Its package is not installed.
+    """
+    asked = scene.required_study.swarm.algorithm
+    if asked is not None:
+        foreign.check(asked.removeprefix("pymoo:"))
+
+
+def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
     def function(coordinates: Array) -> Array | tuple[Array, Array]:
         run.ranks.raise_if_stopped()
         return problem.searched(problem.physical(coordinates))
@@ -239,23 +252,36 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type:
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 
-    front = _minimised(run, problem, function, rng)
+    front = _minimised(run, problem, function, len(problem.case.goals), rng)
     if len(front.values):
         return front
-    near = _minimised(run, problem, nearest, rng)
+    near = _minimised(run, problem, nearest, 2, rng)
     return replace(near, values=np.asarray(function(near.points)[0]))
 
 
-def _minimised(  # type: ignore[no-untyped-def]
+def _minimised(
     run: StudyRun,
     problem: Problem,
     function: Callable[[Array], Array | tuple[Array, Array]],
+    objectives: int,
     rng: np.random.Generator,
-):
+) -> Front:
     settings = run.study.swarm
+    bounds = np.column_stack([problem.region.lower, problem.region.upper])
+    if settings.algorithm is not None:
+        return foreign.minimise(
+            settings.algorithm.removeprefix("pymoo:"),
+            function,
+            bounds,
+            objectives,
+            iterations=settings.iterations,
+            particles=settings.particles,
+            rng=rng,
+            size=settings.archive,
+        )
     return minimise(
         function,
-        np.column_stack([problem.region.lower, problem.region.upper]),
+        bounds,
         iterations=settings.iterations,
         rng=rng,
         size=settings.archive,
@@ -347,51 +373,3 @@ def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
     names = run.study.design_variables(case)
     values = to_physical(run.scene, names, coordinates[None])[0]
     return dict(zip(names, values.tolist(), strict=True))
-
-
-def write(
-    run: StudyRun, fronts: Result, verified: Sequence[Choice], model: PiecewiseKriging
-) -> None:
-    """Write front.nc: every run's front of every case, and which solutions were simulated."""
-    cases = [case.name for case in run.study.cases]
-    names = run.study.optimisation
-    solutions = max(fronts[f"front_{k}"].shape[1] for k in range(len(cases)))
-    shape = (len(cases), run.study.swarm.runs, solutions)
-    used = [n for n in names if any(n in run.study.design_variables(case) for case in cases)]
-    data: dict[str, np.ndarray] = {
-        name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)
-    }
-    data["verified"] = np.zeros(shape, np.int8)
-    plain = np.array([case.plain for case in run.study.cases])
-    area = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])
-    data["hypervolume"] = np.where(plain[:, None], area, np.nan)  # else it has another unit
-    searched: list[str] = []
-    if not plain.all():
-        unit = run.scene.objective.unit
-        data["searched"] = np.array([", ".join(names_of(case, unit)) for case in run.study.cases])
-        searched = [f"searched_{name}" for name in ORDINALS[: most_of(run.study.cases)]]
-        data |= {name: np.full(shape, np.nan) for name in searched}
-    for k, case in enumerate(cases):
-        padded, own = fronts[f"front_{k}"], run.study.design_variables(case)
-        place = np.s_[k, :, : padded.shape[1]]
-        values = padded[..., len(own) :]
-        flat = to_physical(run.scene, own, padded[..., : len(own)].reshape(-1, len(own)))
-        for column, name in enumerate(searched[: values.shape[-1]]):
-            data[name][place] = values[..., column]
-        if not run.study.case(case).plain:
-            found = problem_of(run.scene, case, model).moments(flat)
-            values = found.reshape(*padded.shape[:2], 2)
-        data["mean"][place], data["deviation"][place] = values[..., 0], values[..., 1]
-        for column, name in enumerate(own):
-            data[name][place] = flat[:, column].reshape(padded.shape[:2])
-    for choice in verified:
-        if choice.place is not None:
-            data["verified"][(cases.index(choice.case), *choice.place)] = 1
-    coords = {
-        "case": np.array(cases),
-        "run": np.arange(shape[1]),
-        "solution": np.arange(solutions),
-    }
-    units = {name: run.study.variable(name).unit or "1" for name in used}
-    content = dataset.dataset("front", coords, data, None, units, run.scene.objective, run.words)
-    run.write(content, "front.nc")
