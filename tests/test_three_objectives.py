@@ -1,5 +1,6 @@
 """Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
 
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from commands import MPIEXEC, warm
+from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
@@ -19,9 +22,10 @@ from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import extent, run_study
 
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+sys.path.insert(0, str(PROGRAMS))
 
-import formula
+import formula  # noqa: E402
 
 UNIT = 1e-4  # m, of mean and deviation on the sphere
 MEAN, DEVIATION = 2.0, 1.0  # where its centre lies
@@ -168,6 +172,28 @@ def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path
     assert formula.run_in_pieces(scene_of(), str(place), alone()) > 8
     for name in ("front.nc", "verification.nc", "chaos.nc"):
         assert (place / name).read_bytes() == (study / name).read_bytes(), name
+
+
+@pytest.mark.mpi
+def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
+    """By the formula of other studies, whose program ranks can start."""
+    light = 'study.cases={light={random=["C", "m2"], objectives=["mean", "deviation", {formula="m2 + m3"}]}}'
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene_of(light, "study.swarm.algorithm=pymoo:NSGA3").to_toml())
+    for ranks in (1, 2):
+        program = warm().words(
+            [str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / str(ranks))]
+        )
+        launch = [str(MPIEXEC), "-n", str(ranks), *program]
+        done = subprocess.run(
+            launch, capture_output=True, text=True, timeout=crowded(120), check=False
+        )
+        assert done.returncode == 0, done.stderr
+    for name in ("front.nc", "verification.nc", "samples.nc"):
+        one, two = ((tmp_path / ranks / name).read_bytes() for ranks in ("1", "2"))
+        assert one == two, name
+    found = dataset.read(tmp_path / "1" / "verification.nc")
+    assert float(found["third_true"].sel(design="light gamma")) == pytest.approx(0.175, abs=2e-3)
 
 
 # -- cases beside each other ------------------------------------------------------------------------

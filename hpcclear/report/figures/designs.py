@@ -60,7 +60,7 @@ NEAREST = 1e-3
 """Relative length of an axis at least, where more than two things are made small: the least of one may be had with all."""
 
 NARROW = 20
-"""Letters in a line of a label below a panel."""
+"""Letters in a line of a label; longer formulas have two or three lines, and end there."""
 
 
 class _Goal(NamedTuple):
@@ -73,8 +73,8 @@ class _Goal(NamedTuple):
 
 
 _GREEK = "αβγδε"
-_SIDES = ((4, 3), (-8, 3), (4, -8), (-8, -8), (11, -2))
-"""Where letters stand beside their marks, points."""
+_SIDES = ((4, 3), (4, -9), (12, 3), (12, -9), (20, 3))
+"""Where letters stand right of their marks, points; of three and more, left of marks in the right half of a panel."""
 
 _MOMENTS = ("mean of f", "deviation of f")
 _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"deviation $\sigma_f$"))
@@ -99,8 +99,10 @@ def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
     share = words.startswith("share ")
+    if len(words) > 2 * NARROW:
+        words = f"{words[: 2 * NARROW - 6].rstrip()} …"
     label = unit.label(words) if of_f or share else f"{words} (SI)"
-    label = textwrap.fill(labels.literal(label), NARROW, break_long_words=False)
+    label = textwrap.fill(labels.literal(label), NARROW)
     return _Goal(label, f"searched_{name}", name, unit)
 
 
@@ -163,7 +165,7 @@ def _verified(
 
 
 def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, count: int) -> None:
-    """The Greek letters of the ends; of more than two each on a side of its own, as some may lie on each other."""
+    """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
     names = [str(name) for name in verification["design"].to_numpy()]
@@ -178,6 +180,8 @@ def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, c
         if f"{case} {end}" in names:
             one = verification.isel(design=names.index(f"{case} {end}"))
             at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
+            if count > 2 and at[0] > np.mean(panel.get_xlim()):
+                side = -side[0] - 5, side[1]
             options = {"xytext": side, "textcoords": "offset points", "fontsize": style.SMALL}
             drawn = panel.annotate(letter, at, **options)
             if count > 2:
