@@ -122,10 +122,8 @@ def minimise(
         archive.add(unit[good & (broken == 0.0)], values[good & (broken == 0.0)])
         told(asked, values, np.where(good, broken, np.maximum(broken, UNKNOWN)))
         count += len(unit)
-        failed, infeasible = (
-            failed + int((~good).sum()),
-            infeasible + int((good & (broken > 0.0)).sum()),
-        )
+        failed += int((~good).sum())
+        infeasible += int((good & (broken > 0.0)).sum())
         if count <= late:
             earlier = archive.values
     kept = cut(archive.values, size)
