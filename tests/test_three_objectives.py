@@ -1,5 +1,6 @@
 """Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
 
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from browser import Browser
 from commands import MPIEXEC, warm
 from patience import crowded
 
@@ -16,6 +18,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer, beside_original
 from hpcclear.report.html import picture, sections
 from hpcclear.report.html.content import read
+from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search import infill
@@ -269,6 +272,38 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     assert part is not None
     assert part["table"].header[-4:] == ["made small", "and", "and", "constraints"]
     assert ("gamma", "least of the third that the case makes small, likewise") in part["names"]
+
+
+_CHOOSE = """
+const select = [...document.getElementById("front-view").closest(".controls").querySelectorAll("select")];
+select[2].value = 2;
+select[2].dispatchEvent(new Event("change"));
+return select.map((one) => [...one.options].map((option) => option.textContent));
+"""
+
+
+def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
+    shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
+    page = write_report(tmp_path / "page")
+    browser = Browser()
+    try:
+        browser.open(page, 1280)
+        browser.wait("document.querySelectorAll('#front .point').length > 40")
+        count = browser.run("return document.querySelectorAll('#front .point').length;")
+        before = browser.run("return document.getElementById('front').textContent;")
+        _, across, up = browser.run(_CHOOSE)
+        assert across == up == ["mean of f (mm)", "deviation of f (mm)", THIRD]
+        assert browser.run("return document.querySelectorAll('#front .point').length;") == count
+        after = browser.run("return document.getElementById('front').textContent;")
+        assert THIRD not in before
+        assert THIRD in after
+        assert "mean of f (mm)" in after
+        browser.open(page, 380)
+        browser.wait("document.querySelectorAll('#front .point').length > 40")
+        assert browser.run("return document.documentElement.scrollWidth;") <= 380
+        assert browser.log() == []
+    finally:
+        browser.close()
 
 
 # -- designs that are known with errors -------------------------------------------------------------
