@@ -111,6 +111,35 @@ def _other_goals() -> tuple[xr.Dataset, xr.Dataset]:
     return front, verified
 
 
+def _three_goals() -> tuple[xr.Dataset, xr.Dataset]:
+    """The first case asks for three things, the least of the third where also the mean is least; the second for two."""
+    front, verified = _other_goals()
+    words = "((m2 - 0.21)/0.21)**2 + ((m3 - 0.14)/0.14)**2"
+    front["searched"] = (
+        "case",
+        np.array([f"mean of f, deviation of f, {words}", "mean of f, deviation of f"]),
+    )
+    first = np.arange(2)[:, None, None] == 0
+    far = (front["m2"] / 0.21 - 1) ** 2 + (front["m3"] / 0.14 - 1) ** 2
+    for name, value in zip(
+        ("first", "second", "third"),
+        (front["mean"], front["deviation"], far.where(first)),
+        strict=True,
+    ):
+        front[f"searched_{name}"] = value
+        front[f"searched_{name}"].attrs = {}
+    for name, moment in (("first", "mean_true"), ("second", "deviation_true")):
+        verified[f"{name}_true"] = verified[moment]
+    verified["third_true"] = (verified["m2"] / 0.21 - 1) ** 2 + (verified["m3"] / 0.14 - 1) ** 2
+    for name in ("first", "second", "third"):
+        for end in ("lower", "upper"):
+            verified[f"{name}_{end}"] = verified[f"{name}_true"]
+    names = [str(name) for name in verified["design"].to_numpy()]
+    names[1] = f"{names[0].removesuffix('alpha')}gamma"
+    again = verified.isel(design=[0, 0, *range(2, len(names))])  # gamma lies on alpha
+    return front, again.assign_coords(design=names)
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     **{
         name: lambda make=make, name=name: getattr(report, f"{name}_figure")(make())  # type: ignore[misc]
@@ -126,8 +155,12 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         data.samples(failed=1).drop_vars(["m2", "m3", "u2", "I2"])
     ),
     "front, other goals": lambda: report.front_figure(*_other_goals()),
+    "front, three goals": lambda: report.front_figure(*_three_goals()),
     "front, verified": lambda: report.front_figure(data.front(), data.verification()),
     "comparison": lambda: report.comparison_figure({name: data.response(2) for name in DESIGNS}),
+    "comparison, further ends": lambda: report.comparison_figure(
+        {name: data.response(2) for name in ("original", "light gamma", "light delta")}
+    ),
     "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
     "bifurcation": lambda: report.bifurcation_figure(
         [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
@@ -374,6 +407,25 @@ def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
     low, high = upper[1].get_ylim()
     mass = verified["m2"] + verified["m3"]
     assert low <= float(mass.min()) <= float(mass.max()) <= high
+
+
+def test_each_two_of_three_have_panels_and_each_end_a_letter() -> None:
+    front, verified = _three_goals()
+    made = report.front_figure(front, verified)
+    lines = np.array(made.axes).reshape(4, 2)  # three pairs of the first case, one of the second
+    starts = [(one.get_xlabel()[:4], one.get_ylabel()[:4]) for one in lines[:, 0]]
+    assert starts == [("mean", "devi"), ("mean", "((m2"), ("devi", "((m2"), ("mean", "devi")]
+    assert lines[1, 0].get_ylabel().endswith("… (SI)")
+    for panel in lines[:3, 0]:
+        letters = {text.get_text(): text for text in panel.texts}
+        assert set(letters) == set("αβγ")
+        assert letters["α"].xy == letters["γ"].xy  # one design, told apart by where they stand
+        assert letters["α"].xyann != letters["γ"].xyann
+    assert [text.get_text() for text in lines[3, 0].texts] == ["α", "β"]
+    points = lines[2, 0].lines[0].get_xydata()
+    one = front.isel(case=0, run=0)
+    np.testing.assert_allclose(points[:, 1], one["searched_third"])
+    assert not lines[0, 1].texts
 
 
 def test_drawing_leaves_a_figure_as_it_was():

@@ -58,6 +58,13 @@ _ALL = (
 OBJECTIVES = {one.name: one for one in _ALL}
 """Every objective by its name."""
 
+ENDS = ("alpha", "beta", "gamma", "delta", "epsilon")
+"""What the designs are called that have the least of the first, the second ... that a case makes small. There are as many as a
+case may name: hypervolumes are exact so far, and the designs that a study can afford are lost on a front of more."""
+
+ORDINALS = ("first", "second", "third", "fourth", "fifth")
+"""The same places, as variables of files are called by them."""
+
 MEAN_GAP = OBJECTIVES["mean-gap"]
 """f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
 

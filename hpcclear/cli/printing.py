@@ -310,7 +310,10 @@ def describe_study(place: Path) -> None:
             title=f"Case {case}, directly simulated, against the original",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
-        for header in ("", *designs):
+        beside.add_column(
+            "", min_width=11 if len(designs) > 4 else None
+        )  # "constraints" in one line
+        for header in designs:
             beside.add_column(header)
         for row in rows:
             beside.add_row(*(fitting(text) for text in row))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report import alike
 from hpcclear.report.figures import labels
@@ -74,8 +75,8 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ]  # fmt: skip
 
 
-ENDS = ("original", "alpha", "beta")
-"""Designs of a case that stand beside each other."""
+BESIDE = ("original", *ENDS[:2])
+"""Designs of a case that stand beside each other, and with them further ends where its front has more."""
 
 _TOLD = {
     "mean": "mean_true",
@@ -91,15 +92,16 @@ def beside_original(
     verified: xr.Dataset,
 ) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """Each case, the designs of its table, and its lines: what it is, and its value for each, with limits and against the
-    original. The designs are `ENDS`, and the one to take where it is another one."""
+    original. The designs are `BESIDE`, and the one to take where it is another one."""
     known = bool(np.isfinite(verified["mean_true"]).any())
     best = str(_best(_ours(verified))["design"].item()) if known else ""
     names = [str(name) for name in verified["design"].to_numpy()]
     for case in [name.removesuffix(" original") for name in names if name.endswith(" original")]:
-        if not {f"{case} {end}" for end in ENDS} <= set(names):
+        if not {f"{case} {end}" for end in BESIDE} <= set(names):
             continue
         own = best.removeprefix(f"{case} ")
-        headers = ENDS if own == best or own in ENDS else (*ENDS, own)
+        told = (*BESIDE, *(end for end in ENDS[2:] if f"{case} {end}" in names))
+        headers = told if own == best or own in told else (*told, own)
         designs = [verified.sel(design=f"{case} {end}") for end in headers]
         lines = [
             (words, *(_against(one, designs[0], name) for one in designs))
@@ -146,17 +148,20 @@ _USUAL = ("mean of f", "deviation of f", "95th percentile of f")
 
 def _asked(one: xr.Dataset) -> list[str]:
     """What the case of a design makes small and is not told anyway: "first", "second"."""
-    return [
-        name
-        for name in ("first", "second")
-        if f"{name}_goal" in one and str(one[f"{name}_goal"].item()) not in _USUAL
-    ]
+    return [name for name in goals_of(one) if str(one[f"{name}_goal"].item()) not in _USUAL]
+
+
+def goals_of(one: xr.Dataset) -> list[str]:
+    """What the case of a design makes small, where that is told: "first", "second", and further ones."""
+    return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
 
 
 def _goals(best: xr.Dataset) -> Iterator[str]:
     """What the case of a design asks for beyond mean and deviation, with limits."""
-    names = ("first", "second") if "first_goal" in best and not is_plain(best) else ()
+    names = [] if is_plain(best) else goals_of(best)
     for name in names:
+        if len(names) > 2 and str(best[f"{name}_goal"].item()) in _USUAL[:2]:
+            continue  # told above
         value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
         text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
@@ -171,7 +176,7 @@ def is_plain(one: xr.Dataset) -> bool:
     """Whether its case makes mean and deviation small, within no constraints."""
     if "first_goal" not in one:
         return True
-    asked = tuple(str(one[f"{name}_goal"].item()) for name in ("first", "second"))
+    asked = tuple(str(one[f"{name}_goal"].item()) for name in goals_of(one))
     return asked == _USUAL[:2] and not str(one["constraints"].item())
 
 

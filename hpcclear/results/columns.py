@@ -3,7 +3,7 @@
 A row named as its only dimension is a coordinate.
 """
 
-from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.base.objectives import MEAN_GAP, ORDINALS
 from hpcclear.results.rows import (
     Columns,
     count,
@@ -149,8 +149,10 @@ FRONT: Columns = {
     "verified": flag(("case", "run", "solution"), "whether the solution was simulated directly"),
     "hypervolume": number(("case", "run"), "objective^2", "area that the front dominates"),
     "searched": text(("case",), "what is made small, where that is not mean and deviation alone"),
-    "searched_first": number(("case", "run", "solution"), "", "the first of these, by the surrogate"),
-    "searched_second": number(("case", "run", "solution"), "", "the second of these, by the surrogate"),
+    **{
+        f"searched_{name}": number(("case", "run", "solution"), "", f"the {name} of these, by the surrogate")
+        for name in ORDINALS
+    },
 }
 
 VERIFICATION: Columns = {
@@ -182,7 +184,7 @@ VERIFICATION: Columns = {
     "mean_within": number(("design",), "1",
         "relative half-width of the limits of the mean, what the tolerance may add included"),
     "deviation_within": number(("design",), "1", "the same of the deviation"),
-    **goal("first"), **goal("second"),
+    **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "how it stands to the constraints of its case"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),

@@ -2,6 +2,7 @@
 
 from pydantic import model_validator
 
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene.fields import Table, invalid
 from hpcclear.scene.goals import DEVIATION, MEAN, Constraint, Goal
 from hpcclear.scene.variables import NAME
@@ -13,8 +14,8 @@ class Case(Table):
     name: str
     random: tuple[str, ...]
     """Names of `[study.random]`; what is left out has its design's value."""
-    objectives: tuple[Goal, Goal] | None = None
-    """The two things that are made small; default "mean" and "deviation" of f. A word stands for a statistic without
+    objectives: tuple[Goal, ...] | None = None
+    """The things that are made small, two to five; default "mean" and "deviation" of f. A word stands for a statistic without
     further entries."""
     constraints: tuple[Constraint, ...] | None = None
     """What its designs must keep to."""
@@ -35,10 +36,41 @@ class Case(Table):
             raise invalid("a random input is named twice", "Remove one", key="random")
         return self
 
+    @model_validator(mode="after")
+    def _a_front(self) -> "Case":
+        """That there is something to trade, each thing once, and no more than a front can show."""
+        rows = self.goals
+        if len(rows) < 2:
+            raise invalid(
+                "a case trades two things or more for each other",
+                'Add one, such as "deviation" or { formula = "m2 + m3" }',
+                "objectives",
+            )
+        if len(rows) > len(ENDS):
+            raise invalid(
+                f"on a front of more than {len(ENDS)} things nearly every design is one of the best",
+                "Keep some below limits instead, in constraints, or add some up in one formula",
+                "objectives",
+            )
+        for k, goal in enumerate(rows):
+            if any(goal.same_as(other) for other in rows[:k]):
+                raise invalid(
+                    "is made small already",
+                    "Remove it, or name another thing",
+                    f"objectives.{k}",
+                    goal.formula or goal.statistic,
+                )
+        return self
+
     @property
-    def goals(self) -> tuple[Goal, Goal]:
-        """The two things that are made small."""
+    def goals(self) -> tuple[Goal, ...]:
+        """The things that are made small."""
         return (MEAN, DEVIATION) if self.objectives is None else self.objectives
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Names of the designs with the least of each: alpha of the first, beta of the second, and so on."""
+        return tuple(f"{self.name} {end}" for end in ENDS[: len(self.goals)])
 
     @property
     def kept(self) -> tuple[Constraint, ...]:

@@ -51,6 +51,13 @@ class Goal(Table):
         """Of a quantile: the share that stays below."""
         return 0.95 if self.level is None else self.level
 
+    def same_as(self, other: "Goal") -> bool:
+        """Whether it is the same of every design, as far as spelling tells."""
+        if self.formula is not None and other.formula is not None:
+            return "".join(self.formula.split()) == "".join(other.formula.split())
+        same = (self.statistic, self.limit) == (other.statistic, other.limit)
+        return same and self.formula == other.formula and self.order == other.order
+
     def words(self, unit: str) -> str:
         """What it is, for people: "95th percentile of f", "share with f above 0.3 mm" by the `unit` of f."""
         if self.formula is not None:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene.fields import LONGEST_CURVE, Table
 from hpcclear.scene.scene import Scene
 
@@ -114,7 +115,7 @@ def scene_schema() -> dict[str, Any]:
         "type": "array",
         "items": {"anyOf": [one_word, {"$ref": "#/$defs/Goal"}]},
         "minItems": 2,
-        "maxItems": 2,
+        "maxItems": len(ENDS),
     }
     entries = definitions["Case"]["properties"]
     entries["objectives"] = {**goals, "description": entries["objectives"]["description"]}

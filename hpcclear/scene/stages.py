@@ -110,9 +110,22 @@ class CertificateOfEffects(Table):
     """Whether peak contact forces must stay within the tolerance, too."""
 
 
-class Swarm(Table):
-    """Multi-objective particle swarm (eqs. 22 and 23)."""
+FEWEST = 8
+"""Designs at a time of which an algorithm of pymoo can make others: some go on for ever with fewer."""
 
+
+class Swarm(Table):
+    """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
+
+    algorithm: (
+        Literal[
+            "pymoo:AGEMOEA", "pymoo:AGEMOEA2", "pymoo:GDE3", "pymoo:NSGA2", "pymoo:NSGA3", "pymoo:RVEA",
+            "pymoo:SMSEMOA", "pymoo:UNSGA3",
+        ]
+        | None
+    ) = None  # fmt: skip
+    """Default the swarm; or an algorithm of pymoo, which `pip install 'hpcclear[pymoo]'` brings, with its own settings and as
+    many evaluations: `particles` designs at a time, `iterations` times."""
     particles: Annotated[int, Count(2, 10**6)] = 100
     """Designs that are moved at a time."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
@@ -131,6 +144,17 @@ class Swarm(Table):
     """How mean and deviation over the random inputs are found."""
     monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
     """Samples a design, for "monte-carlo"."""
+
+    @model_validator(mode="after")
+    def _enough(self) -> "Swarm":
+        if self.algorithm is not None and self.particles < FEWEST:
+            raise invalid(
+                f"{self.algorithm} makes designs of each other, and needs {FEWEST} at a time",
+                f"Ask for {FEWEST} or more",
+                "particles",
+                self.particles,
+            )
+        return self
 
 
 class MomentAccuracy(Table):

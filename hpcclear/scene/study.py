@@ -220,6 +220,13 @@ class Study(Table):
 
     def _check_goals(self, case: Case) -> None:
         own = self.design_variables(case.name)
+        if self.swarm.archive < len(case.goals):
+            raise invalid(
+                f"case {case.name} makes {len(case.goals)} things small, and each has a solution of its own",
+                f"Ask for {len(case.goals)} solutions or more",
+                key="swarm.archive",
+                value=self.swarm.archive,
+            )
         for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
             for k, goal in enumerate(rows):
                 for name in () if goal.formula is None else names_in(goal.formula):

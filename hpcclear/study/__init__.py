@@ -6,11 +6,12 @@
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
 2. Kriging: models of the objective; the swarm searches one of them.
-3. Optimisation: fronts of mean and deviation of every case by the model, several runs each.
+3. Optimisation: fronts of mean and deviation, or of what else a case makes small, by the model, several runs each.
 4. Refinement: designs of these fronts and others through the true dynamics, more where the front is
    decided, until it stands.
 5. Verification: the best of them, on scatter of their own. Alpha has the least mean, beta the least
-   deviation, and each design of the front is surely better than each other in one of the two.
+   deviation (gamma, delta, epsilon the least of what a case makes small besides), and each design of the front is surely
+   better than each other in one of them.
 6. Chaos: samples of these designs twice, a hair beside, for the share of their scatter that is chaos.
 7. Findings: responses of the optimised designs; for the scene of a publication also what it prints
    and claims, beside ours (`hpcclear.study.paper`).
@@ -41,6 +42,7 @@ from hpcclear.study import (
     budget,
     certificate,
     chaos,
+    fronts,
     lives,
     optimisation,
     paper,
@@ -100,6 +102,7 @@ def run_study(
     if not study.cases:
         raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
     lives.check(scene)
+    optimisation.check(scene)
     for text in unused(scene):
         tell(f"Warning: {text}")
     place = Place.of_directory(Path(directory), fresh, ("responses",))
@@ -154,9 +157,9 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
 
     model = surrogates.models_of(kriging)[-1]
     surrogates.write(run, kriging)
-    fronts = run.stage("optimisation", optimisation.optimise, model)
-    ends, between = optimisation.extremes(run, fronts), optimisation.spread(run, fronts)
-    optimisation.write(run, fronts, [*ends, *between], model)
+    found = run.stage("optimisation", optimisation.optimise, model)
+    ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
+    fronts.write(run, found, [*ends, *between], model)
     finalists, remarks = refinement.search(run, [*ends, *between])
 
     designs = [*ends, *(finalists or between)]

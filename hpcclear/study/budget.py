@@ -260,7 +260,7 @@ def verified(
 def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Result) -> Budget:
     """At the loosest tolerance, from the split's on, that is good enough for alpha and beta; the tightest if none is."""
     named = enumerate(zip(table.choices, table.rows, strict=True))
-    ends = {row: k for k, (one, row) in named if one.name in verification.ends_of(one.case)}
+    ends = {row: k for k, (one, row) in named if one.name in run.study.case(one.case).ends}
     rows = list(ends)
     choices = [table.choices[k] for k in ends.values()]
     rtol = made.found.rtol[made.split.rung :]

@@ -13,6 +13,7 @@ from hpcclear.study import (
     surrogates,
     truth,
 )
+from hpcclear.study.goals import ends_in_all
 from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
@@ -43,7 +44,7 @@ def _of_stages(scene: Scene, each: int | None = None) -> dict[str, int]:
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
     count = truth.expected(study.verification) if each is None else each
     if study.verification.infill_rounds:
-        verified += refinement.RUNNERS_UP * len(study.cases)
+        verified += ends_in_all(study)  # runners-up
     begun, rounds = refinement.simulations(study)
     return {
         "wear": lives.simulations(scene),

@@ -11,6 +11,7 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.formula import value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
+from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates
 from hpcclear.statistics.random.replicates import Estimate, student
 
@@ -95,7 +96,16 @@ def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     return np.asarray(ndtr((drawn - goal.limit) / width).mean(axis=1))
 
 
-def names_of(case: Case, unit: str) -> tuple[str, str]:
-    """Both goals of a case in words, by the unit of f."""
-    first, second = (goal.words(unit) for goal in case.goals)
-    return first, second
+def names_of(case: Case, unit: str) -> tuple[str, ...]:
+    """The goals of a case in words, by the unit of f."""
+    return tuple(goal.words(unit) for goal in case.goals)
+
+
+def ends_in_all(study: Study) -> int:
+    """How many ends the fronts of all cases have: one for each thing that a case makes small."""
+    return sum(len(case.goals) for case in study.cases)
+
+
+def most_of(cases: Sequence[Case]) -> int:
+    """How many things a case makes small at most."""
+    return max(len(case.goals) for case in cases)

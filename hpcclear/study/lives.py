@@ -17,11 +17,9 @@ from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import RandomInput
 from hpcclear.statistics.random.replicates import moments, student
+from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
-
-ENDS = ("original", "alpha", "beta")
-"""Designs of a case whose lives are followed."""
 
 NAME = "wear.nc"
 """Where lives are kept, in the directory of the study."""
@@ -62,11 +60,11 @@ def simulations(scene: Scene) -> int:
 
 def simulations_of_designs(scene: Scene) -> int:
     """How many follow the designs; the original's lives are those of the scene."""
-    return 2 * len(scene.required_study.cases) * simulations(scene)
+    return ends_in_all(scene.required_study) * simulations(scene)
 
 
 def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result:
-    """What the original, alpha and beta of each case come to over lives of their own.
+    """What the original and the ends of the front (alpha, beta) of each case come to over lives of their own.
 
     Parameters
     ----------
@@ -82,7 +80,8 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
         designs.
     """
     (run.directory / FOLDER).mkdir(exist_ok=True)
-    ends = [f"{case.name} {end}" for case in run.study.cases for end in ENDS]
+    cases = run.study.cases
+    ends = [name for case in cases for name in (f"{case.name} original", *case.ends)]
     rows = [
         _over_life(run, scene, choice) if choice.name in ends else (np.nan,) * 4
         for choice in designs

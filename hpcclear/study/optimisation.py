@@ -1,7 +1,7 @@
-"""Robust optimisation of each case: fronts of mean and deviation, alpha and beta (eqs. 19 to 23)."""
+"""Robust optimisation of each case: fronts of mean and deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import moocore
@@ -10,7 +10,7 @@ import numpy as np
 from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.results import dataset
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.cases import Case
@@ -27,11 +27,12 @@ from hpcclear.statistics.random.distributions import (
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, separable
+from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.mopso import minimise
-from hpcclear.statistics.search.pareto import cut, hypervolume
+from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study.goals import excess, guessed, names_of
+from hpcclear.study.goals import ends_in_all, excess, guessed
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
 
@@ -77,7 +78,7 @@ class Problem:
         return to_physical(self.scene, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, 2); with constraints, by how much these are broken besides, (n,)."""
+        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
         if self.case.plain:
             return self.objective(designs)
         drawn = self.objective.sampled(designs, self.draws)
@@ -86,7 +87,8 @@ class Problem:
         found = np.column_stack([guessed(goal, drawn, named) for goal in asked])
         if not self.case.kept:
             return found
-        return found[:, :2], np.maximum(excess(self.case.kept, found[:, 2:]), 0.0)
+        count = len(self.case.goals)
+        return found[:, :count], np.maximum(excess(self.case.kept, found[:, count:]), 0.0)
 
     def moments(self, designs: Array) -> Array:
         """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
@@ -205,7 +207,7 @@ def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + 2): design coordinates, and what the case makes
+        For case number k ``front_k`` (runs, solutions, d + goals): design coordinates, and what the case makes
         small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
@@ -218,19 +220,33 @@ def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
             gains.append(front.gain)
         size = max(len(front) for front in fronts)
         padded = np.full((len(fronts), size, fronts[0].shape[1]), np.nan)
-        for k, front in enumerate(fronts):
-            padded[k, : len(front)] = front
-        values = padded[..., -2:]
+        for k, solutions in enumerate(fronts):
+            padded[k, : len(solutions)] = solutions
+        count = len(case.goals)
+        values = padded[..., -count:]
         reference = np.nanmax(values, axis=(0, 1)) * 1.1
         result[f"front_{index}"] = padded
         result[f"gain_{index}"] = np.array(gains)
         result[f"hypervolume_{index}"] = np.array(
-            [hypervolume(front[:, -2:], reference) for front in fronts]
+            [hypervolume(solutions[:, -count:], reference) for solutions in fronts]
         )
     return result
 
 
-def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def check(scene: Scene) -> None:
+    """That the search a study asks for can be had, before anything is simulated.
+
+    Raises
+    ------
+    InputError
+        Its package is not installed.
+    """
+    asked = scene.required_study.swarm.algorithm
+    if asked is not None:
+        foreign.check(asked.removeprefix("pymoo:"))
+
+
+def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
     def function(coordinates: Array) -> Array | tuple[Array, Array]:
         run.ranks.raise_if_stopped()
         return problem.searched(problem.physical(coordinates))
@@ -240,23 +256,36 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator):  # type:
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 
-    front = _minimised(run, problem, function, rng)
+    front = _minimised(run, problem, function, len(problem.case.goals), rng)
     if len(front.values):
         return front
-    near = _minimised(run, problem, nearest, rng)
+    near = _minimised(run, problem, nearest, 2, rng)
     return replace(near, values=np.asarray(function(near.points)[0]))
 
 
-def _minimised(  # type: ignore[no-untyped-def]
+def _minimised(
     run: StudyRun,
     problem: Problem,
     function: Callable[[Array], Array | tuple[Array, Array]],
+    objectives: int,
     rng: np.random.Generator,
-):
+) -> Front:
     settings = run.study.swarm
+    bounds = np.column_stack([problem.region.lower, problem.region.upper])
+    if settings.algorithm is not None:
+        return foreign.minimise(
+            settings.algorithm.removeprefix("pymoo:"),
+            function,
+            bounds,
+            objectives,
+            iterations=settings.iterations,
+            particles=settings.particles,
+            rng=rng,
+            size=settings.archive,
+        )
     return minimise(
         function,
-        np.column_stack([problem.region.lower, problem.region.upper]),
+        bounds,
         iterations=settings.iterations,
         rng=rng,
         size=settings.archive,
@@ -293,17 +322,13 @@ class Choice:
     origin: str = "search"
 
 
-_ENDS = ((-2, "alpha"), (-1, "beta"))
-"""Column of the objective that an end of the front has the least of, and its name."""
-
-
 def chosen_in_all(study: Study) -> tuple[int, int]:
     """How many designs `extremes` chooses, and `spread` at most."""
-    return 2 * len(_ENDS) * len(study.cases), study.verification.designs * len(study.cases)
+    return 2 * ends_in_all(study), study.verification.designs * len(study.cases)
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Designs with the least of either that a case makes small, by the surrogate: of least mean and of least deviation.
+    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of least deviation.
 
     Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
     average keeps the bounds; and the best single ones.
@@ -311,10 +336,11 @@ def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
     chosen = []
     for index, case in enumerate(run.study.cases):
         padded = fronts[f"front_{index}"]
-        for column, letter in _ENDS:
+        count = len(case.goals)
+        for column, letter in enumerate(ENDS[:count], start=-count):
             best = np.nanargmin(padded[..., column], axis=1)
             own = padded[np.arange(len(padded)), best]
-            average = own[:, :-2].mean(axis=0)
+            average = own[:, :-count].mean(axis=0)
             chosen.append(
                 Choice(
                     f"{case.name} averaged {letter}", case.name, _design(run, case.name, average)
@@ -322,25 +348,27 @@ def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
             )
             winner = int(own[:, column].argmin())
             place = winner, int(best[winner])
-            design = _design(run, case.name, own[winner, :-2])
+            design = _design(run, case.name, own[winner, :-count])
             chosen.append(Choice(f"{case.name} best {letter}", case.name, design, place))
     return chosen
 
 
 def spread(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Points spread along the joint front of each case's runs, without its two ends."""
+    """Points spread over the joint front of each case's runs, without its ends."""
     chosen = []
     for index, case in enumerate(run.study.cases):
-        padded = fronts[f"front_{index}"]
+        padded, count = fronts[f"front_{index}"], len(case.goals)
         places = np.argwhere(np.isfinite(padded[..., -1]))
         points = padded[places[:, 0], places[:, 1]]
-        kept = moocore.is_nondominated(points[:, -2:])  # of equal ones the first
+        kept = moocore.is_nondominated(points[:, -count:])  # of equal ones the first
         points, places = points[kept], places[kept]
-        points_wanted = cut(points[:, -2:], run.study.verification.designs + 2)
-        inner = points_wanted[np.argsort(points[points_wanted, -2], kind="stable")][1:-1]
-        for row in inner:
+        values = points[:, -count:]
+        ends = np.unique(values.argmin(axis=0))  # one may have the least of several
+        wanted = cut(values, run.study.verification.designs + len(ends))
+        inner = wanted[~np.isin(wanted, ends)]
+        for row in inner[np.argsort(values[inner, 0], kind="stable")]:
             number_of_run, solution = (int(index) for index in places[row])
-            design = _design(run, case.name, points[row, :-2])
+            design = _design(run, case.name, points[row, :-count])
             chosen.append(Choice("", case.name, design, (number_of_run, solution)))
     return chosen
 
@@ -349,52 +377,3 @@ def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
     names = run.study.design_variables(case)
     values = to_physical(run.scene, names, coordinates[None])[0]
     return dict(zip(names, values.tolist(), strict=True))
-
-
-def write(
-    run: StudyRun, fronts: Result, verified: Sequence[Choice], model: PiecewiseKriging
-) -> None:
-    """Write front.nc: every run's front of every case, and which solutions were simulated."""
-    cases = [case.name for case in run.study.cases]
-    names = run.study.optimisation
-    solutions = max(fronts[f"front_{k}"].shape[1] for k in range(len(cases)))
-    shape = (len(cases), run.study.swarm.runs, solutions)
-    used = [n for n in names if any(n in run.study.design_variables(case) for case in cases)]
-    data: dict[str, np.ndarray] = {
-        name: np.full(shape, np.nan) for name in ("mean", "deviation", *used)
-    }
-    data["verified"] = np.zeros(shape, np.int8)
-    plain = np.array([case.plain for case in run.study.cases])
-    area = np.array([fronts[f"hypervolume_{k}"] for k in range(len(cases))])
-    data["hypervolume"] = np.where(plain[:, None], area, np.nan)  # else it has another unit
-    if not plain.all():
-        unit = run.scene.objective.unit
-        data["searched"] = np.array([", ".join(names_of(case, unit)) for case in run.study.cases])
-        data |= {name: np.full(shape, np.nan) for name in ("searched_first", "searched_second")}
-    for k, case in enumerate(cases):
-        padded = fronts[f"front_{k}"]
-        place = np.s_[k, :, : padded.shape[1]]
-        data["mean"][place], data["deviation"][place] = padded[..., -2], padded[..., -1]
-        own = run.study.design_variables(case)
-        flat = to_physical(run.scene, own, padded[..., :-2].reshape(-1, len(own)))
-        if "searched" in data:
-            data["searched_first"][place], data["searched_second"][place] = (
-                padded[..., -2],
-                padded[..., -1],
-            )
-        if not run.study.case(case).plain:
-            found = problem_of(run.scene, case, model).moments(flat).reshape(*padded.shape[:2], 2)
-            data["mean"][place], data["deviation"][place] = found[..., 0], found[..., 1]
-        for column, name in enumerate(own):
-            data[name][place] = flat[:, column].reshape(padded.shape[:2])
-    for choice in verified:
-        if choice.place is not None:
-            data["verified"][(cases.index(choice.case), *choice.place)] = 1
-    coords = {
-        "case": np.array(cases),
-        "run": np.arange(shape[1]),
-        "solution": np.arange(solutions),
-    }
-    units = {name: run.study.variable(name).unit or "1" for name in used}
-    content = dataset.dataset("front", coords, data, None, units, run.scene.objective, run.words)
-    run.write(content, "front.nc")

@@ -14,6 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import SCRAMBLINGS
@@ -21,7 +22,7 @@ from hpcclear.scene.study import Study
 from hpcclear.statistics.search.infill import proposals
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.study import truth
-from hpcclear.study.goals import excess, wanted
+from hpcclear.study.goals import excess, most_of, wanted
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
 
@@ -30,9 +31,6 @@ RAYS = 6
 
 PATIENCE = 3
 """Rounds in a row that win nothing, after which a front stands."""
-
-RUNNERS_UP = 2
-"""Designs verified beside those of the front, since its ends are chosen among designs that are nearly as good."""
 
 
 @dataclass
@@ -45,7 +43,7 @@ class Tried:
         Design variables.
     coordinates : array, shape (n, d)
         Sampling coordinates.
-    values : array, shape (n, 2)
+    values : array, shape (n, goals)
         What its case makes small: mean and deviation, if nothing else is asked for.
     excess : array, shape (n,)
         By how much its constraints are broken (`hpcclear.study.goals.excess`).
@@ -177,23 +175,30 @@ def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
 def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
     """Cases, designs (NaN where a variable is none of the case's), what they make small, by how much they break constraints."""
     names = run.study.optimisation
+    most = most_of(run.study.cases)
     if not choices:
         nothing = np.empty((0, len(names)))
-        none = {"values": np.empty((0, 2)), "excess": np.empty(0)}
+        none = {"values": np.empty((0, most)), "excess": np.empty(0)}
         return {"case": np.array([], "U1"), "design": nothing, **none}
     count = length(run.study)
     found = truth.sequences(run, choices, stage, "search", count, count * SCRAMBLINGS)
     return {
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
-        "values": found["goal"][:, :2],
+        "values": found["goal"][:, :most],
         "excess": np.array(
             [
-                excess(kept := run.study.case(c.case).kept, row[None, 2 : 2 + len(kept)])[0]
+                _broken(run.study.case(c.case), row)
                 for c, row in zip(choices, found["goal"], strict=True)
             ]
         ),
     }
+
+
+def _broken(case: Case, goals: Array) -> float:
+    """By how much a design breaks the constraints of its case, which stand behind what it makes small."""
+    first = len(case.goals)
+    return float(excess(case.kept, goals[None, first : first + len(case.kept)])[0])
 
 
 def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tried:
@@ -204,7 +209,8 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
     coordinates = to_coordinates(run.scene, names, found["design"][rows][:, columns])
     region = box(run.scene, names)
     coordinates = np.clip(coordinates, region.lower, region.upper)  # round-off at the border
-    values, broken = found["values"][rows], found["excess"][rows]
+    values = found["values"][rows, : len(run.study.case(case).goals)]
+    broken = found["excess"][rows]
     if before is None:
         return Tried(names, coordinates, values, broken)
     return Tried(
@@ -241,16 +247,20 @@ def _won(run: StudyRun, name: str, before: Tried, now: Tried) -> str:
 
 
 def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
-    """What each new design wins over each old one, (old, new, 2): relative, or as it is."""
+    """What each new design wins over each old one, (old, new, goals): relative, or as it is."""
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.sign(old[:, None]) * (1.0 - new / old[:, None])
     return np.asarray(np.where(relative, shares, old[:, None] - new))
 
 
 def _finalists(run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice]) -> list[Choice]:
-    """The best designs of a case, well spread, for verification on scatter of its own; those of `verified` have it anyway."""
+    """The best designs of a case, well spread, for verification on scatter of its own; those of `verified` have it anyway.
+
+    Beside those of the front one for each end, since ends are chosen among designs that are nearly as good.
+    """
     best = tried.best()
-    kept = best[cut(tried.values[best], run.study.verification.designs + RUNNERS_UP)]
+    most = run.study.verification.designs + len(run.study.case(case).goals)
+    kept = best[cut(tried.values[best], most)]
     own = [list(choice.design.values()) for choice in verified if choice.case == case]
     return [
         choice

@@ -13,6 +13,7 @@ from hpcclear.ensemble.single import responses_of
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
 from hpcclear.scene.study import Study
+from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -24,16 +25,16 @@ STATISTICS = ("mean", "fluctuation", "peak")
 
 
 def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
-    """Names and designs whose responses are compared: the original, alpha and beta of each case."""
+    """Names and designs whose responses are compared: the original, alpha, beta (and further ends) of each case."""
     known = {choice.name: choice for choice in designs}
-    cases = [case.name for case in run.study.cases]
-    names = [f"{case} {letter}" for case in cases for letter in ("alpha", "beta")]
-    return [("original", known[f"{cases[0]} original"]), *((name, known[name]) for name in names)]
+    cases = run.study.cases
+    original = known[f"{cases[0].name} original"]
+    return [("original", original), *((name, known[name]) for case in cases for name in case.ends)]
 
 
 def simulations(study: Study) -> int:
     """Single responses: each and its copies are simulated for their statistics, and it for its file."""
-    return (study.verification.response_copies + 1) * (1 + 2 * len(study.cases))
+    return (study.verification.response_copies + 1) * (1 + ends_in_all(study))
 
 
 def scene_of(run: StudyRun, choice: Choice, revolutions: int) -> Scene:

@@ -175,7 +175,7 @@ def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
 def _told(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
     """All that is told of designs from their objectives."""
     settings = run.study.verification
-    most = max(2 + len(case.kept) for case in run.study.cases)
+    most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
     for choice, (values, beyond) in zip(choices, made, strict=True):
         row: dict[str, object] = {

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.objectives import ORDINALS
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
-from hpcclear.study.goals import excess
+from hpcclear.study.goals import excess, most_of, names_of
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
 
@@ -44,9 +45,9 @@ def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging)
 def missed(
     run: StudyRun, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
 ) -> list[str]:
-    """Where the surrogate of f is further from the truth than the study allows at alpha and beta, in words."""
+    """Where the surrogate of f is further from the truth than the study allows at the ends of fronts, in words."""
     settings, texts = run.study.verification, []
-    rows = [k for k, choice in enumerate(choices) if choice.name in ends_of(choice.case)]
+    rows = [k for k, one in enumerate(choices) if one.name in run.study.case(one.case).ends]
     surrogate = predicted(run, [choices[k] for k in rows], model)
     for k, guess in zip(rows, surrogate, strict=True):
         errors = guess / [true["mean"][k], true["deviation"][k]] - 1.0
@@ -59,11 +60,6 @@ def missed(
     return texts
 
 
-def ends_of(case: str) -> tuple[str, str]:
-    """Names of the designs that a case is about."""
-    return f"{case} alpha", f"{case} beta"
-
-
 @dataclass(frozen=True)
 class Table:
     """Verified designs under their names.
@@ -71,14 +67,14 @@ class Table:
     Attributes
     ----------
     choices : list of Choice
-        Alpha, beta and the front of each case, then all others that were verified. An end of the swarm that is
-        also alpha or beta stands there twice.
+        Alpha, beta (and further ends) and the front of each case, then all others that were verified. An end of the swarm
+        that is also alpha or beta stands there twice.
     rows : list of int
         Number of each in what was simulated.
     same_as : list of str
         The first design before it that it cannot be told apart from; empty if there is none.
     dominated : list of bool
-        Whether another design of its case is surely better in both that the case makes small.
+        Whether another design of its case is surely better in all that the case makes small.
     """
 
     choices: list[Choice]
@@ -91,45 +87,46 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     """Verified designs under the names that they have earned.
 
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
-    nothing else is asked for; of those that cannot be told from it at the study's
-    confidence, the best in the other. Each design of the front is surely better than each
-    other in one of the two. Designs that break a constraint are none of these, unless all do.
+    nothing else is asked for; gamma, delta and epsilon of further ones. Of those that cannot be told from it at the
+    study's confidence it is the best in the others. Each design of the front is surely better than each
+    other in one of them. Designs that break a constraint are none of these, unless all do.
     """
     table = Table([], [], [], [])
     for case in run.study.cases:
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
-        _name_case(run, case.name, rows, choices, true, table)
+        _name_case(run, case, rows, choices, true, table)
     return table
 
 
 def _name_case(
     run: StudyRun,
-    case: str,
+    case: Case,
     rows: Sequence[int],
     choices: Sequence[Choice],
     true: Result,
     table: Table,
 ) -> None:
-    values = true["goal"][rows, :2]
-    shifts = np.moveaxis(true["goal_shifts"][rows, :2], 1, 0)
+    count, kept = len(case.goals), case.kept
+    values = true["goal"][rows, :count]
+    shifts = np.moveaxis(true["goal_shifts"][rows, :count], 1, 0)
     everything = Compared(values, shifts, run.study.verification.confidence)
-    kept = run.study.case(case).kept
-    keeps = excess(kept, true["goal"][rows, 2 : 2 + len(kept)]) <= 0.0
+    keeps = excess(kept, true["goal"][rows, count : count + len(kept)]) <= 0.0
     ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
     ours = [k for k in ours if keeps[k]] or ours
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
-    ends = [ours[mine.best(0)], ours[mine.best(1)]] if mine.known.any() else ours[:1] * 2
-    front = mine.front(run.study.verification.designs + 2) if mine.known.any() else []
+    known = mine.known.any()
+    ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count
+    front = mine.front(run.study.verification.designs + count) if known else []
     inner = sorted(
         (ours[k] for k in front if ours[k] not in ends), key=lambda k: float(values[k, 0])
     )
-    named = [*zip(ends, ends_of(case), strict=True)]
-    named += [(k, f"{case} front {number + 1}") for number, k in enumerate(inner)]
+    named = [*zip(ends, case.ends, strict=True)]
+    named += [(k, f"{case.name} front {number + 1}") for number, k in enumerate(inner)]
     taken = {k for k, _ in named}
     left = [k for k in range(len(rows)) if k not in taken or choices[rows[k]].name]
     unnamed = [k for k in left if not choices[rows[k]].name]
     named += [
-        (k, choices[rows[k]].name or f"{case} candidate {unnamed.index(k) + 1}") for k in left
+        (k, choices[rows[k]].name or f"{case.name} candidate {unnamed.index(k) + 1}") for k in left
     ]
     seen: list[tuple[int, str]] = []
     for k, name in named:
@@ -154,36 +151,35 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
     return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
 
 
-_ORDINALS = ("first", "second")
-
-
 def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
     """What cases make small and keep, with limits, in words and numbers; empty where all ask for mean and deviation."""
     if all(case.plain for case in run.study.cases):
         return {}
     unit, data = run.scene.objective.unit, {}
     cases = [run.study.case(choice.case) for choice in table.choices]
-    for column, name in enumerate(_ORDINALS):
-        data[f"{name}_goal"] = np.array([case.goals[column].words(unit) for case in cases])
-        data[f"{name}_unit"] = np.array([case.goals[column].unit(unit) for case in cases])
-        data[f"{name}_true"] = true["goal"][:, column]
-        data[f"{name}_lower"] = true["goal_lower"][:, column]
-        data[f"{name}_upper"] = true["goal_upper"][:, column]
+    for column, name in enumerate(ORDINALS[: most_of(run.study.cases)]):
+        asked = [case.goals[column] if column < len(case.goals) else None for case in cases]
+        there = np.array([goal is not None for goal in asked])
+        data[f"{name}_goal"] = np.array([goal.words(unit) if goal else "" for goal in asked])
+        data[f"{name}_unit"] = np.array([goal.unit(unit) if goal else "" for goal in asked])
+        for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
+            values = true[f"goal{end}"][:, column]
+            data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
+    table_of_limits = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
     data["constraints"] = np.array(
-        [_kept(case, unit, *rows) for case, rows in zip(cases, _limits(true), strict=True)]
+        [_kept(case, unit, *rows) for case, *rows in zip(cases, *table_of_limits, strict=True)]
     )
     return data
 
 
-def _limits(true: Result) -> list[tuple[Array, Array, Array]]:
-    """Values and limits of constraints, a tuple a design."""
-    return list(zip(*(true[f"goal{end}"][:, 2:] for end in ("", "_lower", "_upper")), strict=True))
+def _kept(case: Case, unit: str, *told: Array) -> str:
+    """How a design stands to its constraints: "share with f above 0.0003 m 0.012 at most 0.05: kept".
 
-
-def _kept(case: Case, unit: str, values: Array, lower: Array, upper: Array) -> str:
-    """How a design stands to its constraints: "share with f above 0.0003 m 0.012 at most 0.05: kept"."""
+    `told`: values, lower and upper limits of what its case makes small and, behind these, of its constraints.
+    """
     texts = []
-    for goal, value, low, high in zip(case.kept, values, lower, upper, strict=False):
+    rows = (one[len(case.goals) :] for one in told)
+    for goal, value, low, high in zip(case.kept, *rows, strict=False):
         surely = "kept" if high <= goal.most else "broken" if low > goal.most else "cannot be told"
         texts.append(f"{goal.words(unit)} {value:.4g} at most {goal.most:g}: {surely}")
     return "; ".join(texts)
@@ -254,10 +250,11 @@ def write(
         "verification", coords, data, None, units, run.scene.objective, run.words
     )
     if "first_goal" in content:
-        both = f"{content['first_goal'].item(0)} and {content['second_goal'].item(0)}"
-        both = "what its case makes small" if len(study.cases) > 1 else both
+        *others, last = names_of(study.cases[0], run.scene.objective.unit)
+        asked = f"{', '.join(others)} and {last}"
+        asked = "what its case makes small" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
-            words = content[name].attrs["long_name"].replace("mean and deviation", both)
+            words = content[name].attrs["long_name"].replace("mean and deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"

@@ -1,5 +1,7 @@
 """Figures of the optimised designs: fronts, and responses side by side."""
 
+import itertools
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -7,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
 
 if TYPE_CHECKING:
@@ -17,8 +20,8 @@ if TYPE_CHECKING:
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
     """Pareto fronts of all cases, and the designs that were simulated directly (the paper's Fig. 9).
 
-    Axes are what each case makes small: mean and deviation, if it asks for nothing else.
-    Left the fronts alone, right with the original and the paper's designs, which lie far off.
+    Axes are what each case makes small: mean and deviation, if it asks for nothing else; of more than two things each two
+    have panels of their own. Left the fronts alone, right with the original and the paper's designs, which lie far off.
 
     Parameters
     ----------
@@ -28,20 +31,23 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
         Kind ``verification``: its designs are drawn with confidence limits, joined to what the surrogate said.
     """
     cases = [str(case) for case in front["case"].to_numpy()]
-    goals = [_goals(front.sel(case=case)) for case in cases]
-    alike = all(one[0].label == goals[0][0].label for one in goals)
+    asked = {case: _goals(front.sel(case=case)) for case in cases}
+    pairs = [(case, x, y) for case in cases for x, y in itertools.combinations(asked[case], 2)]
+    alike = all(x.label == pairs[0][1].label for _, x, _ in pairs)
     columns = 1 if verification is None else 2
     options = {"sharex": "col"} if alike else {}
-    figure, axes = style.grid(len(cases), columns, 24.0 + 54.0 * len(cases), **options)
-    for line, case, (x, y) in zip(axes, cases, goals, strict=True):
+    figure, axes = style.grid(len(pairs), columns, 24.0 + 54.0 * len(pairs), **options)
+    for number, (line, (case, x, y)) in enumerate(zip(axes, pairs, strict=True)):
         for column, panel in enumerate(line):
             _runs(panel, front.sel(case=case), x, y)
             if verification is not None:
                 _verified(panel, verification, case, x, y, all_designs=column == 1)
+                if column == 0:
+                    _ends(panel, verification, case, x, y, len(asked[case]))
         line[0].set_title(f"case: {labels.literal(case)}")
         line[0].set_ylabel(y.label)
         line[-1].set_ylabel(y.label)
-        for panel in line if case == cases[-1] or not alike else ():
+        for panel in line if number == len(pairs) - 1 or not alike else ():
             panel.set_xlabel(x.label)
     handles, words = axes[0, -1].get_legend_handles_labels()
     once = dict(zip(words, handles, strict=True))
@@ -50,8 +56,11 @@ def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "
     return figure
 
 
+NEAREST = 1e-3
+"""Relative length of an axis at least, where more than two things are made small: the least of one may be had with all."""
+
 NARROW = 20
-"""Letters in a line of a label below a panel."""
+"""Letters in a line of a label; longer formulas have two or three lines, and end there."""
 
 
 class _Goal(NamedTuple):
@@ -63,16 +72,20 @@ class _Goal(NamedTuple):
     scale: labels.Scale
 
 
+_GREEK = "αβγδε"
+_SIDES = ((4, 3), (4, -9), (12, 3), (12, -9), (20, 3))
+"""Where letters stand right of their marks, points; of three and more, left of marks in the right half of a panel."""
+
 _MOMENTS = ("mean of f", "deviation of f")
 _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"deviation $\sigma_f$"))
 
 
-def _goals(one: xr.Dataset) -> tuple[_Goal, _Goal]:
+def _goals(one: xr.Dataset) -> list[_Goal]:
     """What a case makes small, from its part of the fronts."""
     asked = str(one["searched"].item()).split(", ") if "searched" in one else []
-    if len(asked) != 2 or tuple(asked) == _MOMENTS:
-        return _moment(one, *_LETTERS[0]), _moment(one, *_LETTERS[1])
-    return _asked(one, asked[0], "first"), _asked(one, asked[1], "second")
+    if len(asked) < 2 or tuple(asked) == _MOMENTS:
+        return [_moment(one, *row) for row in _LETTERS]
+    return [_asked(one, words, name) for words, name in zip(asked, ORDINALS, strict=False)]
 
 
 def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
@@ -81,13 +94,15 @@ def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
 
 
 def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
-    """One of two, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
+    """One of them, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
     values = one[f"searched_{name}"]
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
     share = words.startswith("share ")
+    if len(words) > 2 * NARROW:
+        words = f"{words[: 2 * NARROW - 6].rstrip()} …"
     label = unit.label(words) if of_f or share else f"{words} (SI)"
-    label = textwrap.fill(labels.literal(label), NARROW, break_long_words=False)
+    label = textwrap.fill(labels.literal(label), NARROW)
     return _Goal(label, f"searched_{name}", name, unit)
 
 
@@ -110,13 +125,13 @@ def _verified(
     all_designs: bool,
 ) -> None:
     """True values of the designs of a case, ours or all, each joined to the surrogate's, of mean and deviation."""
-    names = [str(name) for name in verification["design"].to_numpy()]
+    count = verification.sizes["design"]
     cases = (
         [str(c) for c in verification["case"].to_numpy()]
         if "case" in verification
-        else [case] * len(names)
+        else [case] * count
     )
-    for k, name in enumerate(names):
+    for k in range(count):
         if cases[k] != case:
             continue
         one = verification.isel(design=k)
@@ -147,10 +162,30 @@ def _verified(
                 float(one[f"{goal.verified}_surrogate"]) * goal.scale.factor for goal in (x, y)
             ]
             panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
-        greek = {f"{case} alpha": "α", f"{case} beta": "β"}.get(name)
-        if greek is not None and not all_designs:
-            options = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": style.SMALL}
-            panel.annotate(greek, at, **options)
+
+
+def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, count: int) -> None:
+    """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
+    from matplotlib.patheffects import withStroke
+
+    names = [str(name) for name in verification["design"].to_numpy()]
+    sides = _SIDES if count > 2 else _SIDES[:1] * count
+    if count > 2:
+        panel.margins(0.15)  # room for letters beside marks at the border
+        for ends, widen in ((panel.get_xlim(), panel.set_xlim), (panel.get_ylim(), panel.set_ylim)):
+            least = NEAREST * max(map(abs, ends))
+            if ends[1] - ends[0] < least:  # all have the same but for round-off
+                widen(np.mean(ends) - 0.5 * least, np.mean(ends) + 0.5 * least)
+    for end, letter, side in zip(ENDS, _GREEK, sides, strict=False):
+        if f"{case} {end}" in names:
+            one = verification.isel(design=names.index(f"{case} {end}"))
+            at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
+            if count > 2 and at[0] > np.mean(panel.get_xlim()):
+                side = -side[0] - 5, side[1]
+            options = {"xytext": side, "textcoords": "offset points", "fontsize": style.SMALL}
+            drawn = panel.annotate(letter, at, **options)
+            if count > 2:
+                drawn.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
 
 def _mark(one: xr.Dataset) -> tuple[str, str]:
@@ -172,13 +207,13 @@ def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None
 
 @style.drawn
 def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2) -> "Figure":
-    """Responses of optimised designs beside the original's, α left and β right (the paper's Fig. 10).
+    """Responses of optimised designs beside the original's, α left and β right (the paper's Fig. 10), further ends behind them.
 
     Parameters
     ----------
     responses : mapping of str to xarray.Dataset
-        Kind ``response``, by the name of the design: names with ``alpha`` go left, with ``beta`` right, others are
-        drawn in both as what to compare with.
+        Kind ``response``, by the name of the design: names with ``alpha`` go left, with ``beta`` right, names without an
+        end are drawn in all columns as what to compare with.
     revolutions : int
         The last ones are drawn.
 
@@ -193,7 +228,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
     height = 24.0 + 33.0 * len(quantities)
     figure, axes = style.grid(len(quantities), len(columns), height, sharex=True, sharey="row")
     shown = {name: motion.latest(response, revolutions) for name, response in responses.items()}
-    order = sorted(responses, key=lambda name: ("alpha" in name or "beta" in name, name))
+    order = sorted(responses, key=lambda name: (end_of(name) != "", name))
     kinds = list(dict.fromkeys(_kind(name) for name in order))
     for line, (name, joint, words) in zip(axes, quantities, strict=True):
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
@@ -229,16 +264,22 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
 
 def _columns(names: Sequence[str]) -> dict[str, list[str]]:
     """Which designs each column of the comparison shows, by its title."""
-    base = [name for name in names if "alpha" not in name and "beta" not in name]
+    base = [name for name in names if not end_of(name)]
     found = {}
-    for word, title in (("alpha", "solution α"), ("beta", "solution β")):
-        members = [name for name in names if word in name]
+    for word, letter in zip(ENDS, _GREEK, strict=True):
+        members = [name for name in names if end_of(name) == word]
         if members:
-            found[title] = base + members
+            found[f"solution {letter}"] = base + members
     return found or {"": base}
 
 
 def _kind(name: str) -> str:
-    """A design's name without α or β: what has the same colour in both columns."""
-    bare = name.replace("alpha", "").replace("beta", "").strip(" _-.,")
-    return bare or name
+    """A design's name without α or β: what has the same colour in all columns."""
+    before, _, behind = name.rpartition(end_of(name)) if end_of(name) else ("", "", name)
+    return f"{before}{behind}".strip(" _-.,") or name
+
+
+def end_of(name: str) -> str:
+    """Which end of a front a design is by its name: "alpha", "beta" and so on; "" for none."""
+    words = re.split(r"[\s_.,-]+", name)
+    return next((word for word in reversed(words) if word in ENDS), "")

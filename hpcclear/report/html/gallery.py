@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import ENDS
 from hpcclear.report.figures import (
     accuracy,
     designs,
@@ -119,8 +120,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     for name, draw in accuracy.FIGURES.items() if costs is not None else ():
         yield from _of_file(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
     found = content.responses
-    if len(found) > 1:
-        yield "responses of the designs", lambda: _comparison(found)
+    for first in range(0, len(ENDS), 2):  # two columns a picture
+        pair = ENDS[first : first + 2]
+        shown = {name: r for name, r in found.items() if designs.end_of(name) in ("", *pair)}
+        asked = first == 0 or any(designs.end_of(name) for name in shown)
+        if asked and len(shown) > 1:
+            yield "responses of the designs", functools.partial(_comparison, shown)
     if found:
         name = "original" if "original" in found else next(iter(found))
         if len(found) == 1:

@@ -137,15 +137,36 @@
     if (!place || !content.front.points.length) return;
     const view = byId("front-view");
     const far = (p) => p.kind === "printed" || p.kind === "original";
-    const near = content.front.points.filter((p) => !far(p));
+    const known = (p) => Number.isFinite(p.x) && Number.isFinite(p.y);
+    const shown = () => content.front.points.filter((p) => known(p) && (view.value === "all" || !far(p)));
+    const redraw = () => build(place, shown());
     legend(byId("front-legend"));
-    view.addEventListener("change", () => build(place, view.value === "all" ? content.front.points : near));
-    if (!near.length) view.value = "all";
-    build(place, near.length ? near : content.front.points);
+    view.addEventListener("change", redraw);
+    if (!shown().length) view.value = "all";
+    directions(view.closest(".controls"), redraw);
+    redraw();
+  }
+
+  /* of more than two things that are made small, any two may be looked at */
+  function directions(controls, redraw) {
+    const { axes, points } = content.front;
+    if (!axes) return;
+    for (const [at, key, words] of [[0, "x", "across"], [1, "y", "up"]]) {
+      const select = put(put(controls, "label", words), "select");
+      axes.forEach((axis, k) => put(select, "option", axis, { value: k }));
+      select.value = at;
+      select.addEventListener("change", () => {
+        content.front[key] = axes[select.value];
+        for (const p of points) p[key] = p.at[select.value];
+        points.sort((a, b) => a.x - b.x || a.y - b.y);
+        redraw();
+      });
+    }
   }
 
   function build(place, points) {
     place.replaceChildren();
+    if (!points.length) return;
     const panel = byId("front-panel");
     /* as wide as there is room for, so that type keeps its size on a phone */
     const width = Math.max(300, Math.min(640, place.clientWidth)), height = Math.max(320, 0.72 * width);

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.objectives import ORDINALS
+from hpcclear.report.answer import goals_of
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
@@ -14,6 +16,7 @@ _LEGEND = {
     "original": "original design",
     "printed": "the paper’s design",
 }
+_USUAL = ("mean of f", "deviation of f")
 FRAMES = 180  # of a revolution
 
 
@@ -47,14 +50,57 @@ def front(content: Content) -> dict[str, Any]:
             float(f"{point[k] * a.factor:.6g}") for k, a in zip("xy", axes, strict=True)
         )
     points.sort(key=lambda point: (point["x"], point["y"]))
+    further = _further(points)
+    x, y = axes[0].label("mean of f"), axes[1].label("deviation of f")
     return {
-        "x": axes[0].label("mean of f"),
-        "y": axes[1].label("deviation of f"),
+        "x": x,
+        "y": y,
+        **({"axes": [x, y, *further]} if further else {}),
         "cases": sorted({point["case"] for point in points}),
         "points": points,
         "legend": {
             kind: text for kind, text in _LEGEND.items() if kind in {p["kind"] for p in points}
         },
+    }
+
+
+def _further(points: list[dict[str, Any]]) -> list[str]:
+    """Labels of what cases make small besides, where one makes more than two things small; then points know where they are
+    along each as ``at``, None where their case does not ask for it."""
+    asked = [point.pop("goals") for point in points]
+    if max(map(len, asked)) < 3:
+        return []
+    units = {words: unit for own in asked for words, (unit, _) in own.items()}
+    names = [words for words in units if words not in _USUAL]
+    scales = {
+        words: labels.scale(units[words], [own[words][1] for own in asked if words in own])
+        for words in names
+    }
+    for point, own in zip(points, asked, strict=True):
+        found = [own[w][1] * scales[w].factor if w in own else np.nan for w in names]
+        known = [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
+        point["at"] = [point["x"], point["y"], *known]
+    return [scales[w].label(w) if scales[w].unit != "–" else w for w in names]
+
+
+def _searched(one: xr.Dataset) -> dict[str, tuple[str, float]]:
+    """What the case of a solution makes small, by the surrogate: unit and value by its words."""
+    words = str(one["searched"].item()).split(", ") if "searched" in one else []
+    of_f = str(one["mean"].attrs["units"])
+    return {
+        text: (of_f if text.endswith(" of f") else "1", float(one[f"searched_{name}"]))
+        for text, name in zip(words, ORDINALS, strict=False)
+    }
+
+
+def _verified(one: xr.Dataset) -> dict[str, tuple[str, float]]:
+    """The same of a design, by direct simulation."""
+    return {
+        str(one[f"{name}_goal"].item()): (
+            str(one[f"{name}_unit"].item()) or "1",
+            float(one[f"{name}_true"]),
+        )
+        for name in goals_of(one)
     }
 
 
@@ -78,6 +124,7 @@ def _solutions(fronts: xr.Dataset, verified: xr.Dataset | None) -> list[dict[str
                 "surrogate": _moments(one, "mean", "deviation"),
                 "direct": [] if direct is None else _direct(direct),
                 "response": "",
+                "goals": _searched(one),
             }
         )
     return found
@@ -115,6 +162,7 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
         "surrogate": surrogate,
         "direct": _direct(one),
         "response": "original" if is_original else name,
+        "goals": _verified(one),
     }
 
 
@@ -144,6 +192,13 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
             low, high = (float(one[f"{word}_{end}"]) for end in ("lower", "upper"))
             shown += f" ({labels.between(low, high, units)})"
         rows.append([word, shown])
+    asked = goals_of(one)
+    for name in asked if len(asked) > 2 else ():
+        words, unit = (str(one[f"{name}_{what}"].item()) for what in ("goal", "unit"))
+        low, high = (float(one[f"{name}_{end}"]) for end in ("lower", "upper"))
+        if words not in _USUAL:
+            known = f" ({labels.between(low, high, unit)})" if low < high else ""
+            rows.append([words, f"{quantity(float(one[f'{name}_true']), unit)}{known}"])
     for word in ("mean", "deviation"):
         if f"{word}_error" in one and np.isfinite(float(one[f"{word}_error"])):
             rows.append([f"surrogate's error of the {word}", f"{float(one[f'{word}_error']):+.2%}"])

@@ -1,10 +1,11 @@
 """Sections of the page on designs, findings and trust, made from what there is; None where nothing is."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.answer import is_plain
 from hpcclear.report.figures import effects, labels
@@ -201,7 +202,9 @@ def designs(content: Content) -> dict[str, object] | None:
     return {
         "words": words,
         "names": [
-            (name, text) for name, text in _MEANINGS if any(_is_called(one, name) for one in names)
+            (name, text)
+            for name, text in _meanings(names)
+            if any(_is_called(one, name) for one in names)
         ],
         "remarks": "" if remarks == "none" else remarks,
         "table": _designs_table(verified.isel(design=main), caption),
@@ -226,25 +229,34 @@ _MEANINGS = (
 """Kinds of designs, by a word of their names, and what they are."""
 
 
+def _meanings(names: Sequence[str]) -> list[tuple[str, str]]:
+    """The same where a front has more than two ends."""
+    further = [end for end in ENDS[2:] if any(_is_called(name, end) for name in names)]
+    if not further:
+        return list(_MEANINGS)
+    told = dict(_MEANINGS)
+    told["beta"] = told["beta"].replace("the other", "the others")
+    told["front"] = "between these, not beaten in all by any other"
+    told["best"] = told["best"].replace("alpha or beta", "alpha, beta or a further end")
+    places = zip(further, ORDINALS[2:], strict=False)
+    rows = [
+        (end, f"least of the {place} that the case makes small, likewise") for end, place in places
+    ]
+    return [*list(told.items())[:3], *rows, *list(told.items())[3:]]
+
+
 def _is_called(name: str, kind: str) -> bool:
     """Whether the kind is what a design is called; alpha and beta are also what others come near to."""
     words = name.split()
-    return words[-1] == kind if kind in ("original", "alpha", "beta") else kind in words[-2:]
+    return words[-1] == kind if kind in ("original", *ENDS) else kind in words[-2:]
 
 
 def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
     """Case by case: the original, then each of ours before the printed one."""
     name = str(verified["design"].to_numpy()[k])
     case = str(verified["case"].to_numpy()[k]) if "case" in verified else ""
-    order = (
-        "original",
-        "alpha",
-        "best alpha",
-        "printed alpha",
-        "beta",
-        "best beta",
-        "printed beta",
-    )
+    kinds = ("", "best ", "printed ")
+    order = ["original", *(f"{kind}{end}" for end in ENDS for kind in kinds)]
     if labels.is_printed(verified.isel(design=k)):
         name = f"printed {name.rpartition(' ')[2]}"
     own = name.removeprefix(f"{case} ")
@@ -269,7 +281,9 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
     columns += [(verified[name], words) for name, words in _MOMENTS if name in verified]
     scales = [labels.of(variable) for variable, _ in columns]
     header = ["design", *(s.label(words) for s, (_, words) in zip(scales, columns, strict=True))]
-    header += _ASKED if "first_goal" in verified else []
+    asked = [name for name in ORDINALS if f"{name}_goal" in verified]
+    if asked:  # each case asks for its own, so the cells say what it is
+        header += ["made small", *["and"] * (len(asked) - 1), "constraints"]
     rows = []
     for k in range(verified.sizes["design"]):
         row: list[object] = [verified["design"].to_numpy()[k]]
@@ -278,22 +292,19 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
             row.append(
                 Number(shown + _half_width(verified.isel(design=k), str(variable.name), scale))
             )
-        rows.append([*row, *_asked(verified.isel(design=k))])
+        rows.append([*row, *_asked(verified.isel(design=k), asked)])
     return Table(header, rows, caption)
 
 
-_ASKED = ["made small", "and", "constraints"]
-"""Columns of what the case of a design asks for, where that is not mean and deviation alone."""
-
-
-def _asked(one: xr.Dataset) -> list[object]:
-    """Cells of these columns: each case asks for its own, so the cells say what it is."""
-    if "first_goal" not in one:
+def _asked(one: xr.Dataset, names: Sequence[str]) -> list[object]:
+    """Cells of what the case of a design asks for, where that is not mean and deviation alone: first, second and so on."""
+    if not names:
         return []
     cells: list[object] = []
-    for name in ("first", "second"):
+    for name in names:
         value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
-        cells.append(f"{one[f'{name}_goal'].item()}: {value}")
+        words = str(one[f"{name}_goal"].item())
+        cells.append(f"{words}: {value}" if words else "")
     return [*cells, str(one["constraints"].item()) or "none"]
 
 

@@ -1,4 +1,4 @@
-"""Fronts of two objectives that are known with errors: what is surely better, and what is one."""
+"""Fronts of objectives that are known with errors: what is surely better, and what is one."""
 
 import moocore
 import numpy as np
@@ -12,64 +12,70 @@ class Compared:
 
     Parameters
     ----------
-    values : array, shape (n, 2)
-        Objectives, both minimised; a design with NaN is never on a front.
-    shifts : array, shape (2, n, r)
+    values : array, shape (n, m)
+        Objectives, all minimised; a design with NaN is never on a front.
+    shifts : array, shape (m, n, r)
         Influence of each replicate (`hpcclear.statistics.random.replicates.Estimate`).
     confidence : float
         Level of each comparison.
 
     Attributes
     ----------
-    less : array, shape (2, n, n)
+    less : array, shape (m, n, n)
         Whether design i is surely less than design j in an objective.
     """
 
     def __init__(self, values: Array, shifts: Array, confidence: float) -> None:
         self.values = values
-        self.less = np.stack([surely_less(values[:, j], shifts[j], confidence) for j in range(2)])
+        self.less = np.stack(
+            [surely_less(one, its, confidence) for one, its in zip(values.T, shifts, strict=True)]
+        )
         self.known = np.isfinite(values).all(axis=1)
 
     @property
     def one(self) -> Booleans:
-        """Whether two designs cannot be told apart in either objective, (n, n)."""
-        either = self.less[0] | self.less[1]
-        return ~(either | either.T)
+        """Whether two designs cannot be told apart in any objective, (n, n)."""
+        any_less = self.less.any(axis=0)
+        return np.asarray(~(any_less | any_less.T))
 
     @property
     def traded(self) -> Booleans:
-        """Whether each of two designs is surely better in one objective, (n, n)."""
-        pairs: Booleans = self.less[0] & self.less[1].T
-        return pairs | pairs.T
+        """Whether each of two designs is surely better in some objective, (n, n)."""
+        any_less = self.less.any(axis=0)
+        return np.asarray(any_less & any_less.T)
 
     @property
     def beaten(self) -> Booleans:
-        """Whether another design is surely better in both objectives, (n,)."""
-        both: Booleans = self.less[0] & self.less[1]
-        return np.asarray(both.any(axis=0))
+        """Whether another design is surely better in all objectives, (n,)."""
+        return np.asarray(self.less.all(axis=0).any(axis=0))
 
     def best(self, objective: int) -> int:
-        """The design with the least of an objective; of those that cannot be told from it, the best in the other.
+        """The design with the least of an objective; of those that cannot be told from it, the best in the others, one after
+        the other in their order.
 
         Raises
         ------
         ValueError
             If no design has objectives.
         """
-        own = np.where(self.known, self.values[:, objective], np.inf)
-        least = int(own.argmin())
-        level = self.known & ~self.less[objective][least]
-        level[least] = True
-        return int(np.where(level, self.values[:, 1 - objective], np.inf).argmin())
+        level = self.known
+        *earlier, last = sorted(range(len(self.less)), key=lambda k: (k != objective, k))
+        for k in earlier:
+            least = int(np.where(level, self.values[:, k], np.inf).argmin())
+            level = level & ~self.less[k][least]
+            level[least] = True
+        return int(np.where(level, self.values[:, last], np.inf).argmin())
 
     def front(self, size: int) -> list[int]:
-        """At most `size` designs, the two best first, each surely better than each other in one objective.
+        """At most `size` designs, the best of each objective first, each surely better than each other in some objective.
 
         Those between are the ones farthest from all that were taken, objectives scaled to their extent.
         """
         taken = [self.best(0)]
-        if self.traded[taken[0], self.best(1)]:
-            taken.append(self.best(1))
+        for objective in range(1, len(self.less)):
+            best = self.best(objective)
+            if self.traded[best, taken].all():
+                taken.append(best)
         rows = np.flatnonzero(self.known)
         rows = rows[moocore.is_nondominated(self.values[rows])]
         extent = np.ptp(self.values[taken], axis=0)

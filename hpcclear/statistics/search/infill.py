@@ -1,4 +1,4 @@
-"""Where to evaluate next, so that the front of two costly objectives is found with few designs.
+"""Where to evaluate next, so that the front of costly objectives is found with few designs.
 
 Each objective gets a model of two scales: Kriging over everything that is known, and Kriging with
 short length scales over what that one leaves. On the moments of a mechanism with clearances
@@ -79,8 +79,8 @@ def proposals(
     ----------
     designs : array, shape (n, d)
         Evaluated; at least d + 3 with finite values.
-    values : array, shape (n, 2)
-        Their objectives, both minimised; NaN where they failed.
+    values : array, shape (n, m)
+        Their objectives, all minimised; NaN where they failed.
     bounds : array, shape (d, 2)
     count : int
     rng : Generator
@@ -107,17 +107,22 @@ def proposals(
                 size=PARTICLES,
                 settings=SwarmSettings(particles=PARTICLES),
                 start=_best(designs, values, PARTICLES // 2, excess),
-            ).points
+            )
             for boldness in BOLD
         ]
         fronts = [
-            front for front in fronts if len(front)
+            front for front in fronts if len(front.points)
         ]  # none where nothing keeps the constraints
     if not fronts:
         assert excess is not None  # only constraints leave a front without designs
-        return _chosen(designs[:0], _nearer(designs, excess, bounds, rng), designs, bounds, count)
-    ends = np.concatenate([front[[0, -1]] for front in fronts])  # by rising first objective
-    return _chosen(ends, np.concatenate(fronts), designs, bounds, count)
+        near = _nearer(designs, excess, bounds, rng)
+        return _chosen(designs[:0], near, designs, bounds, count, count)
+    ends = np.concatenate([front.points[front.values.argmin(axis=0)] for front in fronts])
+    others = np.concatenate([front.points for front in fronts])
+    most = (
+        count if values.shape[1] == 2 else count // 2
+    )  # between the ends of a surface there is more
+    return _chosen(ends, others, designs, bounds, count, most)
 
 
 def _nearer(
@@ -130,7 +135,7 @@ def _nearer(
 
 
 def _best(designs: Array, values: Array, count: int, excess: Array | None) -> Array:
-    """Designs with the least sum of both objectives, each in units of its deviation; those that keep the constraints first."""
+    """Designs with the least sum of all objectives, each in units of its deviation; those that keep the constraints first."""
     scale = np.nanstd(values, axis=0)
     merit = (values / np.where(scale > 0.0, scale, 1.0)).sum(axis=1)
     if excess is not None:
@@ -155,8 +160,10 @@ def _believed(
     return function
 
 
-def _chosen(ends: Array, others: Array, designs: Array, bounds: Array, count: int) -> Array:
-    """The ends, then the others farthest from all that is known or chosen; none twice."""
+def _chosen(
+    ends: Array, others: Array, designs: Array, bounds: Array, count: int, most: int
+) -> Array:
+    """The ends, at most so many, then the others farthest from all that is known or chosen; none twice."""
     width = bounds[:, 1] - bounds[:, 0]
     known = list(designs / width)
 
@@ -166,7 +173,7 @@ def _chosen(ends: Array, others: Array, designs: Array, bounds: Array, count: in
 
     chosen: list[Array] = []
     for point in ends:
-        if len(chosen) < count and distance(point[None])[0] > NEAR:
+        if len(chosen) < most and distance(point[None])[0] > NEAR:
             chosen.append(point)
             known.append(point / width)
     while len(chosen) < count:

@@ -1,0 +1,395 @@
+"""Three and more things made small: fronts that are surfaces, from the scene to the page, on a front that is known."""
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from browser import Browser
+from commands import MPIEXEC, warm
+from patience import crowded
+
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.html import picture, sections
+from hpcclear.report.html.content import read
+from hpcclear.report.html.page import write_report
+from hpcclear.results import dataset
+from hpcclear.scene import Scene, load_scene
+from hpcclear.statistics.search import infill
+from hpcclear.statistics.search.certainty import Compared
+from hpcclear.study import extent, run_study
+
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
+
+UNIT = 1e-4  # m, of mean and deviation on the sphere
+MEAN, DEVIATION = 2.0, 1.0  # where its centre lies
+RIM = 0.9  # the formula is no larger, so that nothing has an infinite slope
+THIRD = f"{RIM} * (m3 - 0.07) / 0.21"
+LOW, HIGH = 3e-4, 1e-3  # C
+ENDS = ("alpha", "beta", "gamma")
+
+
+def on_sphere(m2: np.ndarray, m3: np.ndarray, u2: np.ndarray) -> np.ndarray:
+    """DTLZ2 (Deb et al. 2002): the front is an octant of the unit sphere, where u2 is 0.06; (..., 3)."""
+    angle = 0.5 * np.pi * (m2 - 0.105) / 0.315
+    third = RIM * (m3 - 0.07) / 0.21
+    reach = np.sqrt(1.0 - third**2) * (1.0 + ((u2 - 0.06) / 0.06) ** 2)
+    return np.stack([reach * np.cos(angle), reach * np.sin(angle), third], axis=-1)
+
+
+def sphere(column: dict[str, np.ndarray]) -> np.ndarray:
+    """f whose mean and deviation over C are the first two, in `UNIT`, off their centre; the third is a formula."""
+    clearance = column["joints.crank_rod.clearance"]
+    slider, rod = column["mechanism.slider.mass"], column["mechanism.rod.mass"]
+    place = on_sphere(rod, slider, column["mechanism.rod.mass_center"])
+    off = (clearance - 0.5 * (LOW + HIGH)) / ((HIGH - LOW) / 12**0.5)
+    return UNIT * (MEAN + place[..., 0] + (DEVIATION + place[..., 1]) * off)
+
+
+STUDY = (
+    "study.sensitivity.groups=[]", "study.sensitivity.sobol_samples=0", "study.samples=80", "study.test_samples=20",
+    "study.surrogate.models=[]", 'study.surrogate.optimisation=["m2", "m3", "u2", "C"]', "study.surrogate.r2=0.9",
+    "study.swarm.particles=50", "study.swarm.iterations=40", "study.swarm.runs=2", "study.swarm.archive=60",
+    "study.verification={accuracy={mean=0.005, deviation=0.01}, designs=12, infill_rounds=4, infill_samples=64, "
+    "infill_designs=12, response_copies=2, response_windows=2, audit_samples=0, most_samples=1024}",
+    f'study.cases={{three={{random=["C"], objectives=["mean", "deviation", {{formula="{THIRD}"}}]}}}}',
+)  # fmt: skip
+
+
+def scene_of(*overrides: str) -> Scene:
+    return load_scene(tomllib.loads(formula.PHYSICS + formula.STUDY), [*STUDY, *overrides])
+
+
+@pytest.fixture(autouse=True)
+def _dynamics(monkeypatch: pytest.MonkeyPatch) -> None:
+    formula.replace_dynamics(monkeypatch.setattr)
+    monkeypatch.setattr(formula, "objective", sphere)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("three") / "whole"
+    patch = pytest.MonkeyPatch()
+    formula.replace_dynamics(patch.setattr)
+    patch.setattr(formula, "objective", sphere)
+    run_study(scene_of(), place, alone(), progress_style="quiet")
+    patch.undo()
+    return place
+
+
+def verified(place: Path) -> xr.Dataset:
+    return dataset.read(place / "verification.nc", "verification")
+
+
+def chosen(found: xr.Dataset) -> xr.Dataset:
+    """The ends and what lies between them."""
+    names = [str(name) for name in found["design"].to_numpy()]
+    ends = [f"three {end}" for end in ENDS]
+    return found.isel(design=[k for k, n in enumerate(names) if n in ends or " front " in n])
+
+
+def places(found: xr.Dataset) -> np.ndarray:
+    """Where designs lie by the formula, not by the simulations that chose them."""
+    return on_sphere(*(found[name].to_numpy() for name in ("m2", "m3", "u2")))
+
+
+# -- the front --------------------------------------------------------------------------------------
+
+
+def test_what_is_told_of_designs_is_where_they_lie(study: Path) -> None:
+    found = verified(study)
+    true = places(found) * (UNIT, UNIT, 1.0) + (UNIT * MEAN, UNIT * DEVIATION, 0.0)
+    for column, name in enumerate(("first", "second", "third")):
+        lower, upper = found[f"{name}_lower"].to_numpy(), found[f"{name}_upper"].to_numpy()
+        slack = 2.0 * (upper - lower) + 1e-12
+        assert (lower - slack <= true[:, column]).all()
+        assert (true[:, column] <= upper + slack).all()
+    assert found["third_goal"].to_numpy().tolist() == [THIRD] * found.sizes["design"]
+    assert f"mean of f, deviation of f and {THIRD}" in found["dominated"].attrs["long_name"]
+    assert "fourth_goal" not in found
+
+
+def test_each_end_has_the_least_of_its_own(study: Path) -> None:
+    found = verified(study)
+    for end, name in zip(ENDS, ("first", "second", "third"), strict=True):
+        own = found.sel(design=f"three {end}")
+        assert float(own[f"{name}_lower"]) <= float(found[f"{name}_upper"].min())
+    least = places(found.sel(design=[f"three {end}" for end in ENDS]))
+    assert least[0, 0] < 0.05
+    assert least[1, 1] < 0.05
+    assert least[2, 2] == 0.0
+
+
+def test_the_front_is_the_octant_and_covers_it(study: Path) -> None:
+    """No design is beaten by another, all are within 4 % of the sphere, and none of its places is far from all."""
+    front = places(chosen(verified(study)))
+    assert len(front) >= 12
+    beaten = (front[:, None] <= front).all(axis=2) & (front[:, None] < front - 0.01).any(axis=2)
+    assert not beaten.any()
+    radius = np.linalg.norm(front, axis=1)
+    assert (radius > 0.999).all()
+    assert (radius < 1.04).all()
+    angle, third = np.meshgrid(np.linspace(0.0, np.pi / 2, 30), np.linspace(0.0, RIM, 30))
+    flat = np.sqrt(1.0 - third**2)
+    octant = np.stack([flat * np.cos(angle), flat * np.sin(angle), third], axis=-1).reshape(-1, 3)
+    gaps = np.linalg.norm(octant[:, None] - front, axis=2).min(axis=1)
+    assert gaps.max() < 0.6  # 1.41 is the way from end to end
+    assert gaps.mean() < 0.25
+
+
+def test_each_solution_knows_all_three(study: Path) -> None:
+    front = dataset.read(study / "front.nc", "front")
+    assert front["searched"].item() == f"mean of f, deviation of f, {THIRD}"
+    known = np.isfinite(front["searched_third"].to_numpy())
+    assert known.sum() == np.isfinite(front["searched_first"]).sum() == 120
+    third = RIM * (front["m3"].to_numpy() - 0.07) / 0.21
+    np.testing.assert_allclose(front["searched_third"].to_numpy()[known], third[known], atol=1e-12)
+    assert int(front["verified"].sum()) <= 12 + 3
+    for names in (("searched_first", "mean"), ("searched_second", "deviation")):
+        one, other = (front[name].to_numpy()[known] for name in names)
+        np.testing.assert_allclose(one, other, rtol=0.02)  # 256 points against a rule
+
+
+def test_the_search_counts_what_it_takes(study: Path) -> None:
+    """The expected counts know three ends: two swarm's designs, a runner-up and a response each."""
+    two = 'study.cases={three={random=["C"]}}'
+    here, there = (extent.samples_of(scene, 64) for scene in (scene_of(), scene_of(two)))
+    assert here["verification"] - there["verification"] == (2 + 1) * 64
+    assert here["check"] - there["check"] == 2 * 64
+    assert extent.responses_of(scene_of()) - extent.responses_of(scene_of(two)) == 3
+    assert (study / "responses" / "three_gamma.nc").exists()
+    assert verified(study).sizes["design"] * 64 <= here["verification"]
+
+
+def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path: Path) -> None:
+    place = tmp_path / "pieces"
+    assert formula.run_in_pieces(scene_of(), str(place), alone()) > 8
+    for name in ("front.nc", "verification.nc", "chaos.nc"):
+        assert (place / name).read_bytes() == (study / name).read_bytes(), name
+
+
+@pytest.mark.mpi
+def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
+    """By the formula of other studies, whose program ranks can start."""
+    light = 'study.cases={light={random=["C", "m2"], objectives=["mean", "deviation", {formula="m2 + m3"}]}}'
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene_of(light, "study.swarm.algorithm=pymoo:NSGA3").to_toml())
+    for ranks in (1, 2):
+        program = warm().words(
+            [str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / str(ranks))]
+        )
+        launch = [str(MPIEXEC), "-n", str(ranks), *program]
+        done = subprocess.run(
+            launch, capture_output=True, text=True, timeout=crowded(120), check=False
+        )
+        assert done.returncode == 0, done.stderr
+    for name in ("front.nc", "verification.nc", "samples.nc"):
+        one, two = ((tmp_path / ranks / name).read_bytes() for ranks in ("1", "2"))
+        assert one == two, name
+    found = dataset.read(tmp_path / "1" / "verification.nc")
+    assert float(found["third_true"].sel(design="light gamma")) == pytest.approx(0.175, abs=2e-3)
+
+
+# -- cases beside each other ------------------------------------------------------------------------
+
+MIXED = (
+    f'study.cases={{plain={{random=["C"]}}, five={{random=["C"], objectives=["mean", "deviation", {{formula="{THIRD}"}}, '
+    '{formula="m2"}, "quantile"], constraints=[{formula="m2", most=0.3}]}}',
+    "study.verification.designs=3", "study.verification.infill_rounds=1", "study.verification.infill_designs=6",
+)  # fmt: skip
+
+
+def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Path) -> None:
+    place = tmp_path / "mixed"
+    run_study(scene_of(*MIXED), place, alone(), progress_style="quiet")
+    found = verified(place)
+    plain = found.isel(design=found["case"].to_numpy() == "plain")
+    five = found.isel(design=found["case"].to_numpy() == "five")
+    assert set(plain["fifth_goal"].to_numpy()) == {""}
+    for name in ("third", "fourth", "fifth"):  # none of them, nor of the other case's constraints
+        assert np.isnan(plain[f"{name}_true"]).all()
+    np.testing.assert_array_equal(five["fourth_true"], five["m2"])
+    np.testing.assert_array_equal(five["fifth_true"], five["percentile"])
+    names = [str(name) for name in five["design"].to_numpy()]
+    assert {f"five {end}" for end in (*ENDS, "delta", "epsilon")} <= set(names)
+    assert "plain gamma" not in found["design"].to_numpy()
+    for one, mass in zip(five["constraints"].to_numpy(), five["m2"].to_numpy(), strict=True):
+        assert one == f"m2 {mass:.4g} at most 0.3: {'kept' if mass <= 0.3 else 'broken'}"
+    kept = five.isel(design=five["m2"].to_numpy() <= 0.3)
+    for end, name in (("alpha", "first"), ("delta", "fourth"), ("epsilon", "fifth")):
+        best = five.sel(design=f"five {end}")
+        assert float(best["m2"]) <= 0.3
+        assert float(best[f"{name}_lower"]) <= float(kept[f"{name}_upper"].min())
+    front = dataset.read(place / "front.nc", "front")
+    assert np.isnan(front["searched_third"].sel(case="plain")).all()
+    np.testing.assert_array_equal(
+        front["searched_first"].sel(case="plain"), front["mean"].sel(case="plain")
+    )
+    assert np.isfinite(front["hypervolume"].sel(case="plain")).all()
+    shown = picture.front(read(place))
+    assert shown["axes"][2:] == [THIRD, "m2", "95th percentile of f (mm)"]
+    assert {len(point["at"]) for point in shown["points"]} == {5}
+    assert all(p["at"][2] is None for p in shown["points"] if p["case"] == "plain")
+
+
+# -- what is told -----------------------------------------------------------------------------------
+
+
+def test_the_answer_has_a_column_for_each_end(study: Path) -> None:
+    found = verified(study)
+    ((case, designs, lines),) = beside_original(found)
+    assert case == "three"
+    assert [name.removesuffix(" (to take)") for name in designs][:4] == ["original", *ENDS]
+    rows = {line[0]: line[1:] for line in lines}
+    assert set(map(len, rows.values())) == {len(designs)}
+    assert rows[THIRD][3] == "0"
+    told = [
+        line.text for line in answer({"verification": found}, "out") if line.label == "asked for"
+    ]
+    assert len(told) == 1  # mean and deviation have lines anyway
+    assert told[0].startswith(THIRD)
+
+
+def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
+    content = read(study)
+    shown = picture.front(content)
+    assert shown["axes"] == [shown["x"], shown["y"], THIRD]
+    for point in shown["points"]:
+        assert point["at"][:2] == [point["x"], point["y"]]
+        assert 0.0 <= point["at"][2] <= RIM
+    gamma = next(point for point in shown["points"] if point["name"] == "three gamma")
+    assert [THIRD, "0"] in gamma["direct"]
+    part = sections.designs(content)
+    assert part is not None
+    assert part["table"].header[-4:] == ["made small", "and", "and", "constraints"]
+    assert ("gamma", "least of the third that the case makes small, likewise") in part["names"]
+
+
+_CHOOSE = """
+const select = [...document.getElementById("front-view").closest(".controls").querySelectorAll("select")];
+select[2].value = 2;
+select[2].dispatchEvent(new Event("change"));
+return select.map((one) => [...one.options].map((option) => option.textContent));
+"""
+
+
+def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
+    shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
+    page = write_report(tmp_path / "page")
+    browser = Browser()
+    try:
+        browser.open(page, 1280)
+        browser.wait("document.querySelectorAll('#front .point').length > 40")
+        count = browser.run("return document.querySelectorAll('#front .point').length;")
+        before = browser.run("return document.getElementById('front').textContent;")
+        _, across, up = browser.run(_CHOOSE)
+        assert across == up == ["mean of f (mm)", "deviation of f (mm)", THIRD]
+        assert browser.run("return document.querySelectorAll('#front .point').length;") == count
+        after = browser.run("return document.getElementById('front').textContent;")
+        assert THIRD not in before
+        assert THIRD in after
+        assert "mean of f (mm)" in after
+        browser.open(page, 380)
+        browser.wait("document.querySelectorAll('#front .point').length > 40")
+        assert browser.run("return document.documentElement.scrollWidth;") <= 380
+        assert browser.log() == []
+    finally:
+        browser.close()
+
+
+# -- designs that are known with errors -------------------------------------------------------------
+
+
+def replicates(values: np.ndarray, error: float, seed: int = 1) -> np.ndarray:
+    """Shifts (m, n, 16) of independent designs."""
+    return np.random.default_rng(seed).normal(0.0, error, (*values.T.shape, 16))
+
+
+def test_the_front_of_three_is_what_is_surely_traded() -> None:
+    corners, middle = 1.0 - np.eye(3), [[0.5, 0.5, 0.5], [0.51, 0.49, 0.501], [2.0, 2.0, 2.0]]
+    values = np.concatenate([corners, middle])
+    found = Compared(values, replicates(values, 0.1), 0.95)
+    assert [found.best(k) for k in range(3)] == [0, 1, 2]
+    front = found.front(6)
+    assert front[:3] == [0, 1, 2]
+    assert len(front) == 4  # of those that cannot be told apart one
+    assert front[3] in (3, 4)
+    assert found.one[3, 4]
+    np.testing.assert_array_equal(found.beaten, [False] * 5 + [True])
+
+
+def test_of_designs_that_are_level_the_others_decide_in_their_order() -> None:
+    values = np.array([[0.0, 1.0, 0.0], [0.001, 0.501, 0.7], [0.002, 0.5, 0.9], [1.0, 0.0, 0.0]])
+    found = Compared(values, replicates(values, 0.05), 0.95)
+    assert (
+        found.best(0) == 1
+    )  # level with 0 and 2 in the first, with 2 in the second, less in the third
+    assert found.best(1) == 3
+    assert found.best(2) == 0  # level with 3 in the third, less in the first
+
+
+def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four swarms have twenty ends of five objectives, where these are rough."""
+    rng = np.random.default_rng(2)
+    designs, corners = rng.random((20, 4)), [*np.eye(4), np.full(4, 0.5)]
+    values = np.stack(
+        [
+            ((designs - corner) ** 2).sum(axis=1) + 0.3 * np.sin(9.0 * designs[:, k % 4] + 4.0 * k)
+            for k, corner in enumerate(corners)
+        ],
+        axis=1,
+    )
+    choose, seen = infill._chosen, []
+
+    def watched(ends: np.ndarray, *others: object) -> np.ndarray:
+        seen.append(ends)
+        return choose(ends, *others)
+
+    monkeypatch.setattr(infill, "_chosen", watched)
+    found = infill.proposals(designs, values, np.array([[0.0, 1.0]] * 4), 12, rng)
+    assert len(found) == 12
+    assert len(seen[0]) == 20
+    assert sum((one == seen[0]).all(axis=1).any() for one in found) == 6
+
+
+# -- what is refused --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("objectives", "key", "reason"),
+    [
+        ('["mean"]', "objectives", "two things or more"),
+        ('["mean", "deviation", "mean"]', "objectives.2", "already"),
+        ('[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]', "objectives.2", "already"),
+        ('["quantile", {statistic="quantile", level=0.95}]', "objectives.1", "already"),
+        ('["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]', "objectives", "more than 5"),
+    ],
+)  # fmt: skip
+def test_too_few_too_many_and_the_same_again(objectives: str, key: str, reason: str) -> None:
+    with pytest.raises(InputError) as caught:
+        scene_of(f'study.cases={{three={{random=["C"], objectives={objectives}}}}}')
+    assert caught.value.key == f"study.cases.three.{key}"
+    assert reason in caught.value.reason
+    assert caught.value.remedy
+
+
+def test_two_levels_of_a_quantile_are_two_things() -> None:
+    rows = '["quantile", {statistic="quantile", level=0.5}, {statistic="exceedance", limit=1e-4}]'
+    scene = scene_of(f'study.cases={{three={{random=["C"], objectives={rows}}}}}')
+    assert len(scene.required_study.case("three").goals) == 3
+
+
+def test_an_archive_has_room_for_each_end() -> None:
+    with pytest.raises(InputError) as caught:
+        scene_of("study.swarm.archive=2")
+    assert caught.value.key == "study.swarm.archive"
+    assert "3" in caught.value.remedy
