@@ -137,8 +137,10 @@ def test_a_study_searches_with_it_to_the_same_bytes(tmp_path):
     front = dataset.read(tmp_path / "one" / "front.nc", "front")
     least = front["m2"].where(front["deviation"] == front["deviation"].min("solution"))
     np.testing.assert_allclose(least.min("solution"), 0.105, atol=0.02)  # as the swarm finds it
-    run_study(scene_of("study.swarm.algorithm=pymoo:RVEA"), tmp_path / "other", alone(), progress_style="quiet")  # fmt: skip
-    assert (tmp_path / "one" / "front.nc").read_bytes() != (tmp_path / "other" / "front.nc").read_bytes()  # fmt: skip
+    swarm = scene_of().with_({"study.swarm.algorithm": None})
+    run_study(swarm, tmp_path / "swarm", alone(), progress_style="quiet")
+    other = dataset.read(tmp_path / "swarm" / "front.nc", "front")
+    assert front["mean"].shape != other["mean"].shape or not front["mean"].equals(other["mean"])
 
 
 def test_where_pymoo_is_missing_it_is_said_before_anything_is_simulated(tmp_path, monkeypatch):

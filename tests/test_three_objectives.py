@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import extent, run_study
+from hpcclear.study import extent, lives, refinement, run_study
+from hpcclear.study.optimisation import Choice
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
 sys.path.insert(0, str(PROGRAMS))
@@ -202,7 +204,8 @@ def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
 # -- cases beside each other ------------------------------------------------------------------------
 
 MIXED = (
-    f'study.cases={{plain={{random=["C"]}}, five={{random=["C"], objectives=["mean", "deviation", {{formula="{THIRD}"}}, '
+    'study.cases={plain={random=["C"]}, two={random=["C"], constraints=[{formula="m2", most=0.3}]}, '
+    f'five={{random=["C"], objectives=["mean", "deviation", {{formula="{THIRD}"}}, '
     '{formula="m2"}, "quantile"], constraints=[{formula="m2", most=0.3}]}}',
     "study.verification.designs=3", "study.verification.infill_rounds=1", "study.verification.infill_designs=6",
 )  # fmt: skip
@@ -214,9 +217,11 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     found = verified(place)
     plain = found.isel(design=found["case"].to_numpy() == "plain")
     five = found.isel(design=found["case"].to_numpy() == "five")
-    assert set(plain["fifth_goal"].to_numpy()) == {""}
-    for name in ("third", "fourth", "fifth"):  # none of them, nor of the other case's constraints
-        assert np.isnan(plain[f"{name}_true"]).all()
+    two = found.isel(design=found["case"].to_numpy() == "two")
+    for few in (plain, two):
+        assert set(few["fifth_goal"].to_numpy()) == {""}
+        for name in ("third", "fourth", "fifth"):  # nor the constraint, which stands there
+            assert np.isnan(few[f"{name}_true"]).all()
     np.testing.assert_array_equal(five["fourth_true"], five["m2"])
     np.testing.assert_array_equal(five["fifth_true"], five["percentile"])
     names = [str(name) for name in five["design"].to_numpy()]
@@ -230,7 +235,10 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
         assert float(best["m2"]) <= 0.3
         assert float(best[f"{name}_lower"]) <= float(kept[f"{name}_upper"].min())
     front = dataset.read(place / "front.nc", "front")
-    assert np.isnan(front["searched_third"].sel(case="plain")).all()
+    own = front.sel(case="five")
+    assert float(own["m2"].max()) <= 0.3
+    assert float(own["searched_third"].max()) > 0.8  # which no constraint is about
+    assert np.isnan(front["searched_third"].sel(case=["plain", "two"])).all()
     np.testing.assert_array_equal(
         front["searched_first"].sel(case="plain"), front["mean"].sel(case="plain")
     )
@@ -239,6 +247,25 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     assert shown["axes"][2:] == [THIRD, "m2", "95th percentile of f (mm)"]
     assert {len(point["at"]) for point in shown["points"]} == {5}
     assert all(p["at"][2] is None for p in shown["points"] if p["case"] == "plain")
+
+
+def test_the_search_finds_constraints_behind_the_goals() -> None:
+    case = scene_of(*MIXED).required_study.case("five")
+    told = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 0.45])
+    assert refinement._broken(case, told) == pytest.approx(0.5)
+    assert refinement._broken(case, np.array([9.0, 9.0, 9.0, 9.0, 9.0, 0.15])) == pytest.approx(
+        -0.5
+    )
+
+
+def test_lives_are_followed_of_every_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lives, "_over_life", lambda *given: (1.0, 0.1, 2.0, 0.2))
+    run = SimpleNamespace(directory=tmp_path, study=scene_of().required_study)
+    names = ("three original", "three gamma", "three front 1", "three best gamma", "three beta")
+    designs = [Choice(name, "three", {}) for name in names]
+    found = lives.of_designs(run, scene_of(), designs)  # type: ignore[arg-type]
+    assert np.isfinite(found["mean"]).tolist() == [True, True, False, False, True]
+    assert np.isfinite(found["deviation_reach"]).tolist() == [True, True, False, False, True]
 
 
 # -- what is told -----------------------------------------------------------------------------------
@@ -335,6 +362,17 @@ def test_of_designs_that_are_level_the_others_decide_in_their_order() -> None:
     )  # level with 0 and 2 in the first, with 2 in the second, less in the third
     assert found.best(1) == 3
     assert found.best(2) == 0  # level with 3 in the third, less in the first
+
+
+def test_an_end_that_is_not_surely_traded_is_none_of_the_front() -> None:
+    """What is level is not handed on: the middle one cannot be told from the others, which can in the first."""
+    values = np.array([[0.0, 1.0, 1.0], [0.08, 0.05, 0.55], [0.15, 0.0, 0.5]])
+    found = Compared(values, replicates(values, 1.0), 0.95)
+    found.less = np.zeros((3, 3, 3), bool)
+    found.less[0, 0, 2] = True
+    found.less[1:, 1:, 0] = True
+    assert (found.best(0), found.best(1)) == (1, 2)
+    assert found.front(3) == [1]
 
 
 def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
