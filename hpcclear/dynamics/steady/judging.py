@@ -169,7 +169,7 @@ def spin_up(series: Array, noise: float = 0.0) -> int:
     the variance of its noise, where that is known.
     """
     n = len(series)
-    errors = np.array([max(np.var(series[d:]), noise) / (n - d) for d in range(n // 2 + 1)])
+    errors = np.array([max(float(np.var(series[d:])), noise) / (n - d) for d in range(n // 2 + 1)])
     return int(np.argmax(errors <= NEARLY * errors.min()))
 
 
