@@ -6,8 +6,8 @@ python analysis/chaos_cost.py --scenes 5 8 14
 Splits are searched by brute force, their errors measured over groups of copies. The cheapest with hindsight: whose error is
 small enough, though nobody would know. The cheapest with limits: at least four copies, whose Student's limits come to 1 %.
 With all known: revolutions that independent copies without spin-up take if their scatter is known, at the cheapest tolerance
-that is off by no more than a quarter of the target. What is found here has to find scatter, tolerance and spin-up besides.
-Processor time; a busy machine slows all.
+that is off by no more than a quarter of the target or than chance makes. What is found here has to find scatter, tolerance
+and spin-up besides. Processor time; a busy machine slows all.
 """
 
 import argparse
@@ -112,8 +112,9 @@ def all_known(all_gaps: dict[float, tuple[np.ndarray, float]], truth: float) -> 
         each = objective(late.mean(axis=0))
         scatter = float(each.var(ddof=1)) * STRETCH * len(late) / truth**2
         off = abs(float(objective(late.mean(axis=(0, 1)))) / truth - 1.0)
+        doubt = float(each.std(ddof=1)) / np.sqrt(COPIES) / truth
         revolutions = int(np.ceil(scatter * (1.96 / TARGET) ** 2))
-        if off <= 0.25 * TARGET:
+        if off <= max(0.25 * TARGET, 2.0 * doubt):
             found.append(
                 Split(price * revolutions, rtol, revolutions, 0, revolutions, TARGET / 1.96)
             )

@@ -226,3 +226,10 @@ def test_slow_kicks_wait_longer_for_the_first_look(growth: float, stretches: int
     assert ensemble._first(a_sample(), growth) == stretches
     assert ensemble._first(a_sample(latched=True), growth) == 6
     assert ensemble._first(a_sample(free=True), growth) == 6
+
+
+def test_a_difference_of_tolerances_counts_by_what_chance_does_not_make_of_it():
+    assert ensemble._excess(0.9, doubt=1.0, usual=10.0) == 0.0
+    assert ensemble._excess(1.5, doubt=1.0, usual=10.0) == pytest.approx(1.25)
+    assert ensemble._excess(-1.5, doubt=1.0, usual=0.2) == pytest.approx(0.04)  # more is chance
+    assert ensemble._excess(-3.0, doubt=1.0, usual=0.2) == pytest.approx(8.0)  # is none
