@@ -101,10 +101,24 @@ def test_pairs_that_fail_leave_a_change_unknown():
 # ---- the procedure ---------------------------------------------------------------------------------
 
 
-def followed(change, effects, tolerance=0.01, noise=0.0, most=256, saves=None) -> Certificate:
+def explicit(off):
+    """No variant calls for implicit steps."""
+    return False
+
+
+def followed(
+    change,
+    effects,
+    tolerance=0.01,
+    noise=0.0,
+    most=256,
+    saves=None,
+    implicit=explicit,
+    budget=math.inf,
+) -> Certificate:
     """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k]."""
     saves = saves or [0.3] * effects
-    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, lambda off: 1.0)
+    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, implicit, budget)
     asking = certificate(plan)
     wanted = next(asking)
     while True:
@@ -116,7 +130,7 @@ def followed(change, effects, tolerance=0.01, noise=0.0, most=256, saves=None) -
             f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
             work = 1000.0 * np.prod([1.0 - saves[k] for k in one.off])
             told.append(
-                Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)))
+                Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)), np.full(f.shape, work))
             )  # fmt: skip
         try:
             wanted = asking.send(told)
@@ -168,14 +182,14 @@ def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not()
 
 
 def test_the_cheapest_set_that_is_impossible_is_not_asked_for():
-    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), lambda off: 1.0)
+    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), explicit)
     asking = certificate(plan)
     wanted = next(asking)
     while True:
         assert all(one.off != (0, 1) for one in wanted)
         ones = [np.ones((one.last - one.first, 4)) for one in wanted]
         try:
-            wanted = asking.send([Seen(x, np.ones((*x.shape, 1)), x.astype(int)) for x in ones])
+            wanted = asking.send([Seen(x, np.ones((*x.shape, 1)), x.astype(int), x) for x in ones])
         except StopIteration as end:
             found = end.value
             break

@@ -231,19 +231,21 @@ def effects(
     def program(ranks: "Ranks") -> int:
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
-        from hpcclear.study.extent import certificate_samples
+        from hpcclear.study.extent import certificate_extent
 
         allowed = tolerance_of(tolerance)
         scene = scene_of(file, overrides)
         if reduced is not None:
             check_free(reduced)
+        most, budget = certificate_extent(scene, samples)
         found = run_effects(
             scene,
             place_of(output or Path(f"{file.stem}-effects.nc")),
             ranks,
             how.options(),
             tolerance=allowed,
-            samples=certificate_samples(scene) if samples is None else samples,
+            samples=most,
+            budget=budget,
             forces=forces,
         )
         code = describe(found, scene, file)

@@ -51,6 +51,7 @@ def run_effects(
     *,
     tolerance: float = 0.01,
     samples: int = SAMPLES,
+    budget: float = np.inf,
     forces: bool = False,
 ) -> Finished:
     """Certify on all ranks which effects a scene can do without, and write it; on root.
@@ -66,6 +67,8 @@ def run_effects(
         Relative change that is allowed.
     samples : int
         Of each variant at most.
+    budget : float
+        Samples of the whole scene that all may come to, by their work.
     forces : bool
         Whether peak contact forces must stay within the tolerance as well.
 
@@ -77,13 +80,18 @@ def run_effects(
     check_tolerance(tolerance)
     place = Place.of_file(output, options.fresh)
     trial = Trial(scene)
-    asked = {"tolerance": repr(tolerance), "samples": str(samples), "forces": str(forces)}
+    asked = {
+        "tolerance": repr(tolerance),
+        "samples": str(samples),
+        "budget": str(budget),
+        "forces": str(forces),
+    }
     with Session(place, {**run_key(scene, "effects"), **asked}, ranks, options) as session:
         content = session.found("effects")
         times: dict[str, str] | None = None
         if content is None:
             session.describe(scene)
-            content = _certified(trial, trial.plan(tolerance, samples, forces), session)
+            content = _certified(trial, trial.plan(tolerance, samples, forces, budget), session)
             with ranks.stage("effects: cost"):
                 variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
                 times = {SECONDS_PER_SAMPLE: json.dumps(trial.seconds(variants))}

@@ -2,15 +2,17 @@
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.problem import coordinate_count, problem_of
+from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.ensemble.certificate import Asked, Certificate, Plan, Seen, Variant, certificate
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.results.names import ALL_ON
@@ -37,6 +39,9 @@ dearer without an effect (contacts without damping bounce on) ends as failed, an
 
 EVALUATIONS = 6
 """Of an explicit step."""
+
+IMPLICIT = 20.0
+"""What an evaluation counts as where a sample took implicit steps, which lanes take one at a time and solve for."""
 
 Simulate = Callable[[Scene, Points], Records]
 
@@ -128,6 +133,8 @@ class Trial:
                 "See hpcclear check for what is on",
             )  # fmt: skip
         self._variants: dict[Variant, Off | None] = {}
+        self._bare = scene.with_({"study": None})  # quick to change
+        self._implicit: dict[Variant, bool] = {}
         self._limits: dict[str, int] = {}
 
     def names(self, off: Variant) -> tuple[str, ...]:
@@ -137,8 +144,12 @@ class Trial:
     def possible(self, off: Variant) -> bool:
         """Whether such effects can be off together."""
         if off not in self._variants:
+            chosen = [self.switches[k] for k in off]
+            if any(one.excludes(other) for one, other in combinations(chosen, 2)):
+                self._variants[off] = None  # two models of one effect
+                return False
             try:
-                made = Off(self.scene, [self.switches[k] for k in off])
+                made = Off(self.scene, chosen)
                 problem_of(made.scene)
                 self._variants[off] = made
             except InputError:
@@ -153,12 +164,25 @@ class Trial:
         assert made is not None
         return made
 
-    def plan(self, tolerance: float, samples: int, forces: bool) -> Plan:
-        """What is asked of the certificate."""
+    def implicit(self, off: Variant) -> bool:
+        """Whether a variant calls for implicit steps."""
+        if off and not self.implicit(()):
+            return False  # without an effect no motion gets stiff
+        kept = tuple(k for k in off if self.switches[k].stiff)
+        if kept not in self._implicit:
+            try:
+                made = Off(self._bare, [self.switches[k] for k in kept])
+                self._implicit[kept] = implicit_method(made.scene) != "never"
+            except InputError:
+                self._implicit[kept] = True
+        return self._implicit[kept]
+
+    def plan(self, tolerance: float, samples: int, forces: bool, budget: float = np.inf) -> Plan:
+        """What is asked of the certificate; `budget`: samples of the whole scene that all may come to, by their work."""
         most = max(samples // self.drawn.size, 4)
         return Plan(
             len(self.switches), tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
-            forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
+            forces, self.possible, self.implicit, budget / self.drawn.size,
         )  # fmt: skip
 
     def points(self, asked: Asked) -> Points:
@@ -194,9 +218,12 @@ class Trial:
             place = scene.joint_labels.index(name)
             force[:, labels.index(name)] = records["peak_contact_force"][:, place]
         shape = (asked.last - asked.first, self.drawn.size)
+        evaluations = records["rhs_evaluations"]
+        weight = np.where(records["flags"] & int(Flag.STIFF), IMPLICIT, 1.0)
+        work = evaluations * weight * (1.0 + coordinate_count(scene))
         return Seen(
             records["objective"].reshape(shape), force.reshape(*shape, len(labels)),
-            records["rhs_evaluations"].reshape(shape),
+            evaluations.reshape(shape), work.reshape(shape),
         )  # fmt: skip
 
     def payloads(self) -> list[dict[str, Any]]:
