@@ -159,6 +159,7 @@ def test_an_effect_whose_absence_costs_more_stays_on():
     found = followed(lambda off: 0.001 * len(off), 2, saves=[-0.5, 0.2])
     assert found.recommended == (1,)
     assert found.book.verdict((0,)) is Verdict.WITHIN
+    assert followed(lambda off: 0.001 * len(off), 1, saves=[-0.5]).recommended == ()
 
 
 def test_effects_that_are_one_another_s_substitute_stay_on():

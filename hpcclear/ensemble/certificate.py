@@ -296,17 +296,10 @@ def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | N
 
 
 def _expected_work(book: Book, chosen: Variant) -> tuple[bool, float]:
-    """Whether implicit steps are left, and the work as if each effect saved by itself what it saves alone.
-
-    What is dearer alone counts as that, unless it is one of those without which there are no implicit steps any more.
-    """
-    implicit = book.plan.implicit
-    left, work = implicit(chosen), 1.0
-    for k in chosen:
-        own = book.work((k,))
-        freed = not left and implicit(tuple(other for other in chosen if other != k))
-        work *= own if own > MORE_WORK and not freed else min(own, LEAST_SAVING)
-    return left, work
+    """Whether implicit steps are left, and the work as if each effect saved by itself what it saves alone."""
+    alone = [book.work((k,)) for k in chosen]
+    each = [one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]
+    return book.plan.implicit(chosen), float(np.prod(each))
 
 
 def _may_pass(book: Book, chosen: Variant) -> bool:
