@@ -16,7 +16,7 @@ from margins import at_least, fewest
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.outcome import OUTCOME, Flag
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
@@ -28,7 +28,7 @@ from hpcclear.ensemble.certificate import (
     certificate,
     interaction,
 )
-from hpcclear.ensemble.trial import Drawn, Trial
+from hpcclear.ensemble.trial import IMPLICIT, Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import effects_figure
 from hpcclear.report.figures.effects import saving, seconds_of, statement, statements
@@ -38,10 +38,10 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
-from hpcclear.scene.switches import Off, switches
+from hpcclear.scene.switches import Off, mean_of, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
-from hpcclear.study.extent import certificate_samples, samples_of
+from hpcclear.study.extent import certificate_extent, certificate_samples, samples_of
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
@@ -102,18 +102,37 @@ def test_pairs_that_fail_leave_a_change_unknown():
 # ---- the procedure ---------------------------------------------------------------------------------
 
 
-def followed(change, effects, tolerance=0.01, noise=0.0, most=256, saves=None) -> Certificate:
-    """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k]."""
+def explicit(off):
+    """No variant calls for implicit steps."""
+    return False
+
+
+def followed(
+    change,
+    effects,
+    tolerance=0.01,
+    noise=0.0,
+    most=256,
+    saves=None,
+    implicit=explicit,
+    budget=math.inf,
+    works=None,
+) -> Certificate:
+    """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k], or
+    `works` tells what a sample takes."""
     saves = saves or [0.3] * effects
-    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, lambda off: 1.0)
+    works = works or (lambda off: np.prod([1.0 - saves[k] for k in off]))
+    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, implicit, budget)
 
     def seen(one):
         rows = np.arange(one.first, one.last)
         design = 1.0 + 0.5 * np.sin(1.0 + rows)[:, None] * np.ones((1, 4))
         rng = np.random.default_rng([*one.off, 99, one.first])
         f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
-        work = 1000.0 * np.prod([1.0 - saves[k] for k in one.off])
-        return Seen(f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)))
+        work = 1000.0 * works(one.off)
+        return Seen(
+            f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)), np.full(f.shape, work)
+        )
 
     return answered(certificate(plan), lambda wanted: [seen(one) for one in wanted])
 
@@ -136,6 +155,7 @@ def test_an_effect_whose_absence_costs_more_stays_on():
     found = followed(lambda off: 0.001 * len(off), 2, saves=[-0.5, 0.2])
     assert found.recommended == (1,)
     assert found.book.verdict((0,)) is Verdict.WITHIN
+    assert followed(lambda off: 0.001 * len(off), 1, saves=[-0.5]).recommended == ()
 
 
 def test_effects_that_are_one_another_s_substitute_stay_on():
@@ -162,15 +182,49 @@ def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not()
 
 
 def test_the_cheapest_set_that_is_impossible_is_not_asked_for():
-    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), lambda off: 1.0)
+    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), explicit)
 
     def told(wanted):
         assert all(one.off != (0, 1) for one in wanted)
         ones = [np.ones((one.last - one.first, 4)) for one in wanted]
-        return [Seen(x, np.ones((*x.shape, 1)), x.astype(int)) for x in ones]
+        return [Seen(x, np.ones((*x.shape, 1)), x.astype(int), x) for x in ones]
 
     found = answered(certificate(plan), told)
     assert found.recommended == (0,)
+
+
+def test_what_calls_for_implicit_steps_goes_together():
+    """Either film alone is dearer than both, since the dry joint strikes; without both steps are explicit and cheap."""
+    work = {(): 1.0, (0,): 2.0, (1,): 1.5, (2,): 0.9}
+
+    def saved(off):
+        return work.get(off, 0.05 if {0, 1} <= set(off) else 2.0)
+
+    found = followed(
+        lambda off: 0.002 * len(off), 3, works=saved, implicit=lambda off: not {0, 1} <= set(off)
+    )
+    assert found.recommended == (0, 1, 2)
+    assert found.variants == ((), (0,), (1,), (2,), (0, 1, 2))  # none before it, none after
+
+
+def test_a_set_that_turns_out_dearer_is_not_recommended():
+    work = {(): 1.0, (0,): 0.8, (1,): 0.9, (0, 1): 3.0}
+    found = followed(lambda off: 0.001 * len(off), 2, works=work.get)
+    assert found.book.verdict((0, 1)) is Verdict.WITHIN
+    assert found.recommended == (0,)
+
+
+def test_what_is_told_soon_leaves_its_share_to_what_is_not():
+    def told(budget):
+        found = followed(lambda off: 0.5 if off == (0,) else 0.0, 3, noise=0.12, budget=budget)
+        return found, [found.book.replicates((k,)) for k in range(3)]
+
+    found, (needed, *others) = told(450.0)
+    assert needed == 16
+    assert others == [64, 64]
+    assert found.book.spent() <= 450.0
+    assert told(math.inf)[1] == [16, 256, 256]
+    assert told(1.0)[1] == [16, 16, 16]  # first looks are always taken
 
 
 # ---- scenes with effects off -----------------------------------------------------------------------
@@ -200,6 +254,135 @@ def test_every_effect_of_a_slider_crank_is_found_and_its_entries_go():
             "joints", "drive", "effects", "study",
         }, name  # fmt: skip
         assert load_scene(parse(one.to_toml(), name)) == one
+
+
+BRISTLES = '{law="lugre", coefficient=0.1, static_coefficient=0.15, stribeck_speed=0.001, bristle_stiffness=1e5}'
+FILM = '{viscosity=0.01, length=%s, model="finite"}'
+STROKE = (
+    "[[0.0, 8.0], [1.5707963267948966, 0.0], [3.141592653589793, 0.0], [4.71238898038469, 4.0]]"
+)
+
+
+def rich(*settings):
+    """The paper's mechanism with oil in one joint, bristles, a rod in four modes, tables."""
+    return load_scene(
+        SCENE,
+        [f"joints.crank_rod.film={FILM % 0.02}", f"effects.friction={BRISTLES}", f"effects.slider_load={STROKE}",
+         "joints.rod_slider.clearance=1e-4", "mechanism.rod.bending={stiffness=800.0, modes=4, damping=0.01}",
+         *settings],
+    )  # fmt: skip
+
+
+def test_cheaper_models_of_an_effect_are_tried_besides_its_absence():
+    scene = rich()
+    found = {one.name: one for one in switches(scene)}
+    assert list(found) == [
+        "play in crank_rod", "play in rod_slider", "oil film in crank_rod", "finite length of the film in crank_rod",
+        "friction in joints", "sticking in joints", "contact damping", "bending of rod", "bending of rod beyond 2 modes",
+        "bending of rod beyond one mode", "slider load", "variation of slider load",
+    ]  # fmt: skip
+    off = {name: Off(scene, [one]).scene for name, one in found.items()}
+    assert off["oil film in crank_rod"].films() == {}
+    (film,) = off["finite length of the film in crank_rod"].films().values()
+    assert film == scene.films()["crank_rod"].model_copy(update={"model": "short"})
+    sliding = off["sticking in joints"].effects.friction
+    assert (sliding.law, sliding.coefficient) == ("coulomb", 0.1)
+    assert sliding.ramp_speed == pytest.approx(
+        0.1 / 50.0
+    )  # not as steep as Stribeck's speed would make it
+    assert not off["bending of rod"].bending()
+    assert off["bending of rod beyond 2 modes"].modes == 2
+    assert off["bending of rod beyond one mode"].modes == 1
+    assert off["variation of slider load"].effects.slider_load == pytest.approx(3.0)
+    wide = rich(f"joints.crank_rod.film={FILM % 0.08}")  # twice as long as its diameter
+    closed = next(one for one in switches(wide) if one.name.startswith("finite"))
+    assert Off(wide, [closed]).scene.films()["crank_rod"].model == "long"
+
+
+def test_numbers_of_a_cheaper_model_stand_where_they_stood():
+    scene = rich()
+    found = {one.name: one for one in switches(scene)}
+    off = Off(scene, [found["sticking in joints"], found["finite length of the film in crank_rod"]])
+    kept = ("effects.friction.coefficient", "joints.crank_rod.film.viscosity")
+    assert off.paths((*kept, "effects.friction.bristle_stiffness")) == kept
+
+
+def test_two_models_of_one_effect_are_no_set():
+    trial = Trial(rich())
+    place = {one.name: k for k, one in enumerate(trial.switches)}
+    for names in (
+        ("oil film in crank_rod", "finite length of the film in crank_rod"),
+        ("play in crank_rod", "oil film in crank_rod"),
+        ("friction in joints", "sticking in joints"),
+        ("bending of rod", "bending of rod beyond one mode"),
+        ("slider load", "variation of slider load"),
+    ):
+        assert not trial.possible(tuple(sorted(place[name] for name in names))), names
+    assert trial.possible((place["play in rod_slider"], place["oil film in crank_rod"]))
+
+
+def test_ramps_that_call_for_implicit_steps_are_tried_wider():
+    steep = {
+        '{law="coulomb", coefficient=0.1, ramp_speed=1e-4}': lambda f: f.ramp_speed,
+        '{law="ambrosio", coefficient=0.1, speeds=[1e-5, 1e-4]}': lambda f: f.speeds[1],
+    }
+    for law, speed in steep.items():
+        scene = load_scene(SCENE, [f"effects.friction={law}"])
+        trial = Trial(scene)
+        place = [one.name for one in trial.switches].index("steepness of friction")
+        wider = trial.variant((place,)).scene.effects.friction
+        assert speed(wider) == pytest.approx(0.002)
+        assert wider.coefficient == 0.1
+        assert trial.implicit(())
+        assert not trial.implicit((place,))
+    assert wider.speeds[0] == pytest.approx(0.0002)
+    gentle = load_scene(
+        SCENE, ['effects.friction={law="coulomb", coefficient=0.1, ramp_speed=0.01}']
+    )
+    assert "steepness of friction" not in [one.name for one in switches(gentle)]
+
+
+def test_waves_and_wear_of_joints_are_effects_unless_lives_are_followed():
+    worn = "joints.crank_rod.wear={length=0.02, bearing={coefficient=1e-15}}"
+    shape = "joints.rod_slider.out_of_round={bearing={cosine_2=1e-5}}"
+    play = "joints.rod_slider.clearance=1e-4"
+    scene = load_scene(SCENE, [worn, play, shape])
+    found = {one.name: one for one in switches(scene)}
+    assert not Off(scene, [found["wear of crank_rod"]]).scene.worn_joints()
+    assert not any(Off(scene, [found["waves around rod_slider"]]).scene.waves().values())
+    lives = load_scene(SCENE, [worn, play, shape, "wear={cycles=1e6}"])
+    assert {one.name for one in switches(lives)} == set(found) - {"wear of crank_rod"}
+
+
+def test_tables_of_a_linkage_and_of_a_torque_are_tried_as_their_means():
+    scene = load_scene(JOBS / "linkages" / "four_stroke.toml")
+    gas = next(one for one in switches(scene) if one.name == "variation of gas")
+    (load,) = (one for one in Off(scene, [gas]).scene.mechanism.loads if one.name == "gas")
+    (table,) = (one.size for one in scene.mechanism.loads if one.name == "gas")
+    assert load.size == pytest.approx(mean_of(table, 2))
+    free = load_scene(
+        SCENE, [f'drive={{kind="torque", torque={STROKE}, initial_speed="3000 rpm"}}']
+    )
+    torque = next(one for one in switches(free) if one.name == "variation of torque")
+    assert Off(free, [torque]).scene.drive.torque == pytest.approx(3.0)
+    assert mean_of(((0.0, 6.0), (2.0 * math.pi, 0.0)), 2) == pytest.approx(
+        3.0
+    )  # and back in the second turn
+
+
+def test_an_evaluation_in_implicit_steps_weighs_more():
+    trial = Trial(rich())
+    records = np.zeros(4, OUTCOME)
+    records["rhs_evaluations"] = 600
+    plain = trial.seen(Asked((), 0, 1), records).work
+    records["flags"][1:] = int(Flag.STIFF | Flag.LATCHED)
+    weighed = trial.seen(Asked((), 0, 1), records)
+    np.testing.assert_array_equal(weighed.work / plain, [[1.0, *[IMPLICIT] * 3]])
+    np.testing.assert_array_equal(weighed.evaluations, 600)
+    rigid = [one.name for one in trial.switches].index("bending of rod")
+    assert (
+        trial.seen(Asked((rigid,), 0, 1), records).work[0, 0] / plain[0, 0] == 7 / 11
+    )  # six coordinates, ten
 
 
 def test_without_any_play_friction_in_it_goes_too():
@@ -330,6 +513,8 @@ def test_a_certificate_takes_a_twentieth_of_its_study():
     assert samples >= 128
     asked = scene.with_({"study.certificate": {"samples": 256}})
     assert samples_of(asked) == {**samples_of(scene), "effects": 256 * (effects + 2)}
+    assert certificate_extent(scene) == (4096, samples * (effects + 2))
+    assert certificate_extent(scene, 256) == (256, math.inf)
     assert certificate_samples(asked) == samples
 
 

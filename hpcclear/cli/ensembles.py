@@ -210,18 +210,19 @@ def effects(
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted
-        from hpcclear.study.extent import certificate_samples
+        from hpcclear.study.extent import certificate_extent
 
         allowed = tolerance_of(tolerance)
         scene = written.scene()
         if reduced is not None:
             check_free(reduced)
+        most, budget = certificate_extent(scene, samples)
         found = run_effects(
             scene,
             place_of(output or Path(f"{written.file.stem}-effects.nc")),
             ranks,
             how.options(),
-            Wanted(allowed, certificate_samples(scene) if samples is None else samples, forces),
+            Wanted(allowed, most, budget, forces),
         )
         code = describe(found, scene, written.file)
         if reduced is not None:

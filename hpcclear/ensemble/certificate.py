@@ -6,6 +6,9 @@ replicates of the points; it is sent what came of them, and returns what it foun
 Singly at first: replicates double until each effect's change is surely within the tolerance, surely beyond it, or cannot be
 told. What is within it singly is then left out together, the cheapest set first, and only a set whose own change is within
 the tolerance is recommended. Where a set fails, pairs tell which of its effects are more together than alone.
+
+What an effect saves depends on the others: a film saves nothing while another one calls for implicit steps. So sets without
+any come first.
 """
 
 import itertools
@@ -30,7 +33,7 @@ Variant = tuple[int, ...]
 FIRST = 16
 """Replicates that are looked at first."""
 
-MOST_TOGETHER = 10
+MOST_TOGETHER = 12
 """Effects that sets are made of at most: those that save the most."""
 
 TRIES = 8
@@ -44,6 +47,12 @@ LEAST_SAVING = 0.99
 
 MORE_WORK = 1.02
 """Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
+
+MUCH_LESS = 0.9
+"""Work of a set, over that of another that is known to pass, below which it is recommended in its place."""
+
+SINGLY = 0.6
+"""Of the budget that single effects may take; the rest is for sets."""
 
 
 class Verdict(IntEnum):
@@ -64,11 +73,12 @@ class Asked(NamedTuple):
 
 class Seen(NamedTuple):
     """What came of it: objective (r, s); peak contact force (r, s, joints) by the whole scene's joints, NaN where there is
-    none; evaluations (r, s)."""
+    none; evaluations (r, s), and their work (r, s), which goes by the size of the motion and the kind of step as well."""
 
     objective: Array
     force: Array
     evaluations: Integers
+    work: Array
 
 
 @dataclass(frozen=True)
@@ -88,8 +98,10 @@ class Plan:
     """Whether peak forces count."""
     possible: Callable[[Variant], bool]
     """Whether such effects can be off together."""
-    size: Callable[[Variant], float]
-    """How much one evaluation of the motion of a variant is, relative."""
+    implicit: Callable[[Variant], bool]
+    """Whether a variant calls for implicit steps, which cost far more."""
+    budget: float = np.inf
+    """Replicates of the whole scene that all may come to, by work; first looks are always taken."""
 
 
 class Changes(NamedTuple):
@@ -125,8 +137,7 @@ class Book:
 
     def all(self, off: Variant) -> Seen:
         """All that was seen of a variant."""
-        objective, force, evaluations = zip(*self.seen[off], strict=True)
-        return Seen(np.concatenate(objective), np.concatenate(force), np.concatenate(evaluations))
+        return Seen(*(np.concatenate(parts) for parts in zip(*self.seen[off], strict=True)))
 
     def changes(self, off: Variant) -> Changes:
         """By how much a variant differs from the whole scene, over the replicates of both."""
@@ -152,11 +163,12 @@ class Book:
         return judged(counted, self.plan.tolerance)
 
     def work(self, off: Variant) -> float:
-        """Mean work of a sample, over that of the whole scene: evaluations by the size of one."""
-        return self._work(off) / (self._work(()) or 1.0)
+        """Mean work of a sample, over that of the whole scene."""
+        return float(self.all(off).work.mean()) / (float(self.all(()).work.mean()) or 1.0)
 
-    def _work(self, off: Variant) -> float:
-        return float(self.all(off).evaluations.mean()) * self.plan.size(off)
+    def spent(self) -> float:
+        """Replicates of the whole scene that all so far come to, by work."""
+        return sum(self.replicates(one) * self.work(one) for one in self.seen)
 
 
 def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
@@ -182,16 +194,16 @@ def certificate(plan: Plan) -> Asking:
     """The procedure; see the module."""
     book = Book(plan)
     singles = [(k,) for k in range(plan.effects) if plan.possible((k,))]
-    yield from _told(book, [()])
-    yield from _told(book, singles)
+    yield from _told(book, [()], plan.budget)
+    yield from _told(book, singles, SINGLY * plan.budget)
     good = [one for one in singles if book.verdict(one) is Verdict.WITHIN]
     good = sorted(sorted(good, key=lambda one: (book.work(one), one))[:MOST_TOGETHER])
     recommended = yield from _together(book, [one[0] for one in good])
     return Certificate(tuple(book.seen), recommended, book)
 
 
-def _told(book: Book, variants: Sequence[Variant]) -> Part:
-    """Simulate variants, more and more replicates of those that cannot be told."""
+def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
+    """Simulate variants, more and more replicates of those that cannot be told, as far as a budget goes."""
     count = min(FIRST, book.plan.most)
     pending = [one for one in variants if book.replicates(one) < count]
     while pending:
@@ -205,40 +217,69 @@ def _told(book: Book, variants: Sequence[Variant]) -> Part:
         if count >= book.plan.most:
             return
         count = min(2 * count, book.plan.most)
+        pending = _afforded(book, pending, count, budget)
+
+
+def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> list[Variant]:
+    """Those whose replicates may come to so many within a budget; what saves least is given up first."""
+    kept = sorted(pending, key=lambda one: (book.work(one), one))
+    left = budget - book.spent()
+    while kept:
+        more = [(count - book.replicates(one)) * book.work(one) for one in [(), *kept]]
+        if sum(more) <= left:
+            break
+        kept.pop()
+    return [one for one in pending if one in kept]
 
 
 def _together(book: Book, good: list[int]) -> Generator[list[Asked], list[Seen], Variant]:
     """The cheapest set of effects, each within the tolerance singly, that is so together."""
     failed: list[Variant] = []
-    while len(failed) < TRIES:
+    budget = book.plan.budget
+    while len(failed) < TRIES and (not failed or book.spent() <= budget):
         best = _cheapest(book, good, failed)
         if best is None:
-            return ()
-        yield from _told(book, [best])
-        if book.verdict(best) is Verdict.WITHIN:
-            return best
-        if not failed and len(best) > 2:
+            break
+        yield from _told(book, [best], budget)
+        passes = book.verdict(best) is Verdict.WITHIN
+        if passes and book.work(best) <= MORE_WORK:
+            break
+        if not passes and not failed and len(best) > 2 and book.spent() <= budget:
             pairs = [p for p in itertools.combinations(best, 2) if book.plan.possible(p)]
-            yield from _told(book, pairs[:MOST_PAIRS])
+            yield from _told(book, pairs[:MOST_PAIRS], budget)
         failed.append(best)
-    return min([(k,) for k in good], key=book.work)
+    return _best_known(book)
+
+
+def _best_known(book: Book) -> Variant:
+    """The largest set that passes, unless another one is much cheaper; () where none does."""
+    passed = [
+        one for one in book.seen
+        if one and book.verdict(one) is Verdict.WITHIN and book.work(one) <= MORE_WORK
+    ]  # fmt: skip
+    if not passed:
+        return ()
+    least = min(book.work(one) for one in passed)
+    near = [one for one in passed if book.work(one) * MUCH_LESS <= least]
+    return min(near, key=lambda one: (-len(one), book.work(one), one))
 
 
 def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | None:
     """The set that is expected to be cheapest of those that may pass."""
     sets = [one for k in range(1, len(good) + 1) for one in itertools.combinations(good, k)]
-    for chosen in sorted(sets, key=lambda one: (_expected_work(book, one), -len(one), one)):
-        if any(set(one) <= set(chosen) for one in failed) or not _may_pass(book, chosen):
-            continue
+    sets = [one for one in sets if not any(set(f) <= set(one) for f in failed)]
+    sets = [one for one in sets if _may_pass(book, one)]
+    for chosen in sorted(sets, key=lambda one: (*_expected_work(book, one), -len(one), one)):
         if book.plan.possible(chosen):
             return chosen
     return None
 
 
-def _expected_work(book: Book, chosen: Variant) -> float:
-    """As if each effect saved by itself what it saves alone."""
+def _expected_work(book: Book, chosen: Variant) -> tuple[bool, float]:
+    """Whether implicit steps are left, and the work as if each effect saved by itself what it saves alone."""
     alone = [book.work((k,)) for k in chosen]
-    return float(np.prod([one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]))
+    each = [one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]
+    return book.plan.implicit(chosen), float(np.prod(each))
 
 
 def _may_pass(book: Book, chosen: Variant) -> bool:

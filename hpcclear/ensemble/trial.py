@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ import numpy as np
 from hpcclear.base.arrays import Records
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.problem import coordinate_count, problem_of
+from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.ensemble.certificate import Asked, Certificate, Plan, Seen, Variant, certificate
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.results.names import ALL_ON
@@ -38,6 +40,9 @@ dearer without an effect (contacts without damping bounce on) ends as failed, an
 
 EVALUATIONS = 6
 """Of an explicit step."""
+
+IMPLICIT = 20.0
+"""What an evaluation counts as where a sample took implicit steps, which lanes take one at a time and solve for."""
 
 Simulate = Callable[[Scene, Points], Records]
 
@@ -99,6 +104,8 @@ class Wanted(NamedTuple):
     """Relative change that is allowed."""
     samples: int
     """Of each variant at most."""
+    budget: float = np.inf
+    """Samples of the whole scene that all may come to, by their work."""
     forces: bool = False
     """Whether peak contact forces must stay within the tolerance as well."""
 
@@ -140,6 +147,8 @@ class Trial:
                 "See hpcclear check for what is on",
             )  # fmt: skip
         self._variants: dict[Variant, Off | None] = {}
+        self._bare = scene.with_({"study": None})  # quick to change
+        self._implicit: dict[Variant, bool] = {}
         self._limits: dict[str, int] = {}
 
     def names(self, off: Variant) -> tuple[str, ...]:
@@ -149,8 +158,12 @@ class Trial:
     def possible(self, off: Variant) -> bool:
         """Whether such effects can be off together."""
         if off not in self._variants:
+            chosen = [self.switches[k] for k in off]
+            if any(one.excludes(other) for one, other in combinations(chosen, 2)):
+                self._variants[off] = None  # two models of one effect
+                return False
             try:
-                made = Off(self.scene, [self.switches[k] for k in off])
+                made = Off(self.scene, chosen)
                 problem_of(made.scene)
                 self._variants[off] = made
             except InputError:
@@ -164,6 +177,19 @@ class Trial:
         made = self._variants[off]
         assert made is not None
         return made
+
+    def implicit(self, off: Variant) -> bool:
+        """Whether a variant calls for implicit steps."""
+        if off and not self.implicit(()):
+            return False  # without an effect no motion gets stiff
+        kept = tuple(k for k in off if self.switches[k].stiff)
+        if kept not in self._implicit:
+            try:
+                made = Off(self._bare, [self.switches[k] for k in kept])
+                self._implicit[kept] = implicit_method(made.scene) != "never"
+            except InputError:
+                self._implicit[kept] = True
+        return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
         """What is asked of the certificate.
@@ -180,7 +206,7 @@ class Trial:
         most = max(wanted.samples // self.drawn.size, 4)
         return Plan(
             len(self.switches), wanted.tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
-            wanted.forces, self.possible, lambda off: 1.0 + coordinate_count(self.variant(off).scene),
+            wanted.forces, self.possible, self.implicit, wanted.budget / self.drawn.size,
         )  # fmt: skip
 
     def points(self, asked: Asked) -> Points:
@@ -216,9 +242,12 @@ class Trial:
             place = scene.joint_labels.index(name)
             force[:, labels.index(name)] = records["peak_contact_force"][:, place]
         shape = (asked.last - asked.first, self.drawn.size)
+        evaluations = records["rhs_evaluations"]
+        weight = np.where(records["flags"] & int(Flag.STIFF), IMPLICIT, 1.0)
+        work = evaluations * weight * (1.0 + coordinate_count(scene))
         return Seen(
             records["objective"].reshape(shape), force.reshape(*shape, len(labels)),
-            records["rhs_evaluations"].reshape(shape),
+            evaluations.reshape(shape), work.reshape(shape),
         )  # fmt: skip
 
     def payloads(self) -> list[dict[str, Any]]:

@@ -1,17 +1,32 @@
-"""Effects that a scene could do without: what each is, and the scene with some of them off."""
+"""Effects that a scene could do without: what each is, and the scene with some of them off.
+
+An effect that has a cheaper model is there more than once: as a whole, and as what its model has beyond the cheaper one.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from hpcclear.base.errors import InputError
 from hpcclear.scene.driving import PlanarTorque, speed_entry
+from hpcclear.scene.fields import Curve
 from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import validated
+
+GENTLE_RAMP = 50.0
+"""Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""
+
+SHORT_TO = 1.5
+"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
+
+FEW_MODES = (2, 1)
+"""Modes that a bar which bends in more of them is tried with."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +34,7 @@ class Switch:
     """An effect that is on and may be switched off."""
 
     name: str
-    """What it is, in words."""
+    """What goes with it, in words."""
     changes: Mapping[str, Any]
     """What switches it off: entries to replace; None removes one."""
     moved: Mapping[str, str] = field(default_factory=dict)
@@ -29,8 +44,25 @@ class Switch:
 
     def path(self, path: str) -> str | None:
         """Where a number of the scene stands with the effect off; None if nowhere."""
-        gone = any(path == key or path.startswith(f"{key}.") for key in self.changes)
+        gone = any(_holds(key, path) for key in self.changes)
         return self.moved.get(path) if gone else path
+
+    @property
+    def stiff(self) -> bool:
+        """Whether a motion may be stiff for it: it is of a joint, of friction or contact there, or of a bar that bends."""
+        parts = ("joints.", "mechanism.joints.", "effects.friction", "effects.contact")
+        return any(key.startswith(parts) or ".bending" in key for key in self.changes)
+
+    def excludes(self, other: "Switch") -> bool:
+        """Whether both change the same entries, as two models of one effect do, or a joint's play and its film."""
+        return any(
+            _holds(key, own) or _holds(own, key) for key in self.changes for own in other.changes
+        )
+
+
+def _holds(key: str, path: str) -> bool:
+    """Whether an entry is, or is in, what stands at a key."""
+    return path == key or path.startswith(f"{key}.")
 
 
 def switches(scene: Scene) -> tuple[Switch, ...]:
@@ -39,7 +71,8 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
     Play in a joint that ``numerics.objective_joints`` names is none of them: the study asks about it.
     """
     return (
-        *_plays(scene), *_films(scene), *_laws(scene), *_bendings(scene), *_outside(scene), *_drives(scene)
+        *_plays(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
+        *_bendings(scene), *_outside(scene), *_drives(scene),
     )  # fmt: skip
 
 
@@ -56,23 +89,59 @@ def _plays(scene: Scene) -> Iterator[Switch]:
 
 
 def _films(scene: Scene) -> Iterator[Switch]:
-    for label in scene.films():
-        yield Switch(f"oil film in {label}", {f"{scene.joint_key(label)}.film": None})
+    for label, film in scene.films().items():
+        key = f"{scene.joint_key(label)}.film"
+        yield Switch(f"oil film in {label}", {key: None})
+        if film.model == "finite":
+            slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
+            closed = "short" if slender < SHORT_TO else "long"
+            yield Switch(f"finite length of the film in {label}", {f"{key}.model": closed})
+
+
+def _surfaces(scene: Scene) -> Iterator[Switch]:
+    """Shapes that are not round; and wear, which changes no motion and still costs, unless lives are followed."""
+    for label in scene.clearance_joints():
+        joint, key = scene.clearance_joint(label), scene.joint_key(label)
+        if joint.out_of_round is not None:
+            yield Switch(f"waves around {label}", {f"{key}.out_of_round": None})
+        if joint.wear is not None and scene.wear is None:
+            yield Switch(f"wear of {label}", {f"{key}.wear": None})
 
 
 def _bendings(scene: Scene) -> Iterator[Switch]:
-    for key in scene.bending():
-        yield Switch(f"bending of {key.rpartition('.')[2]}", {f"{key}.bending": None})
+    for key, table in scene.bending().items():
+        name = key.rpartition(".")[2]
+        yield Switch(f"bending of {name}", {f"{key}.bending": None})
+        for modes in FEW_MODES:
+            if modes < table.modes:
+                few = "one mode" if modes == 1 else f"{modes} modes"
+                yield Switch(f"bending of {name} beyond {few}", {f"{key}.bending.modes": modes})
 
 
-def _laws(scene: Scene) -> Iterator[Switch]:
-    """What the contact law does beside its elastic force."""
-    effects = scene.effects
-    if not scene.clearance_joints():
+def _frictions(scene: Scene) -> Iterator[Switch]:
+    """Friction in joints, and what a law has beyond Coulomb's with a ramp that explicit steps follow."""
+    law, key = scene.effects.friction, "effects.friction"
+    if not scene.clearance_joints() or law.law == "none":
         return
-    if effects.friction.law != "none":
-        yield Switch("friction in joints", {"effects.friction": {"law": "none"}})
-    law = effects.contact
+    yield Switch("friction in joints", {key: {"law": "none"}})
+    assert law.coefficient is not None  # by validation
+    gentle = law.coefficient / GENTLE_RAMP
+    if law.law == "lugre":
+        assert law.stribeck_speed is not None
+        ramp = max(law.stribeck_speed, gentle)
+        sliding = {"law": "coulomb", "coefficient": law.coefficient, "ramp_speed": ramp}
+        kept = f"{key}.coefficient"
+        yield Switch("sticking in joints", {key: sliding}, {kept: kept})
+    if law.ramp_speed is not None and law.ramp_speed < 0.5 * gentle:
+        yield Switch("steepness of friction", {f"{key}.ramp_speed": gentle})
+    if law.speeds is not None and law.speeds[1] < 0.5 * gentle:
+        wider = [law.speeds[0] / law.speeds[1] * gentle, gentle]
+        yield Switch("steepness of friction", {f"{key}.speeds": wider})
+
+
+def _contacts(scene: Scene) -> Iterator[Switch]:
+    """What the contact law does beside its elastic force."""
+    law = scene.effects.contact if scene.clearance_joints() else None
     if law is not None and (law.damping or (law.restitution is not None and law.restitution < 1)):
         floor = "effects.contact.minimum_impact_speed"
         elastic = {"law": "hertz", "minimum_impact_speed": law.minimum_impact_speed}
@@ -85,6 +154,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
+        yield from _mean("slider load", "effects.slider_load", effects.slider_load, 1)
     if effects.guide_friction is not None:
         yield Switch("guide friction", {"effects.guide_friction": None})
     if isinstance(mechanism, Planar):
@@ -93,7 +163,24 @@ def _outside(scene: Scene) -> Iterator[Switch]:
                 key = f"mechanism.joints.{joint.name}.friction"
                 yield Switch(f"guide friction in {joint.name}", {key: None})
         for load in mechanism.loads:
-            yield Switch(f"{load.kind} {load.name}", {f"mechanism.loads.{load.name}": None})
+            key = f"mechanism.loads.{load.name}"
+            yield Switch(f"{load.kind} {load.name}", {key: None})
+            for entry in ("size", "torque"):
+                curve = getattr(load, entry, None)
+                yield from _mean(load.name, f"{key}.{entry}", curve, turns_of(mechanism))
+
+
+def _mean(name: str, key: str, curve: Curve | None, turns: int) -> Iterator[Switch]:
+    """Of a load that a table over so many turns tells: its mean in place of it."""
+    if isinstance(curve, tuple):
+        yield Switch(f"variation of {name}", {key: mean_of(curve, turns)})
+
+
+def mean_of(curve: tuple[tuple[float, float], ...], turns: int = 1) -> float:
+    """Mean of a table ((angle, value), ...) that repeats after so many turns, straight between its rows."""
+    angle, value = np.array(curve).T
+    period = 2.0 * np.pi * turns
+    return float(np.trapezoid([*value, value[0]], [*angle, angle[0] + period]) / period)
 
 
 def _drives(scene: Scene) -> Iterator[Switch]:
@@ -112,6 +199,8 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
+        turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+        yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
 class Off:

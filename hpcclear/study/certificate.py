@@ -12,7 +12,7 @@ from hpcclear.report.figures.effects import statements
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.study.extent import certificate_samples
+from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import Result, StudyRun
 
 
@@ -27,7 +27,7 @@ def certify(run: StudyRun) -> None:
     asked = run.study.certificate
     assert asked is not None
     trial = Trial(run.scene)
-    samples = certificate_samples(run.scene) if asked.samples is None else asked.samples
+    samples, budget = certificate_extent(run.scene, asked.samples)
     count = 0
 
     def simulate(scene: Scene, points: Points) -> Records:
@@ -38,7 +38,8 @@ def certify(run: StudyRun) -> None:
 
     run.announce("effects")
     with run.ranks.stage("effects"):
-        found = trial.certify(trial.plan(Wanted(asked.tolerance, samples, asked.forces)), simulate)
+        plan = trial.plan(Wanted(asked.tolerance, samples, budget, asked.forces))
+        found = trial.certify(plan, simulate)
     content = effects_dataset(trial, found, {})
     run.write(content, "effects.nc")
     with run.ranks.stage("effects: cost"):
@@ -48,7 +49,7 @@ def certify(run: StudyRun) -> None:
         run.tell(text)
 
 
-_KEPT = ("objective", "peak_contact_force", "rhs_evaluations", "steady_revolutions")
+_KEPT = ("objective", "peak_contact_force", "rhs_evaluations", "steady_revolutions", "flags")
 
 
 def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:

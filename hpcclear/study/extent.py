@@ -1,5 +1,7 @@
 """How much a study simulates, from what each of its stages says of itself."""
 
+import math
+
 from hpcclear.ensemble import effects
 from hpcclear.scene import Scene
 from hpcclear.scene.switches import switches
@@ -74,8 +76,18 @@ CERTIFICATE_SHARE = 0.05
 """Of a study's samples that its certificate of effects may take."""
 
 
+def certificate_extent(scene: Scene, samples: int | None = None) -> tuple[int, float]:
+    """Samples of each variant at most, and of the whole scene that all come to by their work (infinite for none at most).
+
+    Where `samples` names no number, effects that are told soon leave what they do not need to those that are not.
+    """
+    if samples is not None or scene.study is None:
+        return effects.SAMPLES if samples is None else samples, math.inf
+    return effects.SAMPLES, float(certificate_samples(scene) * _variants(scene))
+
+
 def certificate_samples(scene: Scene) -> int:
-    """Samples of a variant at most, for a certificate of effects that takes a small share of the study it serves.
+    """Samples of a variant, for a certificate of effects that takes a small share of the study it serves.
 
     Counted are the whole scene, each effect by itself and one set of them; never fewer than a first look needs.
     """
