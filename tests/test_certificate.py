@@ -232,6 +232,11 @@ def test_of_two_models_alike_in_cost_the_one_with_less_in_it_is_taken():
     assert (1, 2) not in found.variants
 
 
+def test_what_takes_no_work_at_all_is_cheapest():
+    found = followed(lambda off: 0.006 * len(off), 2, works=lambda off: 0.0 if off == (1,) else 1.0)
+    assert found.recommended == (1,)
+
+
 def test_what_fails_is_not_simulated_on():
     found = followed(lambda off: np.nan if off == (0,) else 0.0, 2)
     assert found.book.verdict((0,)) is Verdict.UNTOLD

@@ -48,6 +48,9 @@ LEAST_SAVING = 0.99
 MORE_WORK = 1.02
 """Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
 
+LEAST_WORK = 1e-3
+"""What work counts as at least: a mechanism without play is known in closed form and takes none."""
+
 MUCH_LESS = 0.9
 """Work of a set over that of another below which it is cheaper: work is not known better. Of sets alike the one with more
 effects is tried and recommended, then the one whose effects come first: an effect stands before what it has beyond a model."""
@@ -305,7 +308,8 @@ def _expected_work(book: Book, chosen: Variant) -> tuple[bool, int]:
     """Whether implicit steps are left, and the work in steps of `MUCH_LESS`, as if each effect saved what it saves alone."""
     alone = [book.work((k,)) for k in chosen]
     each = [one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]
-    return book.plan.implicit(chosen), round(float(np.log(each).sum() / -np.log(MUCH_LESS)))
+    total = np.log(np.maximum(each, LEAST_WORK)).sum()
+    return book.plan.implicit(chosen), round(float(total / -np.log(MUCH_LESS)))
 
 
 def _may_pass(book: Book, chosen: Variant) -> bool:
