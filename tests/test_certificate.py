@@ -117,12 +117,13 @@ def followed(
     implicit=explicit,
     budget=math.inf,
     works=None,
+    possible=lambda off: True,
 ) -> Certificate:
     """A certificate of a formula: f is 1 + change(off) times a design, with scatter; effect k saves the share saves[k], or
     `works` tells what a sample takes."""
     saves = saves or [0.3] * effects
     works = works or (lambda off: np.prod([1.0 - saves[k] for k in off]))
-    plan = Plan(effects, tolerance, 0.99, most, False, False, lambda off: True, implicit, budget)
+    plan = Plan(effects, tolerance, 0.99, most, False, False, possible, implicit, budget)
 
     def seen(one):
         rows = np.arange(one.first, one.last)
@@ -212,6 +213,28 @@ def test_a_set_that_turns_out_dearer_is_not_recommended():
     found = followed(lambda off: 0.001 * len(off), 2, works=work.get)
     assert found.book.verdict((0, 1)) is Verdict.WITHIN
     assert found.recommended == (0,)
+
+
+def test_of_two_models_alike_in_cost_the_one_with_less_in_it_is_taken():
+    """0 is an effect, 1 what it has beyond a cheaper model, whose evaluations happen to be a few per cent fewer."""
+    work = {(0,): 0.5, (1,): 0.48, (2,): 0.9, (0, 2): 0.45, (1, 2): 0.43, (): 1.0}
+    found = followed(
+        lambda off: 0.0, 3, works=lambda off: work[off], possible=lambda off: not {0, 1} <= set(off)
+    )
+    assert found.recommended == (0, 2)
+    assert (1, 2) not in found.variants
+
+
+def test_what_takes_no_work_at_all_is_cheapest():
+    found = followed(lambda off: 0.006 * len(off), 2, works=lambda off: 0.0 if off == (1,) else 1.0)
+    assert found.recommended == (1,)
+
+
+def test_what_fails_is_not_simulated_on():
+    found = followed(lambda off: np.nan if off == (0,) else 0.0, 2)
+    assert found.book.verdict((0,)) is Verdict.UNTOLD
+    assert found.book.replicates((0,)) == 16
+    assert found.recommended == (1,)
 
 
 def test_what_is_told_soon_leaves_its_share_to_what_is_not():
@@ -472,7 +495,7 @@ def test_what_is_far_dearer_without_an_effect_ends_as_failed():
     assert trial.simulated((0,)).numerics.max_steps == 1_000_000  # nothing is known yet
     for off in ((), (0,)):
         trial.seen(Asked(off, 0, 1), records)
-    assert trial.simulated((0,)).numerics.max_steps == 10 * 600 // 6 + 1000
+    assert trial.simulated((0,)).numerics.max_steps == 5 * 600 // 6 + 1000
     assert trial.simulated(()).numerics.max_steps == 1_000_000
     assert (
         trial.variant((0,)).scene.numerics.max_steps == 1_000_000
@@ -480,7 +503,7 @@ def test_what_is_far_dearer_without_an_effect_ends_as_failed():
     aimed = Trial(load_scene(SCENE, ["numerics.target_error=0.01"]))
     records["steady_revolutions"] = 50.0
     aimed.seen(Asked((), 0, 1), records)
-    assert aimed.simulated((0,)).numerics.target_revolutions == 600
+    assert aimed.simulated((0,)).numerics.target_revolutions == 350
 
 
 # ---- points ----------------------------------------------------------------------------------------

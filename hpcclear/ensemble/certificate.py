@@ -48,8 +48,12 @@ LEAST_SAVING = 0.99
 MORE_WORK = 1.02
 """Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
 
+LEAST_WORK = 1e-3
+"""What work counts as at least: a mechanism without play is known in closed form and takes none."""
+
 MUCH_LESS = 0.9
-"""Work of a set, over that of another that is known to pass, below which it is recommended in its place."""
+"""Work of a set over that of another below which it is cheaper: work is not known better. Of sets alike the one with more
+effects is tried and recommended, then the one whose effects come first: an effect stands before what it has beyond a model."""
 
 SINGLY = 0.6
 """Of the budget that single effects may take; the rest is for sets."""
@@ -213,11 +217,16 @@ def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
         ]  # fmt: skip
         for one, seen in zip(asked, (yield asked), strict=True):
             book.seen.setdefault(one.off, []).append(seen)
-        pending = [one for one in pending if one and book.verdict(one) is Verdict.UNTOLD]
+        pending = [one for one in pending if one and _may_be_told(book, one)]
         if count >= book.plan.most:
             return
         count = min(2 * count, book.plan.most)
         pending = _afforded(book, pending, count, budget)
+
+
+def _may_be_told(book: Book, off: Variant) -> bool:
+    """Whether more replicates may tell a change: not where too many have failed."""
+    return book.verdict(off) is Verdict.UNTOLD and bool(np.isfinite(book.changes(off).mean.value))
 
 
 def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> list[Variant]:
@@ -261,7 +270,7 @@ def _best_known(book: Book) -> Variant:
         return ()
     least = min(book.work(one) for one in passed)
     near = [one for one in passed if book.work(one) * MUCH_LESS <= least]
-    return min(near, key=lambda one: (-len(one), book.work(one), one))
+    return min(near, key=lambda one: (-len(one), one))
 
 
 def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | None:
@@ -275,11 +284,12 @@ def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | N
     return None
 
 
-def _expected_work(book: Book, chosen: Variant) -> tuple[bool, float]:
-    """Whether implicit steps are left, and the work as if each effect saved by itself what it saves alone."""
+def _expected_work(book: Book, chosen: Variant) -> tuple[bool, int]:
+    """Whether implicit steps are left, and the work in steps of `MUCH_LESS`, as if each effect saved what it saves alone."""
     alone = [book.work((k,)) for k in chosen]
     each = [one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]
-    return book.plan.implicit(chosen), float(np.prod(each))
+    total = np.log(np.maximum(each, LEAST_WORK)).sum()
+    return book.plan.implicit(chosen), round(float(total / -np.log(MUCH_LESS)))
 
 
 def _may_pass(book: Book, chosen: Variant) -> bool:

@@ -34,7 +34,7 @@ TOGETHER = 4
 VICINITY = 0.01
 """Relative half-width of the clearances about a scene without a study, so that a chaotic motion shows as scatter."""
 
-DEARER = 10
+DEARER = 5
 """Steps, or revolutions to a target error, that a variant may take, times the most that the whole scene took: what is so much
 dearer without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
 
