@@ -402,17 +402,19 @@ def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) 
 # -- what is refused --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("objectives", "key", "reason"),
-    [
-        ('["mean"]', "objectives", "two things or more"),
-        ('["mean", "deviation", "mean"]', "objectives.2", "already"),
-        ('[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]', "objectives.2", "already"),
-        ('["quantile", {statistic="quantile", level=0.95}]', "objectives.1", "already"),
-        ('["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]', "objectives", "more than 5"),
-    ],
-)  # fmt: skip
-def test_too_few_too_many_and_the_same_again(objectives: str, key: str, reason: str) -> None:
+MANY = '["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]'
+REFUSED = {  # what is asked for: the key within the case, and why
+    '["mean"]': ("objectives", "two things or more"),
+    '["mean", "deviation", "mean"]': ("objectives.2", "already"),
+    '[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]': ("objectives.2", "already"),
+    '["quantile", {statistic="quantile", level=0.95}]': ("objectives.1", "already"),
+    MANY: ("objectives", "more than 5"),
+}
+
+
+@pytest.mark.parametrize("objectives", REFUSED)
+def test_too_few_too_many_and_the_same_again(objectives: str) -> None:
+    key, reason = REFUSED[objectives]
     with pytest.raises(InputError) as caught:
         scene_of(f'study.cases={{three={{random=["C"], objectives={objectives}}}}}')
     assert caught.value.key == f"study.cases.three.{key}"

@@ -8,18 +8,10 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.revolutions import objective
+from hpcclear.dynamics.steady import effort as given
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import KICK, kicked, separation
-from hpcclear.dynamics.steady.effort import (
-    SPEED,
-    STEADY,
-    STRICTER,
-    TIGHTEST,
-    Effort,
-    Mean,
-    Sample,
-    Stretch,
-)
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
 from hpcclear.dynamics.views import Outcome, Start
 
 SHARE = 0.1
@@ -76,7 +68,7 @@ def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mea
     """Four copies, revolution by revolution: a regular motion's mean, or the tolerance at which it turned out irregular."""
     sample = effort.sample
     rtol = min((SHARE_LATCHED if sample.latched else SHARE) * target, LOOSEST)
-    strictness = np.array([1.0, 1.0, STRICTER, STRICTER])
+    strictness = np.array([1.0, 1.0, given.STRICTER, given.STRICTER])
     start = kicked(sample.start, sample.scale, range(2))
     start = Start(np.concatenate([start.rows, start.rows]))
     history = _History(apart=[KICK])
@@ -102,7 +94,7 @@ def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mea
         if step == "irregular" or spent:
             return rtol, growth
         if step == "tighten":
-            rtol /= STRICTER
+            rtol /= given.STRICTER
             start = Start(np.concatenate([start.rows[2:], start.rows[2:]]))
             history = _History(apart=[history.apart[-1]])
 
@@ -136,7 +128,7 @@ def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_F
         return "irregular"
     settling = max(seen.settling, _of_speed(sample.speeds(history.outcomes), 0.5 * level, f.mean()))
     settled = settling + kick <= 0.5 * level and (seen.period is not None or revolutions >= 32)
-    if settled and tolerance > level and rtol / STRICTER >= TIGHTEST:
+    if settled and tolerance > level and rtol / given.STRICTER >= given.TIGHTEST:
         return "tighten"
     if not settled and revolutions >= 4 * CHECKPOINTS[-1] and _drifts(history, level):
         return _unsteady(history)
@@ -151,7 +143,7 @@ def _of_speed(speeds: Array | None, level: float, f: float) -> float:
     """How far f still moves with the mean speed of a free crank, m, from speeds (revolutions, copies)."""
     if speeds is None:
         return 0.0
-    return SPEED * f * judging.speed_settling(speeds, level / (SPEED * f))
+    return given.SPEED * f * judging.speed_settling(speeds, level / (given.SPEED * f))
 
 
 def _drifts(history: _History, level: float) -> bool:
@@ -161,7 +153,9 @@ def _drifts(history: _History, level: float) -> bool:
         history.moved.get(n, np.nan) for n in (revolutions // 4, revolutions // 2, revolutions)
     ]
     return bool(
-        moved[2] > 0.5 * level and moved[2] > STEADY * moved[1] and moved[1] > STEADY * moved[0]
+        moved[2] > 0.5 * level
+        and moved[2] > given.STEADY * moved[1]
+        and moved[1] > given.STEADY * moved[0]
     )
 
 

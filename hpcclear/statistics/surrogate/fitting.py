@@ -95,7 +95,7 @@ def _maximise_likelihood(
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = maximise(unit, normalised, start, bounds, restarts, seed, kernel)
+        found = maximise(unit, normalised, start, bounds, restarts, seed, kernel=kernel)
     return asdict(found)
 
 

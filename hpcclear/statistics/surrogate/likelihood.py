@@ -64,6 +64,7 @@ def maximise(
     bounds: Array,
     restarts: int,
     seed: int,
+    *,
     kernel: Kernel = SQUARED_EXPONENTIAL,
 ) -> Fitted:
     """The most likely signal variance, length scales and noise variance of values at points.

@@ -36,33 +36,16 @@ class _Box:
 
 @dataclass(frozen=True)
 class SubintervalSettings:
-    """When a box is accepted, and what is done until it is.
+    """When a box is accepted, and what is done until it is."""
 
-    Attributes
-    ----------
-    cuts : sequence of int, optional
-        Subintervals of each input to begin with (default 1 each: a single model).
-    samples, test_samples : int
-        Training and test points of a box.
-    r2_min, rmae_max : float
-        A box is accepted with R2 at least and RMAE at most this on its test points.
-    max_resamples : int
-        How often a refused box gets `samples` further training points before it is cut.
-    max_depth : int
-        How often a box may be cut in half; a refused box at this depth stays, not accepted.
-    restarts : int
-    kernel : str
-        See `fit_kriging`.
-    """
-
-    cuts: Sequence[int] | None = None
-    samples: int = 200
+    cuts: Sequence[int] | None = None  # subintervals of each input to begin with; 1 each
+    samples: int = 200  # training points of a box
     test_samples: int = 100
-    r2_min: float = 0.99
-    rmae_max: float = 0.3
-    max_resamples: int = 1
-    max_depth: int = 3
-    restarts: int = 3
+    r2_min: float = 0.99  # a box is accepted with at least this on its test points
+    rmae_max: float = 0.3  # and at most this
+    max_resamples: int = 1  # how often a refused box gets `samples` further points before it is cut
+    max_depth: int = 3  # how often it may be cut in half; refused there it stays, not accepted
+    restarts: int = 3  # of `fit_kriging`, as is the kernel
     kernel: Kernel = SQUARED_EXPONENTIAL
 
 

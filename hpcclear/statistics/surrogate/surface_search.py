@@ -8,14 +8,9 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate import response_surface as surfaces
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.response_surface import (
-    ResponseSurface,
-    Sampler,
-    check_bounds,
-    fit_response_surface,
-    latin_hypercube,
-)
+from hpcclear.statistics.surrogate.response_surface import ResponseSurface
 
 
 @dataclass(frozen=True)
@@ -58,27 +53,15 @@ class SurfaceSearch:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """What is tried, in which order, and when it is enough; the defaults follow the paper.
+    """What is tried, in which order, and when it is enough; the defaults follow the paper."""
 
-    Attributes
-    ----------
-    orders : sequence of int
-        Total orders, the preferred one first.
-    n_points, n_test, max_points : int
-        First training sample, test points, and the largest training sample.
-    r2_min, rmae_max : float
-        Targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`.
-    chosen : bool
-        Whether surfaces choose their terms (`fit_response_surface`).
-    """
-
-    orders: Sequence[int] = (3, 2, 4)
-    n_points: int = 45
+    orders: Sequence[int] = (3, 2, 4)  # total orders, the preferred one first
+    n_points: int = 45  # first training sample
     n_test: int = 5
-    max_points: int = 360
-    r2_min: float = 0.9
+    max_points: int = 360  # largest training sample
+    r2_min: float = 0.9  # targets, see `hpcclear.statistics.surrogate.metrics.Accuracy.meets`
     rmae_max: float = 0.5
-    chosen: bool = False
+    chosen: bool = False  # whether surfaces choose their terms (`fit_response_surface`)
 
 
 Search = Generator[Array, Array, SurfaceSearch]
@@ -118,7 +101,7 @@ def search(
     bounds: ArrayLike,
     rng: np.random.Generator,
     settings: SearchSettings,
-    sample: Sampler = latin_hypercube,
+    sample: surfaces.Sampler = surfaces.latin_hypercube,
 ) -> Search:
     """Raise the sample or change the order until a surface passes, or say that none does.
 
@@ -144,7 +127,7 @@ def search(
     InputError
         If no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
-    limits = check_bounds(bounds)
+    limits = surfaces.check_bounds(bounds)
     _check_search(settings)
     orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
     test = sample(settings.n_test, limits, rng)
@@ -159,7 +142,7 @@ def search(
         points, values = np.vstack([points, fresh]), np.append(values, (yield fresh))
         for order in orders:
             try:
-                surface = fit_response_surface(
+                surface = surfaces.fit_response_surface(
                     points, values, limits, order, chosen=settings.chosen
                 )
             except InputError as refusal:
