@@ -256,8 +256,7 @@ def test_who_takes_collocation():
         return problem_of(scene_with(changes, rtol=1e-9), **options).collocation
 
     smooth = {"effects.contact": HUNT_CROSSLEY}
-    assert not taken(smooth | {"numerics.rtol": 1e-6}, single=True)  # as its ensemble
-    assert taken(smooth | {"numerics.rtol": 5e-7}, single=True)
+    assert not taken(smooth | {"numerics.rtol": 2e-9}, single=True)  # as its ensemble
     assert taken(smooth, single=True)
     assert not taken(smooth)  # an ensemble
     assert taken(smooth | {"numerics.method": "lobatto"})

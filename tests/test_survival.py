@@ -233,7 +233,7 @@ def _script() -> str:
 # -- program errors -----------------------------------------------------------------------------
 
 BEFORE = [
-    "call hpcclear.cli.ensembles:scene_of",
+    "call hpcclear.cli.options:Written.scene",
     "call hpcclear.ensemble.samples:design",
     "call hpcclear.results.lock:Lock.acquire",
     "call hpcclear.results.checkpoint:Checkpoint._open",
@@ -256,7 +256,7 @@ AFTER = [
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
 STUDY_CASES = [
-    "call hpcclear.cli.studies:scene_of",
+    "call hpcclear.cli.options:Written.scene",
     "import hpcclear.study",
     "call hpcclear.results.checkpoint:Checkpoint._open",
     "call hpcclear.study.sensitivities:analyse",
@@ -279,7 +279,9 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
     before, after = place.parent / "before.log", place.parent / "after.log"
     mark = place.parent / "mark.log"
     words = undisturbed.words(place)
-    if "flush" in case:  # a fast machine is done before there is a second one
+    if (
+        "flush" in case or case in NO_MORE_SAVES
+    ):  # a fast machine is done before there is a second one
         words = [*words, "--checkpoint-interval", "0.2"]
     settings = {"TEST_FAIL": case, "TEST_RANK": str(rank), "TEST_MARK": str(mark)}
     code, output = commands.run(words, TEST_LOG=str(before), **settings)

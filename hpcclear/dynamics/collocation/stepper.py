@@ -19,7 +19,7 @@ from hpcclear.dynamics.collocation.crossings import gap_before, stop_at_contacts
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
-from hpcclear.dynamics.stepping.control import choose_step, commit
+from hpcclear.dynamics.stepping.control import choose_step, commit, leave_rates
 from hpcclear.dynamics.stepping.peaks import NEAR, damping, keep_peak
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -187,29 +187,6 @@ def quadratures(effects, work, m):
 
 
 @lane_function
-def rate_at_end(work, m, rate):
-    """Put a rate at the end of the step where the block stepper would leave it."""
-    work[at.RATE_NOW + rate] = m[(at.RATE_NOW + rate) * STAGES + STAGES - 1]
-
-
-@lane_function
-def rates_at_end(effects, work, m):
-    """Those that are read after a step, as each stands in a line of the cache of its own."""
-    for p in range(effects.rules.begin, effects.rules.end):
-        rate_at_end(work, m, at.GAP + p)
-        rate_at_end(work, m, at.FORCE + p)
-        rate_at_end(work, m, at.GAP_RATE + p)
-    for r in range(len(effects.measures)):
-        rate_at_end(work, m, effects.measures[r])
-    if effects.rules.responses:
-        rate_at_end(work, m, at.DRIVE_MOMENT)
-        rate_at_end(work, m, at.FOLLOWED_SQUARE)
-    if effects.rules.profile:
-        for rate in range(at.RATES):
-            rate_at_end(work, m, rate)
-
-
-@lane_function
 def end_of_step(effects, work, m, n):
     """Put the end of the step where the block stepper would leave it."""
     last = STAGES - 1
@@ -217,7 +194,7 @@ def end_of_step(effects, work, m, n):
         work[at.QS + k] = m[(at.QS + k) * STAGES + last]
         work[at.VS + k] = m[(at.VS + k) * STAGES + last]
         work[at.ACC + k] = m[(lob.NODE_ACC + k) * STAGES + last]
-    rates_at_end(effects, work, m)
+    leave_rates(effects, work, 0, 1, m, STAGES, last)
 
 
 @lane_function

@@ -39,6 +39,7 @@ from hpcclear.dynamics.implicit.radau import (
     refilter_error,
     start_of_step,
 )
+from hpcclear.dynamics.stepping.control import leave_rates
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
     LANE,
@@ -380,31 +381,14 @@ def propose(lane, W, work, m, iterations):
     work[at.NEXT_STEP * W + lane] = proposal
 
 
-@lane_function
-def leave_rate(rate, lane, W, work, m):
-    """Put a rate at the end of the step where an explicit step would leave it."""
-    work[(at.RATE_NOW + rate) * W + lane] = m[(at.RATE_NOW + rate) * LANES + END]
-
-
 @scalar_function
 def leave(effects, n, lane, W, work, m):
-    """Put the end of the step where an explicit step would leave it; of the rates those that are read after a step."""
+    """Put the end of the step where an explicit step would leave it."""
     for k in range(n):
         work[(at.QS + k) * W + lane] = m[(at.QS + k) * LANES + END]
         work[(at.VS + k) * W + lane] = m[(at.VS + k) * LANES + END]
         work[(at.ACC + k) * W + lane] = m[(at.ACC + k) * LANES + END]
-    for p in range(effects.rules.begin, effects.rules.end):
-        leave_rate(at.GAP + p, lane, W, work, m)
-        leave_rate(at.FORCE + p, lane, W, work, m)
-        leave_rate(at.GAP_RATE + p, lane, W, work, m)
-    for r in range(len(effects.measures)):
-        leave_rate(effects.measures[r], lane, W, work, m)
-    if effects.rules.responses:
-        leave_rate(at.DRIVE_MOMENT, lane, W, work, m)
-        leave_rate(at.FOLLOWED_SQUARE, lane, W, work, m)
-    if effects.rules.profile:
-        for rate in range(at.RATES):
-            leave_rate(rate, lane, W, work, m)
+    leave_rates(effects, work, lane, W, m, LANES, END)
 
 
 @scalar_function

@@ -233,3 +233,27 @@ def commit(effects, work, stages, n, W):
         work[at.REJECTED * W + i] = rejected * (1.0 - accept)
         ended = count_up(ended, accept * work[at.ENDING * W + i] * work[at.RUNNING * W + i])
     return ended
+
+
+@lane_function
+def leave_rate(work, rate, lane, W, bank, stride, column):
+    """Put a rate where an explicit step would leave it."""
+    work[(at.RATE_NOW + rate) * W + lane] = bank[(at.RATE_NOW + rate) * stride + column]
+
+
+@lane_function
+def leave_rates(effects, work, lane, W, bank, stride, column):
+    """Put the rates in a column of a bank of so many lanes where an explicit step would leave them: those that are read after a
+    step, as each stands in a line of the cache of its own."""
+    for p in range(effects.rules.begin, effects.rules.end):
+        leave_rate(work, at.GAP + p, lane, W, bank, stride, column)
+        leave_rate(work, at.FORCE + p, lane, W, bank, stride, column)
+        leave_rate(work, at.GAP_RATE + p, lane, W, bank, stride, column)
+    for r in range(len(effects.measures)):
+        leave_rate(work, measure(effects, r), lane, W, bank, stride, column)
+    if effects.rules.responses:
+        leave_rate(work, at.DRIVE_MOMENT, lane, W, bank, stride, column)
+        leave_rate(work, at.FOLLOWED_SQUARE, lane, W, bank, stride, column)
+    if effects.rules.profile:
+        for rate in range(at.RATES):
+            leave_rate(work, rate, lane, W, bank, stride, column)
