@@ -37,8 +37,8 @@ IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
 TIGHT = 1e-9
-"""Relative tolerance from which "auto" integrates a single response by collocation. It is faster from 1e-4 on; but a response is
-its ensemble's sample, step by step, until two methods agree to about this."""
+"""Relative tolerance from which "auto" integrates a single response by collocation. It is faster from 1e-4 on; but a response
+is its ensemble's sample, step by step, until two methods agree to about this."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
