@@ -53,3 +53,16 @@ def test_peaks_lie_between_the_ends_of_steps(law: str, method: str):
         # one latched design of 64 has other forces at 1e-6, whose error falls with the tolerance like that of its motion
         assert np.sort(error.max(axis=1))[-2] < 1e-4
         assert error.max() < 1e-3
+
+
+def test_implicit_steps_have_the_same_peaks():
+    setup = ensemble(scene("hunt-crossley", 1e-8, 0, 1), 8)
+
+    def run(implicit: str):
+        return Lanes(replace(setup.problem, implicit=implicit), 8).run(setup.par, setup.start)
+
+    found, other = run("always"), run("never")
+    assert found.stiff_steps.min() > 100
+    for name in ("peak_force", "deepest"):
+        ours, theirs = getattr(found, name)[:, :2], getattr(other, name)[:, :2]
+        assert np.abs(ours / theirs - 1.0).max() < 1e-5  # twenty times what it is

@@ -46,9 +46,8 @@ GAP_COEFFICIENT = COEFFICIENT + MOST_COORDINATES  # and of a gap
 BASE = GAP_COEFFICIENT + 1  # row: coefficient of degree 0, lane by lane a coordinate
 START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
 WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
-SQUARES = (
-    WEIGHT + 1
-)  # rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
+# rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
+SQUARES = WEIGHT + 1
 SCALARS = SQUARES + 3
 (
     POLYNOMIAL_STEP,  # s, of the step whose coefficients are kept; 0 when there are none

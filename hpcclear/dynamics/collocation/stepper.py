@@ -41,7 +41,9 @@ LOG_SAFETY = -0.32  # log2(0.8)
 LARGEST_SHRINK, LARGEST_GROWTH = 0.1, 4.0
 FAILED_SHRINK = 0.7  # after the sweeps did not converge
 UNTESTED = 0.5  # what one sweep leaves unmeasured is taken to have fallen so far, or steps might stay small for ever
-PATIENCE = 2.0
+PATIENCE = (
+    2.0  # sweeps before which no step counts as not converging: acceleration begins with the second
+)
 BEST_CONTRACTION = 0.15  # of a sweep: longer steps need more of them than they save
 
 
@@ -138,9 +140,7 @@ def sweep(motion, work, m, tables, n):
 @lane_function
 def gap_tail(work, m, p, rtol):
     """Squares of the last two coefficients of joint p's gap and of the two before, scaled as its integral's error is."""
-    row = (
-        lob.GAP_COEFFICIENT
-    )  # the same for all joints: into one that goes by p the compiler would not store a vector
+    row = lob.GAP_COEFFICIENT  # of all joints: into a row that goes by p no vector would be stored
     lob.coefficients_of(m, at.RATE_NOW + at.GAP + p, work[at.RATE_OLD + at.GAP + p], row)
     clearance = lob.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
     scale = work[at.STEP] / (rtol * m[clearance * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
