@@ -45,7 +45,7 @@ SCENES = {
     "HC 500 s/m": ("hunt-crossley", "damping=500.0", 0.01, 0.01, True),
     "paper's case": ("lankarani-nikravesh", "restitution=0.9", 0.01, 0.01, False),
 }
-METHODS = ("auto", "dormand-prince")
+METHODS = ("auto", "tsitouras")
 LSODA = "LSODA"
 TARGETS = np.array([1e-6, 1e-7, 1e-8])
 REVOLUTIONS = 10
@@ -109,7 +109,7 @@ def prepare(name: str, revolutions: int, rtols: Array) -> Case:
         chosen = scene_of(name, method, rtol)
         return setup(chosen, parameters(chosen))
 
-    tight = at_tolerance("dormand-prince", 1e-11)
+    tight = at_tolerance("tsitouras", 1e-11)
     lanes = Lanes(tight.problem, 1)
     start, starts = tight.start, []
     for k in range(SETTLED + revolutions):
@@ -122,7 +122,7 @@ def prepare(name: str, revolutions: int, rtols: Array) -> Case:
     def with_start(given: Setup) -> Setup:
         return given._replace(par=par, start=start)
 
-    sharp = with_start(at_tolerance("dormand-prince", 1e-12))
+    sharp = with_start(at_tolerance("tsitouras", 1e-12))
     exact = ends(Lanes(sharp.problem, 1), sharp)
     latched = sharp.problem.effects.latched is not None
     none = [(0.0, np.zeros(2))]

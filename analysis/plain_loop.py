@@ -1,6 +1,6 @@
 """The yardstick: the same mechanics and method as a plain compiled loop, one sample after the other.
 
-Dormand and Prince's pair, the same tolerances, error norm, step control, impact location and fastmath flags as
+Tsitouras' pair, the same tolerances, error norm, step control, impact location and fastmath flags as
 the package, written the way one writes an integrator in Numba: arrays of first-order states, loops over
 stages, library sines, branches. Two open joints, constant crank speed, Coulomb friction; contact by
 Hunt-Crossley, or by Lankarani-Nikravesh with the impact speed latched.
@@ -14,13 +14,13 @@ from numba import njit
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE
+from hpcclear.dynamics.explicit.tableau import TSITOURAS
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
 OUTPUTS = ("objective", "slider_position", "slider_velocity", "evaluations", "steps", "status")
 
-_C = DORMAND_PRINCE.a.sum(axis=1)
-_A, _B, _E = DORMAND_PRINCE.a, DORMAND_PRINCE.b, DORMAND_PRINCE.e
+_C = TSITOURAS.a.sum(axis=1)
+_A, _B, _E = TSITOURAS.a, TSITOURAS.b, TSITOURAS.e
 _compiled = njit(error_model="numpy", fastmath=FASTMATH, cache=True)
 
 

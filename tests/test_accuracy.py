@@ -73,8 +73,8 @@ def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
     order = dict(zip(found.methods, velocity, strict=True))
     # Approached from above as the ladder moves down: 6.2 from 1e-4 on, 5.8 from 1e-6 on, 5.7 here, where double precision
     # ends. test_order.py finds 4.95 with steps of one length.
-    assert order["dormand-prince"] == pytest.approx(5.0, abs=0.8)
-    assert order[f"dormand-prince, {DEFAULT_LANES} lanes"] == order["dormand-prince"]
+    assert order["tsitouras"] == pytest.approx(5.0, abs=0.8)
+    assert order[f"tsitouras, {DEFAULT_LANES} lanes"] == order["tsitouras"]
     assert order["fehlberg"] == pytest.approx(4.0, abs=0.5)
     assert order["RK4, fixed steps"] == pytest.approx(4.0, abs=0.5)
     assert order["DOP853 (scipy)"] == pytest.approx(8.0, abs=0.8)
@@ -133,7 +133,7 @@ def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
         return  # the ladder is climbed once
     found = integration.measure(scene, TINY, silent)
     by_name = dict(zip(found.methods, found.error[..., 0], strict=True))
-    for name in ("dormand-prince", "LSODA (scipy)"):
+    for name in ("tsitouras", "LSODA (scipy)"):
         assert by_name[name][0] < 1e-3
         assert by_name[name][2] < 1e-6  # 9e-9 at most with eight loads from -105 to -145
     # The classical method's longest steps are too long for these contacts: no number is told, and no good one.
@@ -366,7 +366,7 @@ def test_figures_and_tables(measured, tmp_path, capsys):
     for word in (
         "A steady mean",
         "of a core",
-        "dormand-prince",
+        "tsitouras",
         "Kriging",
         "floor",
         "speed-up",

@@ -237,26 +237,26 @@ def test_a_lost_cause_ends_with_a_status():
     assert lost.attempts == 20
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize(("method", "rtol"), [("tsitouras", 1e-6), ("auto", 1e-10)])
 @pytest.mark.parametrize("name", ["Hunt-Crossley", "latched"])
-def test_a_response_is_the_ensemble_s_sample(name: str, rtol: float):
-    """To 1e-9, whichever side of the tolerance at which the method changes."""
-    scene = case(name, "auto", rtol, 1)
+def test_a_response_is_the_ensemble_s_sample(name: str, method: str, rtol: float):
+    """To 1e-9: by the same pair at any tolerance, by collocation at a tight one."""
+    scene = case(name, method, rtol, 1)
     _, alone, _ = integrate(scene)
     par = parameters(scene)
     lanes = Lanes(problem_of(scene), 32)
     starts = Start(np.repeat(start_states(scene, par).rows, 3, 0))
     outcomes = lanes.run(np.repeat(par, 3, 0), starts)
-    assert lanes.problem.tableau.name == "dormand-prince"
+    assert lanes.problem.tableau.name == "tsitouras"
     np.testing.assert_allclose(alone["objective"][0], outcomes.objective, rtol=1e-9)
 
 
 def test_who_takes_collocation():
     def taken(changes, **options) -> bool:
-        return problem_of(scene_with(changes, rtol=1e-9), **options).collocation
+        return problem_of(scene_with(changes, rtol=1e-4), **options).collocation
 
     smooth = {"effects.contact": HUNT_CROSSLEY}
-    assert not taken(smooth | {"numerics.rtol": 2e-9}, single=True)  # as its ensemble
+    assert not taken(smooth | {"numerics.rtol": 2e-4}, single=True)  # some would reach the step cap
     assert taken(smooth, single=True)
     assert not taken(smooth)  # an ensemble
     assert taken(smooth | {"numerics.method": "lobatto"})

@@ -28,6 +28,7 @@ def test_a_followed_point_accelerates_as_its_places_say(formulation):
     scene = ROCKER.with_(
         {
             "numerics.formulation": formulation,
+            "numerics.method": "tsitouras",
             "numerics.transient_revolutions": 0,
             "numerics.averaged_revolutions": 1,
             "output.instants_per_revolution": 20_000,

@@ -53,14 +53,12 @@ class Integration:
 def reference_of(scene: Scene, designs: int) -> Reference:
     """One revolution, solved two ways.
 
-    scipy's DOP853, restarted wherever a gap changes sign, gives the values; the kernel's Dormand-Prince pair at the
+    scipy's DOP853, restarted wherever a gap changes sign, gives the values; the kernel's pair at the
     same tolerance is the second way. On the largest force LSODA is, since the kernel reports it at steps' ends.
     """
     made = systems(scene, designs)
     values = np.array([solve_turn(scene, one, "DOP853", REFERENCE_RTOL)[0] for one in made])
-    method = kernel_method(
-        "second", scene, designs, 1, formulation="minimal", method="dormand-prince"
-    )
+    method = kernel_method("second", scene, designs, 1, formulation="minimal", method="tsitouras")
     second = method.prepare(REFERENCE_RTOL)[0]().values
     second[:, 2] = [solve_turn(scene, one, "LSODA", 10 * REFERENCE_RTOL)[0][2] for one in made]
     scale = np.abs(values)

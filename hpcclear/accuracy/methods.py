@@ -261,11 +261,11 @@ def _largest_force(one: Equations, piece: object) -> float:
 def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
     """Every method that can integrate this scene, the kernel's first."""
     wanted: list[tuple[str, int, dict[str, Any]]] = [
-        ("dormand-prince", 1, {"formulation": "minimal", "method": "dormand-prince"}),
+        ("tsitouras", 1, {"formulation": "minimal", "method": "tsitouras"}),
         (
-            f"dormand-prince, {DEFAULT_LANES} lanes",
+            f"tsitouras, {DEFAULT_LANES} lanes",
             DEFAULT_LANES,
-            {"formulation": "minimal", "method": "dormand-prince"},
+            {"formulation": "minimal", "method": "tsitouras"},
         ),
         ("fehlberg", 1, {"formulation": "minimal", "method": "fehlberg"}),
         ("lobatto", 1, {"formulation": "minimal", "method": "lobatto"}),
@@ -273,7 +273,7 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
     if more:
         wanted += [
             ("radau", 1, {"formulation": "minimal", "method": "radau"}),
-            ("baumgarte", 1, {"formulation": "baumgarte", "method": "dormand-prince"}),
+            ("baumgarte", 1, {"formulation": "baumgarte", "method": "tsitouras"}),
         ]
     found = []
     for name, width, numerics in wanted:

@@ -14,7 +14,7 @@ from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.curves import periodic_cells
-from hpcclear.dynamics.explicit.tableau import DORMAND_PRINCE, TABLEAUS, Tableau
+from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
@@ -36,9 +36,9 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-TIGHT = 1e-9
-"""Relative tolerance from which "auto" integrates a single response by collocation. It is faster from 1e-4 on; but a response
-is its ensemble's sample, step by step, until two methods agree to about this."""
+LOOSEST_COLLOCATION = 1e-4
+"""Relative tolerance from which "auto" integrates a single response by collocation: the faster method at equal error, and at
+this tolerance the more accurate one by 100 to 1000. At 1e-3 one scene in thirty reaches the step cap."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -243,8 +243,8 @@ def _flag(on: bool) -> int | None:
 
 
 def tableau_of(scene: Scene) -> Tableau:
-    """The embedded pair of ``numerics.method``: Dormand and Prince's unless another one is named."""
-    return TABLEAUS.get(scene.numerics.method, DORMAND_PRINCE)
+    """The embedded pair of ``numerics.method``: Tsitouras' unless another one is named."""
+    return TABLEAUS.get(scene.numerics.method, TSITOURAS)
 
 
 def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
@@ -307,11 +307,12 @@ def _bars_of(scene: Scene) -> Mechanism:
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
 
-    Looser than `TIGHT` the pair is kept, so that a response is the ensemble's sample to the last digit, also where the
-    motion is chaotic. A tabulated curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit;
-    where the motion may be stiff, implicit steps are called for.
+    So a response and the sample of an ensemble, which takes the pair, agree to the pair's error; with the pair named for both
+    they are the same, also where the motion is chaotic. Looser than `LOOSEST_COLLOCATION` the pair is kept. A tabulated
+    curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit; where the motion may be stiff,
+    implicit steps are called for.
 
     Raises
     ------
@@ -338,7 +339,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         )
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
-    return single and automatic and smooth and scene.numerics.rtol <= TIGHT
+    return single and automatic and smooth and scene.numerics.rtol <= LOOSEST_COLLOCATION
 
 
 def _cells_of_curves(

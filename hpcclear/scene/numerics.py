@@ -18,11 +18,13 @@ class Numerics(Table):
     """Baumgarte feedback on constraint position, 1/s; used by that formulation, and by ideal loops of linkages."""
     interpolation: Literal["smooth", "linear"] = "smooth"
     """Between the rows of tables against the crank angle: a monotone cubic, or straight lines."""
-    method: Literal["auto", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"] = "auto"
+    method: Literal[
+        "auto", "tsitouras", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"
+    ] = "auto"
     """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
     "radau" always, "auto" as "switching" in scenes with steep friction ramps, strong damping, oil or bristles, as "radau"
     where bars bend in modes too fast for explicit steps, in others
-    "lobatto" for a single response with rtol up to 1e-9 and else "dormand-prince"."""
+    "lobatto" for a single response with rtol up to 1e-4 and else "tsitouras"."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None

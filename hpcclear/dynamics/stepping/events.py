@@ -4,6 +4,10 @@ import math
 
 from hpcclear.base.jit import scalar_function
 
+KINK_REACH = 1e-3
+"""Part of a step that a gap's zero may stand from either end: a kink of the force there does no harm, as its effect falls with
+the 2.5th power, and what the gap does between the two is straight."""
+
 
 @scalar_function
 def hermite(d0, m0, d1, m1, s):
@@ -86,12 +90,28 @@ def impact_fraction(d0, m0, d1, m1, target):
 
 
 @scalar_function
+def zero_at_start(d0, m0):
+    """Whether the gap becomes 0 within `KINK_REACH` of the start of the step."""
+    return d0 * d0 <= -KINK_REACH * m0 * d0
+
+
+@scalar_function
+def zero_at_end(d1, m1):
+    """Whether it became 0 within `KINK_REACH` of the end."""
+    return d1 * d1 <= KINK_REACH * m1 * d1
+
+
+@scalar_function
 def absolute_integral(integral, d0, m0, d1, m1):
     """Integral of |d| over a step in which d changes sign once, from the integral of d.
 
-    The shorter side comes from the cubic, the rest from the method's own quadrature, so that the kink of |d| does
-    not cost its order.
+    The shorter side comes from the cubic, or a triangle, the rest from the method's own quadrature, so that the kink of |d|
+    does not cost its order.
     """
-    s = root(d0, m0, d1, m1, 1.0)
-    first = hermite_integral(d0, m0, d1, m1, s)
-    return abs(first) + abs(integral - first)
+    if zero_at_end(d1, m1):
+        part = 0.5 * d1 * d1 / m1
+    elif zero_at_start(d0, m0):
+        part = -0.5 * d0 * d0 / m0
+    else:
+        part = hermite_integral(d0, m0, d1, m1, root(d0, m0, d1, m1, 1.0))
+    return abs(part) + abs(integral - part)

@@ -3,7 +3,14 @@
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.events import absolute_integral, impact_fraction, root
+from hpcclear.dynamics.stepping.events import (
+    KINK_REACH,
+    absolute_integral,
+    impact_fraction,
+    root,
+    zero_at_end,
+    zero_at_start,
+)
 from hpcclear.dynamics.stepping.settings import (
     ANGLE_TOLERANCE,
     AT_REST,
@@ -17,9 +24,6 @@ STALLED = int(Status.STALLED)
 
 LONG_AT_REST = 1e3
 """Periods after which a body that starts from rest and does not turn has stalled."""
-
-KINK_REACH = 1e-3
-"""Part of a step that a kink of the force may stand from either end: its effect falls with the 2.5th power."""
 
 
 @lane_event
@@ -101,6 +105,8 @@ def before_kink(lane, W, work, settings, p):
     h = work[at.STEP * W + lane]
     m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
     m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane]
+    if zero_at_start(d0, m0) or zero_at_end(d1, m1):
+        return 2.0
     fraction = root(d0, m0, d1, m1, 1.0)
     return fraction if KINK_REACH < fraction < 1.0 - KINK_REACH else 2.0
 
