@@ -38,8 +38,8 @@ DEARER = 5
 """Steps, or revolutions to a target error, that a variant may take, times the most that the whole scene took: what is so much
 dearer without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
 
-EVALUATIONS = 6
-"""Of an explicit step."""
+EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
+"""Of an explicit step, and of an implicit one on average."""
 
 IMPLICIT = 20.0
 """What an evaluation counts as where a sample took implicit steps, which lanes take one at a time and solve for."""
@@ -149,7 +149,8 @@ class Trial:
         self._variants: dict[Variant, Off | None] = {}
         self._bare = scene.with_({"study": None})  # quick to change
         self._implicit: dict[Variant, bool] = {}
-        self._limits: dict[str, int] = {}
+        self._evaluations = 0  # of the whole scene's dearest first point
+        self._turns: dict[str, int] = {}
 
     def names(self, off: Variant) -> tuple[str, ...]:
         """Names of the effects that are off."""
@@ -220,21 +221,25 @@ class Trial:
     def simulated(self, off: Variant) -> Scene:
         """What is simulated of a variant: its scene, with limits to its cost once the whole scene's is known."""
         scene = self.variant(off).scene
-        return scene.with_(self._limits) if off and self._limits else scene
+        if not off or self._evaluations == 0:
+            return scene
+        each = IMPLICIT_EVALUATIONS if self.implicit(off) else EVALUATIONS
+        steps = DEARER * self._evaluations // each + 1000
+        most = min(steps, self.scene.numerics.max_steps)
+        return scene.with_({"numerics.max_steps": most} | self._turns)
 
     def _limit(self, records: Records) -> None:
         """Limits by what the whole scene took at its first points."""
         numerics = self.scene.numerics
-        steps = DEARER * int(records["rhs_evaluations"].max()) // EVALUATIONS + 1000
-        self._limits = {"numerics.max_steps": min(steps, numerics.max_steps)}
+        self._evaluations = int(records["rhs_evaluations"].max())
         if numerics.target_error is not None and self.scene.clearance_joints():
             turns = DEARER * int(np.nanmax(records["steady_revolutions"])) + 100
             limit = min(turns, numerics.target_revolutions)
-            self._limits = {"numerics.target_revolutions": limit}
+            self._turns = {"numerics.target_revolutions": limit}
 
     def seen(self, asked: Asked, records: Records) -> Seen:
         """What the certificate is told of records."""
-        if not asked.off and not self._limits:
+        if not asked.off and self._evaluations == 0:
             self._limit(records)
         scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
         force = np.full((len(records), len(labels)), np.nan)
