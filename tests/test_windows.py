@@ -77,11 +77,14 @@ def test_flat_loops_are_passed_with_their_energy(count, formulation):
         scene = windows(count, rtol, 250.0).with_({"numerics.formulation": formulation})
         response = simulate(scene)
         assert int(response["status"]) == Status.OK
-        assert np.abs(response["energy_residual"].to_numpy()).max() < KEPT / 1e4
+        # what is flat passes within 1e-4 rad: a spike that error estimates at 1e-6 see late
+        lost = {1e-6: KEPT / 1e3, 1e-8: KEPT / 1e4}[rtol]
+        assert np.abs(response["energy_residual"].to_numpy()).max() < lost
         time = response["time"].to_numpy()
         assert time[-1] > 10.0  # s, the benchmark's
         found = response["crank_angle"].to_numpy()
-        assert np.abs(found - as_one_body(count, time)).max() < 1e-5
+        # after eight turns, or fifty radians
+        assert np.abs(found - as_one_body(count, time)).max() < {1e-6: 1e-4, 1e-8: 1e-6}[rtol]
 
 
 def test_feedback_that_is_off_is_told():

@@ -311,8 +311,9 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
 
     So a response and the sample of an ensemble, which takes the pair, agree to the pair's error; with the pair named for both
     they are the same, also where the motion is chaotic. Looser than `LOOSEST_COLLOCATION` the pair is kept. A tabulated
-    curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit; where the motion may be stiff,
-    implicit steps are called for.
+    curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit; a free
+    linkage whose loops fold flat passes that within a ten-thousandth of a turn, which long steps see too late; where the
+    motion may be stiff, implicit steps are called for.
 
     Raises
     ------
@@ -337,6 +338,7 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         curves += tuple(
             drive.rows for drive in linkage.mechanism.drives if isinstance(drive, TableDrive)
         )
+        minimal = minimal and not (linkage.mechanism.free and linkage.forest.closures)
     smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
     return single and automatic and smooth and scene.numerics.rtol <= LOOSEST_COLLOCATION

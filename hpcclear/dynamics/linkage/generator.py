@@ -332,7 +332,7 @@ class _Generator:
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """
-        if not all(isinstance(drive, TorqueDrive) for drive in self.mechanism.drives):
+        if not self.mechanism.free:
             return {}
         n = len(self.columns)
         pins: dict[str, tuple[str, str]] = {}

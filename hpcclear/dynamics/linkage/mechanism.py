@@ -19,6 +19,7 @@ from hpcclear.dynamics.linkage.parts import (
     Revolute,
     Slide,
     TableDrive,
+    TorqueDrive,
     split,
 )
 
@@ -70,6 +71,11 @@ class Mechanism:
     def period(self) -> Drive:
         """The drive whose turn is the revolution."""
         return next((drive for drive in self.drives if drive.period), self.drives[0])
+
+    @property
+    def free(self) -> bool:
+        """Whether torques alone drive it."""
+        return all(isinstance(drive, TorqueDrive) for drive in self.drives)
 
     def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
