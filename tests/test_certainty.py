@@ -13,7 +13,8 @@ from hpcclear.scene.stages import SCRAMBLINGS, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student, surely_less
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.search.infill import NEAR, TwoScales, proposals
-from hpcclear.study import refinement
+from hpcclear.study import refinement, truth
+from hpcclear.study.optimisation import Choice
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
 CASE = ("C", "m2", "m3", "u2", "I2")
@@ -188,6 +189,42 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
 
 def test_designs_that_are_one_make_a_front_of_one():
     assert len(compared([(1, 2), (1.0001, 2.0001), (1.0002, 1.9999)]).front(5)) == 1
+
+
+# -- which end is one -------------------------------------------------------------------------------
+
+
+def contested(monkeypatch, contest: int, origin: str = "search") -> list[int]:
+    """Simulations of three designs of deviations 0.1, 0.1005 and 0.2 after 512, where 0.5 % is asked for."""
+    scene = load_scene(ROBUST).with_(
+        {
+            "study.cases": {"one": ["C"]},
+            "study.verification": {
+                "accuracy": {"mean": 0.5, "deviation": 0.005}, "contest": contest, "most_samples": 4096,
+            },
+        }
+    )  # fmt: skip
+    run = SimpleNamespace(study=scene.required_study)
+    choices = [Choice("", "one", {"m2": 0.2 + 0.01 * k}, origin=origin) for k in range(3)]
+    rng = np.random.default_rng(6)
+
+    def drawn(run, some, stage, purpose, count, first):
+        widths = [(0.1, 0.1005, 0.2)[choices.index(one)] for one in some]
+        return [
+            np.stack([1.0 + w * rng.standard_normal((16, count)), np.zeros((16, count))])
+            for w in widths
+        ]
+
+    monkeypatch.setattr(truth, "_values", drawn)
+    made = drawn(run, choices, "", "", 32, 0)
+    return [one[0].size for one in truth._contested(run, choices, made, "", "")]
+
+
+def test_who_contests_an_end_gets_more_simulations(monkeypatch):
+    assert contested(monkeypatch, 4) == [2048, 2048, 512]
+    assert contested(monkeypatch, 1) == [512, 512, 512]
+    assert contested(monkeypatch, 64) == [4096, 4096, 512]  # most_samples
+    assert contested(monkeypatch, 4, "given") == [512, 512, 512]
 
 
 # -- where to look next -----------------------------------------------------------------------------

@@ -211,6 +211,9 @@ class Verification(Table):
     """Simulations of a design from which its accuracy is judged, for "qmc"; default 512, as far as it may have so many."""
     most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
     """Simulations of a design at most, for "qmc"."""
+    contest: Annotated[int, Count(1, 2**10)] = 4
+    """How many times the simulations that its accuracy takes a design of the search may get, for "qmc", while for all that is
+    known it may be the best in an objective, and is more than 0.4 of the accuracy asked for off the least; 1: none."""
     samples: Annotated[int, Count(2, 10**9)] | None = None
     """Draws of a design, for "monte-carlo"; 10 000 if it is asked for without a number."""
     designs: Annotated[int, Count(0, 10**5)] = 10

@@ -88,6 +88,7 @@ def settled(scene: Scene, split: Split) -> Scene:
             "study.verification.accuracy": wanted,
             "study.verification.least_samples": min(max(first, LEAST), truth.FIRST, most),
             "study.verification.infill_samples": min(max(searched, 4 * SCRAMBLINGS), most),
+            "study.verification.contest": 1,  # the accuracy is what is bought
         }
     )
 

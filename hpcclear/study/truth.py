@@ -10,12 +10,16 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import SCRAMBLINGS, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student
+from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import goals
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
 FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
+
+TIED = 0.4
+"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be told."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is told."""
@@ -74,7 +78,8 @@ def simulate(
     settings = run.study.verification
     if settings.draws is not None:
         return _told(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
-    return sequences(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+    made = _made(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+    return _told(run, choices, _contested(run, choices, made, stage, purpose))
 
 
 def scrambled_length(simulations: int) -> int:
@@ -101,6 +106,12 @@ def sequences(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
 ) -> Result:
     """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
+    return _told(run, choices, _made(run, choices, stage, purpose, length, most))
+
+
+def _made(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
+) -> list[Array]:
     made = [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
     rows = list(range(len(choices)))
     while rows:
@@ -112,7 +123,52 @@ def sequences(
         if 2 * length * SCRAMBLINGS > most:
             break
         rows = [k for k in rows if not _accurate(run, choices[k], made[k][0])]
-    return _told(run, choices, made)
+    return made
+
+
+def _contested(
+    run: StudyRun, choices: Sequence[Choice], made: list[Array], stage: str, purpose: str
+) -> list[Array]:
+    """Designs doubled further while the ends of a front are not decided, the shortest first."""
+    settings = run.study.verification
+    most = [min(one[0].size * settings.contest, settings.most_samples) for one in made]
+    while True:
+        rows = [k for k in _contenders(run, choices, made) if 2 * made[k][0].size <= most[k]]
+        if not rows:
+            return made
+        length = min(made[k].shape[2] for k in rows)
+        rows = [k for k in rows if made[k].shape[2] == length]
+        fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, length)
+        for k, one in zip(rows, fresh, strict=True):
+            made[k] = np.concatenate([made[k], one], axis=2)
+
+
+def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> list[int]:
+    """Designs of the search that may be the best in an objective for all that is known, though not as good as the least to
+    within `TIED`; and that least."""
+    settings, found = run.study.verification, set[int]()
+    for case in run.study.cases:
+        rows = [
+            k for k, one in enumerate(choices) if one.case == case.name and one.origin == "search"
+        ]
+        if not rows:
+            continue
+        told = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
+        values = np.array([[one.value for one in row] for row in told])
+        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in told]), 1, 0)
+        less = Compared(values, shifts, settings.confidence).less
+        for column, goal in enumerate(case.goals):
+            share, relative = goals.wanted(goal, settings.accuracy)
+            own = values[:, column]
+            if not np.isfinite(own).any():
+                continue
+            least = int(np.nanargmin(own))
+            near = TIED * share * (abs(own[least]) if relative else 1.0)
+            far = ~less[column][least] & (own > own[least] + near)
+            found |= {rows[k] for k in np.flatnonzero(far)} | (
+                {rows[least]} if far.any() else set()
+            )
+    return sorted(found)
 
 
 def _values(

@@ -56,9 +56,10 @@ FIRST = 4, 6
 """Stretches before it, at least and at most."""
 
 MEMORY, LONG_MEMORY = 2.0, 10.0
-"""Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what copies
-scatter by; longer with a latched damping or a free crank. On six scenes of nine whose limits had missed the mean, means of the
-first 24 revolutions were off by such memories, or by what weak chaos makes of a tolerance, of 1 to 12 revolutions."""
+"""Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what
+copies scatter by; longer with a latched damping or a free crank. On six of nine scenes whose limits had missed the mean,
+means of the first 24 revolutions were off by 1 to 12 of them times that scatter: by memory, or by what weak chaos makes of a
+tolerance."""
 
 LASTING = 40
 """Stretches before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
