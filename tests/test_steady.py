@@ -205,13 +205,13 @@ def test_an_ensemble_of_noise_holds_its_mean_for_little_more_than_it_takes(scatt
     held = np.abs(f - 1.0) <= [mean.limit for mean in found]
     assert all(mean.met for mean in found)
     assert held.sum() >= stats.binom.ppf(0.001, 200, 0.93)
-    # wider than noise makes them by what a memory might do unseen, most where the first look is the last
+    # wider than noise makes them by what a memory might do unseen: where the first look is the last, and narrow
     width = np.median([mean.limit for mean in found]) / (1.96 * f.std())
-    assert 1.05 < width < (1.3 if scatter > 0.1 else 2.0)
+    assert (0.95 < width < 1.2) if scatter > 0.1 else (1.5 < width < 3.0)
     least = max(
         (1.96 * scatter / 1e-2) ** 2, ensemble.FIRST[0] * ensemble.STRETCH * ensemble.COPIES
     )
-    assert np.mean([mean.revolutions for mean in found]) < 1.95 * least
+    assert np.mean([mean.revolutions for mean in found]) < 1.7 * least
 
 
 def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():

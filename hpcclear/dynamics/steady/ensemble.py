@@ -55,11 +55,11 @@ PARTED = 12
 FIRST = 4, 6
 """Stretches before it, at least and at most."""
 
-MEMORY, LONG_MEMORY = 2.0, 10.0
+MEMORY, LONG_MEMORY = 3.0, 10.0
 """Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what
 copies scatter by; longer with a latched damping or a free crank. On six of nine scenes whose limits had missed the mean,
 means of the first 24 revolutions were off by 1 to 12 of them times that scatter: by memory, or by what weak chaos makes of a
-tolerance."""
+tolerance. Limits are widened by it as far as the target allows: no revolution is simulated for what cannot be seen."""
 
 LASTING = 40
 """Stretches before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
@@ -99,6 +99,7 @@ class _Limits:
     pooled: bool  # whether both tolerances count, or the stricter alone
     f: float
     limit: float
+    unseen: float  # memory of the start that the limit knows nothing of, m
     bias: float  # between the tolerances, m
     doubt: float  # its standard error
     regime: Regime
@@ -106,6 +107,12 @@ class _Limits:
     settling: float  # how far it still may move
     copies_count: bool  # more copies help, more revolutions do not
     short: bool  # too few stretches to see a drift
+
+    def told(self, most: float) -> float:
+        """The limit that is stated, m: with what is unseen as far as that leaves it within `most`; NaN if there is none."""
+        limit = self.limit + self.settling
+        wide = float(np.hypot(self.limit, self.unseen)) + self.settling
+        return np.nan if np.isinf(limit) else max(limit, min(wide, most))
 
     def biased(self, least: float) -> bool:
         """Whether the tolerances differ by more than chance and than so much, m."""
@@ -138,9 +145,8 @@ def ensemble(
         unsteady = restless >= RESTLESS
         if unsteady or spent or met:
             regime = Regime.UNSTEADY if unsteady else Regime.SETTLING if drifting else seen.regime
-            limit = seen.limit + seen.settling
             return effort.mean(
-                regime=regime, limit=np.nan if unsteady or np.isinf(limit) else limit,
+                regime=regime, limit=np.nan if unsteady else seen.told(level if met else np.inf),
                 outcomes=copies.kept(seen), stretch=STRETCH, rtol=rtol, met=bool(met and not unsteady),
                 growth=growth,
             )  # fmt: skip
@@ -263,7 +269,6 @@ def _limits(copies: _Copies, sample: Sample) -> _Limits:
         limit = float(np.hypot(limit, LEFT * np.sqrt(excess)))
     memory = LONG_MEMORY if sample.latched or sample.free else MEMORY
     unseen = memory * float(error) * np.sqrt(kept.shape[1] / (STRETCH * len(kept)))
-    limit = float(np.hypot(limit, unseen))
     within = float(kept.var(axis=0, ddof=1).mean()) if len(kept) > 1 else np.nan
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)
@@ -280,7 +285,20 @@ def _limits(copies: _Copies, sample: Sample) -> _Limits:
         by_speed = SPEED * mean / abs(float(speeds[first:].mean()))
         faster, further = judging.approach(speeds[first:])
         moved, settling = max(moved, by_speed * faster), max(settling, by_speed * further)
-    return _Limits(first, pooled, mean, limit, bias, doubt, regime, moved, settling, several, short)
+    return _Limits(
+        first,
+        pooled,
+        mean,
+        limit,
+        float(unseen),
+        bias,
+        doubt,
+        regime,
+        moved,
+        settling,
+        several,
+        short,
+    )
 
 
 def _excess(bias: float, doubt: float, usual: float) -> float:
