@@ -85,9 +85,11 @@ def impacts(given: Setup, row: int) -> list[tuple[float, Array]]:
     """Pieces of one revolution between impacts, from a recorded tight run."""
     lanes = Lanes(given.problem, 1, np.zeros((1 << 20, rec.columns(4))))
     lanes.queue(given.par[:1], given.start[row : row + 1], np.zeros(1, np.int64))
+    parts = []
     while lanes.pending:
         lanes.advance(10.0)
-    rows = lanes.take_record()
+        parts.append(lanes.take_record())
+    rows = np.concatenate(parts)
     inverse = given.start[row].inverse_impact[:2].copy()
     pieces = [(0.0, inverse)]
     for after in rows[1:]:

@@ -230,6 +230,20 @@ def test_the_record_holds_every_node_and_a_small_one_changes_no_step():
     assert (np.diff(steps.works[:, 1]) >= 0.0).all()  # of the absolute power
 
 
+@pytest.mark.parametrize("method", ["lobatto", "tsitouras"])
+def test_a_full_record_is_not_written_beyond(method: str):
+    scene = case("dry", method, 1e-9)
+    problem, par = problem_of(scene), parameters(scene)
+    lanes = Lanes(problem, 1, np.zeros((2 * lobatto.STAGES, record.columns(problem.coordinates))))
+    lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
+    while not lanes.record_full:
+        assert lanes.step(1000)
+    with pytest.raises(RuntimeError, match="record is full"):
+        lanes.step(1)
+    assert len(lanes.take_record()) > lobatto.STAGES
+    assert lanes.step(1)
+
+
 def test_a_lost_cause_ends_with_a_status():
     scene = case("dry", "lobatto", 1e-6).with_({"numerics.max_steps": 20})
     lost = outcome(scene)

@@ -249,7 +249,15 @@ class Lanes:
         return rows
 
     def step(self, budget: int) -> bool:
-        """Take at most `budget` block steps; True while samples are running."""
+        """Take at most `budget` block steps; True while samples are running.
+
+        Raises
+        ------
+        RuntimeError
+            The record is full: what comes next would be written beyond it.
+        """
+        if self.record_full:
+            raise RuntimeError("the record is full; take it first")
         if (
             not self._compiled
         ):  # at the first call, which one rank of a node makes before the others
