@@ -17,17 +17,23 @@ WIDTH = 32
 
 def lanes_positions(setup: Setup, width: int) -> Array:
     """Slider positions at the end of every sample, shape (m,)."""
-    lanes = Lanes(setup.problem, width)
-    return _collected(lanes, setup)
+    return _collected(_lanes_of(setup.problem, "lanes", width), setup)
 
 
 def _collected(lanes: Lanes, setup: Setup) -> Array:
     return lanes.run(setup.par, setup.start).coordinates(4)[:, SLIDER]
 
 
+def _lanes_of(problem: Problem, name: str, width: int) -> Lanes:
+    """Lanes that are kept between calls, as other codes keep what they have compiled."""
+    key = (problem.effects, name, problem.rtol, problem.atol, width)
+    _PROBLEMS.setdefault(key, problem)
+    return _kept(key)
+
+
 @cache
-def _one_lane(key: tuple) -> Lanes:
-    return Lanes(_PROBLEMS[key], 1)
+def _kept(key: tuple) -> Lanes:
+    return Lanes(_PROBLEMS[key], key[-1])
 
 
 _PROBLEMS: dict[tuple, Problem] = {}
@@ -43,12 +49,10 @@ def _solver(name: str) -> Callable[[Setup, int], float]:
             problem = replace(problem, tableau=tableau, collocation=False)
         elif name == "lobatto":
             problem = replace(problem, collocation=True)
-        key = (problem.effects, name, problem.rtol, problem.atol)
-        _PROBLEMS.setdefault(key, problem)
         one = setup._replace(
             par=setup.par[sample : sample + 1], start=setup.start[sample : sample + 1]
         )
-        return float(_collected(_one_lane(key), one)[0])
+        return float(_collected(_lanes_of(problem, name, 1), one)[0])
 
     return solve
 
