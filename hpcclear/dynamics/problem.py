@@ -36,10 +36,10 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-LOOSEST_COLLOCATION = 1e-5
-"""Relative tolerance from which "auto" integrates a single response by collocation: the faster method at equal error, and at
-this tolerance the more accurate one by 100 to 1000. At 1e-4 the pair is as fast, and good to 1e-6 m; at 1e-3 collocation
-reaches the step cap in one scene of thirty."""
+LOOSEST_COLLOCATION = 1e-9
+"""Relative tolerance from which "auto" integrates a single response by collocation. It is the faster method from 1e-5 on, by
+tenths of a millisecond; but its stepper is compiled anew for each number of coordinates, which takes nine seconds before a
+first result, and a response by the pair is its ensemble's sample, step by step."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -308,10 +308,10 @@ def _bars_of(scene: Scene) -> Mechanism:
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
 
-    So a response and the sample of an ensemble, which takes the pair, agree to the pair's error; with the pair named for both
-    they are the same, also where the motion is chaotic. Looser than `LOOSEST_COLLOCATION` the pair is kept. A tabulated
+    Looser than `LOOSEST_COLLOCATION` the pair is kept, so that a response is the ensemble's sample to the last digit, also
+    where the motion is chaotic, and nothing more is compiled for it. A tabulated
     curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit; a free
     linkage whose loops fold flat passes that within a ten-thousandth of a turn, which long steps see too late; where the
     motion may be stiff, implicit steps are called for.
