@@ -230,7 +230,7 @@ def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():
 
 def test_samples_are_the_scenes_with_their_numbers():
     """Whatever a column drives: masses, lengths, points of the ground, play, speed, a start angle."""
-    scene = rocker("numerics.method=tsitouras")  # by itself a response takes collocation
+    scene = rocker("numerics.method=tsitouras")  # which a tight response would not take
     columns = {
         "mechanism.bodies.coupler.mass": [0.25, 0.35],
         "mechanism.bodies.rocker.length": [0.08, 0.082],
