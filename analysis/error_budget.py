@@ -85,15 +85,16 @@ def scene_of(number: int) -> Scene:
 
 
 class Counted:
-    """`sample_points`, which counts evaluations by stage."""
+    """`sample_points`, which counts evaluations by stage and tolerance."""
 
     def __init__(self) -> None:
-        self.evaluations: Counter[str] = Counter()
+        self.evaluations: Counter[tuple[str, float]] = Counter()
 
     def __call__(self, *arguments: Any, **named: Any) -> np.ndarray:
         records = sample_points(*arguments, **named)
         stage = named["stage"].partition("-")[0].partition(":")[0]
-        self.evaluations[stage] += int(records["rhs_evaluations"].sum())
+        rtol = arguments[0].numerics.rtol
+        self.evaluations[stage, rtol] += int(records["rhs_evaluations"].sum())
         return records
 
 
@@ -131,13 +132,21 @@ def judged(number: int) -> dict[str, Any]:
     best, needed = cheapest(prices, asked, each)
     times = each[rung] * sum(points) / (each[best] * sum(needed)) if needed else np.nan
     whole = sum(counted.evaluations.values()) + sum(pilot.evaluations.values())
-    last = counted.evaluations["verification"]  # the other verified designs are taken to save alike
-    before = (sum(counted.evaluations.values()) - last) * each[best] / each[rung]
+    # what the cheapest split's study takes: verified designs save alike, what is at another tolerance scales with it; pairs,
+    # pilot and what was verified at a looser tolerance before are not needed
+    pairs = sum(n for (stage, _), n in counted.evaluations.items() if stage == "pairs")
+    before = last = 0.0
+    for (stage, rtol), n in counted.evaluations.items():
+        at = min(RUNGS, key=lambda one: abs(np.log(one / rtol)))
+        if stage == "verification":
+            last += n if abs(np.log(rtol / rung)) < 0.1 else 0.0
+        elif stage != "pairs":
+            before += n * each[best] / each[at]
     return {
         "number": number, "asked": asked, "rtol": rung, "sure": split.attrs["sure"], "points": points,
         "errors": found, "truth_errors": errors, "cheapest_rtol": best, "cheapest_points": needed,
         "times": times, "times_whole": whole / (before + last / times),
-        "pilot": sum(pilot.evaluations.values()) / whole,
+        "pilot": (sum(pilot.evaluations.values()) + pairs) / whole,
         "predicted": float(split.attrs["study_evaluations"] / sum(counted.evaluations.values())),
         "within": [[float(verified[f"{m}_within"].sel(design=n)) for m in ("mean", "deviation")]
                    for n in names],
@@ -219,7 +228,7 @@ def summary(rows: list[dict[str, Any]]) -> None:
         )
     pilot, predicted = (np.array([row[key] for row in rows]) for key in ("pilot", "predicted"))
     print(
-        f"pilot: median {np.median(pilot):.1%} of the study; predicted over counted evaluations: "
+        f"pilot and pairs: median {np.median(pilot):.1%} of the study; predicted over counted evaluations: "
         f"median {np.median(predicted):.2f}, within 20 %: {np.mean(abs(predicted - 1) <= 0.2):.0%}"
     )
 

@@ -262,7 +262,7 @@ def test_a_tolerance_that_alpha_needs_tighter_than_the_pilot_is_taken(tmp_path, 
     monkeypatch.setattr(formula, "BEYOND", 10.0)
     told: list[str] = []
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
-    assert any("simulated again at 1e-06" in text for text in told)
+    assert any("designs are verified at 1e-06" in text for text in told)
     found = dataset.read(tmp_path / "it" / "budget.nc", "budget")
     assert found["rtol"].to_numpy()[found["chosen"].to_numpy() == 1] == pytest.approx([1e-6])
     assert found.attrs["searched_rtol"] == pytest.approx(1e-5)
@@ -278,7 +278,7 @@ def test_no_tolerance_is_tightened_for_what_most_samples_ended(tmp_path):
     told: list[str] = []
     few = scene_of("study.verification.most_samples=128", "study.accuracy=0.002")
     run_study(few, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
-    assert not any("simulated again" in text for text in told)
+    assert not any("designs are verified at" in text for text in told)
     assert "study.verification.most_samples ended them" in " ".join(told)
 
 

@@ -50,6 +50,7 @@ from hpcclear.study import (
     responses,
     sensitivities,
     surrogates,
+    tolerance,
     truth,
     verification,
 )
@@ -168,7 +169,9 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
         true = run.stage("verification", truth.simulate, designs, "verification")
         table = verification.named(run, designs, true)
     else:
-        run, shared, true, table = budget.verified(run, budget.asked(given.scene), shared, designs)
+        run, shared, true, table = tolerance.verified(
+            run, budget.asked(given.scene), shared, designs
+        )
     true = {name: values[table.rows] for name, values in true.items()}
     remarks += verification.missed(run, table.choices, true, model)
     for text in remarks:

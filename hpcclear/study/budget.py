@@ -8,7 +8,7 @@ whatever the machine was doing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,12 +20,10 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.stages import SCRAMBLINGS
-from hpcclear.statistics.random.allocation import FALL, Evidence, Split, biases, cheapest
-from hpcclear.study import extent, truth, verification
-from hpcclear.study.optimisation import Choice
+from hpcclear.statistics.random.allocation import Evidence, Split, cheapest
+from hpcclear.study import extent, truth
 from hpcclear.study.pilot import LADDER, Pilot, Simulate
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verification import Table
 
 TIGHTEST = 1e-10
 """Where the ladder ends, if it has to go on."""
@@ -33,7 +31,7 @@ TIGHTEST = 1e-10
 MOST_PAIRS = 64
 """Points of each scrambling that pairs are made of at most."""
 
-PILOT = 0.15
+PILOT = 0.25
 """Share of the study's cost that a pilot may come to by doubled pairs and tighter tolerances."""
 
 LEAST = 128
@@ -42,9 +40,6 @@ LEAST = 128
 SEARCHED = 8
 """Verified designs get so many times the simulations of those that are searched: these meet the same scatter, and their
 differences are known better than they are."""
-
-HIDDEN = 0.25
-"""Standard error of a bias of alpha or beta, over the accuracy, that is small enough."""
 
 MOMENTS = ("mean", "deviation")
 
@@ -235,91 +230,12 @@ def _shares(values: Array) -> str:
     return f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the deviation"
 
 
-def verified(
-    run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice]
-) -> tuple[StudyRun, Budget, Result, Table]:
-    """The stage of verification, and again at a tighter tolerance where alpha and beta turn out to need one.
-
-    The pilot tells what tolerances do to other designs than these, and the least deviation has the largest relative errors:
-    so pairs on these two tell it, before anything is said of them. `wanted`: the accuracy asked, shape (2,).
-    """
-    true = run.stage("verification", truth.simulate, designs, "verification")
-    table = verification.named(run, designs, true)
-    made = _checked(run, wanted, made, table, true)
-    rtol = made.split.rtol
-    if rtol == run.scene.numerics.rtol:
-        return run, made, true, table
-    run.tell(
-        f"Pairs on alpha and beta show that rtol {run.scene.numerics.rtol:.0e} takes more of their accuracy than the "
-        f"samples leave: verified designs are simulated again at {rtol:.0e}."
-    )
-    run = run.of(run.scene.with_({"numerics.rtol": rtol}))
-    true = run.stage("verification-2", truth.simulate, designs, "verification")
-    return run, made, true, verification.named(run, designs, true)
-
-
-def _checked(run: StudyRun, wanted: Array, made: Budget, table: Table, true: Result) -> Budget:
-    """At the loosest tolerance, from the split's on, that is good enough for alpha and beta; the tightest if none is."""
-    named = enumerate(zip(table.choices, table.rows, strict=True))
-    ends = {row: k for k, (one, row) in named if one.name in run.study.case(one.case).ends}
-    rows = list(ends)
-    choices = [table.choices[k] for k in ends.values()]
-    rtol = made.found.rtol[made.split.rung :]
-    longest = int(true["samples"][rows].max()) // SCRAMBLINGS
-    bias, error, spent = _biases(
-        run, choices, rtol, made.found.pairs // SCRAMBLINGS, longest, wanted
-    )
-    # what chance may have made counts as a bias too: a needless tolerance is dear, a missed one makes the answer wrong
-    known = np.sqrt(np.maximum(bias**2 - error**2, 0.0))  # (r - 1, ends, 2)
-    known = np.nan_to_num(np.concatenate([known, FALL * known[-1:]]))
-    # what samples leave, at least the split's share: where `most_samples` ended them no tolerance makes up for it
-    left = np.fmax(wanted**2 - _reach(true)[rows] ** 2, np.fmin(made.split.tolerance, wanted) ** 2)
-    good = (known**2 <= left).all(axis=(1, 2))
-    further = int(good.argmax()) if good.any() else len(rtol) - 1
-    split = replace(made.split, rung=made.split.rung + further, rtol=float(rtol[further]))
-    worst = known[further].max(axis=0, initial=0.0)
-    return replace(made, split=split, pilot=made.pilot + spent, ends=worst)
-
-
-def _biases(
-    run: StudyRun, choices: Sequence[Choice], rtol: Array, length: int, longest: int, wanted: Array
-) -> tuple[Array, Array, float]:
-    """Biases of designs at several tolerances with their errors, (r - 1, designs, 2), and what they took.
-
-    By `length` points of each scrambling, doubled until chance hides no more than a part of the accuracy at the loosest of
-    them, at most to the `longest`.
-    """
-    pairs, spent = np.empty((len(rtol), len(choices), SCRAMBLINGS, 0)), 0.0
-    while True:
-        first = pairs.shape[3]
-        fresh, evaluations = _pairs(run, choices, rtol, first, first or length)
-        pairs, spent = np.concatenate([pairs, fresh], axis=3), spent + evaluations
-        bias, error = biases(rtol, pairs)
-        if (error[0] <= HIDDEN * wanted).all() or 2 * pairs.shape[3] > longest:
-            return bias, error, spent
-
-
-def _pairs(
-    run: StudyRun, choices: Sequence[Choice], rtol: Array, first: int, length: int
-) -> tuple[Array, float]:
-    """The same points of designs at several tolerances, (r, designs, scramblings, length), and what they took."""
-    each = [truth.scattered(run, choice, length, "budget", first) for choice in choices]
-    points = Points(each[0].names, np.concatenate([one.values for one in each]), each[0].paths)
-    values, spent = [], 0.0
-    for number, one in enumerate(rtol.tolist()):
-        scene = run.scene.with_({"numerics.rtol": one})
-        kept = run.part(f"ends-{first}-{number}", _simulated, scene, points)
-        values.append(kept["objective"].reshape(len(choices), SCRAMBLINGS, length))
-        spent += float(kept["evaluations"]) * len(points)
-    return np.stack(values), spent
-
-
 def within(made: Budget, true: Result) -> Array:
     """What each verified design reached, (n, 2): half-widths of its limits with what the tolerance may add, relative."""
-    return np.hypot(_reach(true), made.tolerance_share)
+    return np.hypot(reach_of(true), made.tolerance_share)
 
 
-def _reach(true: Result) -> Array:
+def reach_of(true: Result) -> Array:
     """Relative half-widths of the limits of mean and deviation of verified designs, (n, 2)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in MOMENTS])

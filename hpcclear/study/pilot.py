@@ -23,7 +23,7 @@ LADDER = tuple(10.0**-k for k in range(3, 7))
 """Tolerances of the pilot; the last one is what the others are measured against, and the ladder goes on if none is
 good enough."""
 
-DESIGNS = 5
+DESIGNS = 4
 """Designs of the pilot over all cases, the originals besides."""
 
 SCREENED, SCREENING = 16, 2
@@ -33,7 +33,7 @@ deviation has larger relative errors."""
 PAIRS = 4
 """Points of each scrambling that pairs are made of at first."""
 
-POINTS, POINTS_RTOL = 16, 1e-4
+POINTS, POINTS_RTOL = 8, 1e-4
 """Points of each scrambling that tell how errors of samples fall, and at which tolerance."""
 
 Simulate = Callable[[str, Scene, Points], tuple[Array, float]]

@@ -77,9 +77,9 @@ def simulate(
     """
     settings = run.study.verification
     if settings.draws is not None:
-        return _told(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
-    made = _made(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-    return _told(run, choices, _contested(run, choices, made, stage, purpose))
+        return told_of(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
+    made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+    return told_of(run, choices, _contested(run, choices, made, stage, purpose))
 
 
 def scrambled_length(simulations: int) -> int:
@@ -106,24 +106,48 @@ def sequences(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
 ) -> Result:
     """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
-    return _told(run, choices, _made(run, choices, stage, purpose, length, most))
+    return told_of(run, choices, doubled(run, choices, stage, purpose, length, most))
 
 
-def _made(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
+def doubled(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    stage: str,
+    purpose: str,
+    length: int,
+    most: int,
+    before: Sequence[Array] = (),
 ) -> list[Array]:
-    made = [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
-    rows = list(range(len(choices)))
-    while rows:
-        first = made[rows[0]].shape[2]
-        fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
-        for k, one in zip(rows, fresh, strict=True):
-            made[k] = np.concatenate([made[k], one], axis=2)
-        length = first + length  # a sequence is balanced at powers of two
-        if 2 * length * SCRAMBLINGS > most:
-            break
-        rows = [k for k in rows if not _accurate(run, choices[k], made[k][0])]
-    return made
+    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each scrambling,
+    doubled until accurate or beyond `most` simulations; what was made `before` is gone on from."""
+    made = list(before) or [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    while True:
+        rows = [
+            k for k, one in enumerate(made)
+            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0]))
+        ]  # fmt: skip
+        if not rows:
+            return made
+        first = min(made[k].shape[2] for k in rows)  # a sequence is balanced at powers of two
+        rows = [k for k in rows if made[k].shape[2] == first]
+        lengthen(run, choices, made, rows, stage, purpose, first or length)
+
+
+def lengthen(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    made: list[Array],
+    rows: Sequence[int],
+    stage: str,
+    purpose: str,
+    length: int,
+) -> None:
+    """So many points more of each scrambling of some designs that are equally long; `made` as `doubled` returns it, shape
+    (2, replicates, values) each."""
+    first = made[rows[0]].shape[2]
+    fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
+    for k, one in zip(rows, fresh, strict=True):
+        made[k] = np.concatenate([made[k], one], axis=2)
 
 
 def _contested(
@@ -138,9 +162,7 @@ def _contested(
             return made
         length = min(made[k].shape[2] for k in rows)
         rows = [k for k in rows if made[k].shape[2] == length]
-        fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, length)
-        for k, one in zip(rows, fresh, strict=True):
-            made[k] = np.concatenate([made[k], one], axis=2)
+        lengthen(run, choices, made, rows, stage, purpose, length)
 
 
 def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> list[int]:
@@ -228,8 +250,8 @@ def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
     return [goals.told(goal, values, choice.design, level) for goal in asked]
 
 
-def _told(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """All that is told of designs from their objectives."""
+def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
+    """All that is told of designs from what was made of them, shape (2, replicates, values) each; as `simulate` returns it."""
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
