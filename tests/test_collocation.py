@@ -19,6 +19,7 @@ from hpcclear.dynamics.response import integrate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record
 from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"
@@ -267,15 +268,15 @@ def test_a_response_is_the_ensemble_s_sample(name: str, method: str, rtol: float
 
 def test_who_takes_collocation():
     def taken(changes, **options) -> bool:
-        return problem_of(scene_with(changes, rtol=1e-9), **options).collocation
+        return problem_of(scene_with(changes, rtol=1e-5), **options).collocation
 
     smooth = {"effects.contact": HUNT_CROSSLEY}
-    assert not taken(smooth | {"numerics.rtol": 2e-9}, single=True)  # as its ensemble
+    assert not taken(smooth | {"numerics.rtol": 2e-5}, single=True)  # the pair is as fast
     assert taken(smooth, single=True)
     assert not taken(smooth)  # an ensemble
     assert taken(smooth | {"numerics.method": "lobatto"})
     assert not taken(smooth | {"numerics.method": "dormand-prince"}, single=True)
-    assert not taken(smooth | {"effects.slider_load": CURVE}, single=True)
+    assert taken(smooth | {"effects.slider_load": CURVE}, single=True)
     assert not taken(smooth | {"numerics.formulation": "baumgarte"}, single=True)
     steep = {"effects.friction": {"law": "coulomb", "coefficient": 0.3, "ramp_speed": 1e-4}}
     assert not taken(smooth | steep, single=True)  # stiff: implicit steps may be called for
@@ -284,24 +285,33 @@ def test_who_takes_collocation():
         taken(smooth | both)
 
 
+def test_a_contact_between_two_sweeps_does_not_hold_it_up():
+    """A gap that the last sweep found 1e-8 m on one side of nought, and the state that it left on the other."""
+    linkage = ANALYSIS.parent / "jobs" / "linkages" / "v_twin.toml"
+    short = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
+    twin = load_scene(linkage, [*short, "numerics.method=lobatto", "numerics.rtol=1e-5"])
+    _, outcome, _ = integrate(twin)
+    assert outcome["status"][0] == 0
+
+
 # ---- speed ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_sweep_is_packed(law: str):
-    """Eight stages, a vector each: a loop so short is only vectorised while it needs no run-time check."""
+    """Eight stages, a vector each, however many coordinates; sums over the stages and their quotients are left alone."""
 
     @numba.njit(error_model="numpy", fastmath=FASTMATH)
-    def sweep(m, work):
-        lobatto.take_accelerations(m, work, 4, 1e-6, False)
-        lobatto.guess(m, 4, 1e-6)
+    def sweep(m, work, n):
+        _, back = lobatto.compare(m, n)
+        lobatto.set_stages(m, work, n, 1e-6, at.ACC, back)
+        lobatto.guess(m, n, 1e-6)
 
-    sweep(lobatto.new_memory(), np.zeros(at.WORK))
+    sweep(lobatto.new_memory(), np.zeros(at.WORK), 4)
+    found = executed_arithmetic(sweep.inspect_asm(sweep.signatures[0]))
+    assert found.packed.total() >= 60  # of one coordinate: they are a loop
+    assert found.scalar.total() <= 10
     effects = single(scene(law, 1e-6, 1, 1)).problem.effects
-    for assembly in (
-        sweep.inspect_asm(sweep.signatures[0]),
-        force_evaluation(effects, lobatto.STAGES),
-    ):
-        found = executed_arithmetic(assembly)
-        assert found.packed.total() >= 100
-        assert found.packed_share >= 0.9
+    found = executed_arithmetic(force_evaluation(effects, lobatto.STAGES))
+    assert found.packed.total() >= 100
+    assert found.packed_share >= 0.9

@@ -14,7 +14,7 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.stepper import make_collocation_stepper, quadratures
+from hpcclear.dynamics.collocation.stepper import quadratures
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
 from hpcclear.dynamics.explicit.steps import weigh_rates
@@ -73,8 +73,6 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int):
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match="5 coordinates, not 6"):
-        make_collocation_stepper(6)
     problem = problem_of(scene_with())
     with pytest.raises(ValueError, match="24 coordinates at most, not 25"):
         replace(problem, coordinates=25, atol=50 * problem.atol[:1])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba import typeof
 
-from hpcclear.base.arrays import Array, Booleans, Integers
+from hpcclear.base.arrays import Array, Booleans, Integers, aligned
 from hpcclear.base.beside import compiled_beside
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
@@ -36,20 +36,11 @@ from hpcclear.dynamics.stepping.settings import (
 from hpcclear.dynamics.stepping.special import special_code
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
-LINE = 8  # doubles in a line of the cache
 NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
 OBSERVING = f"{observing_code.__module__}:{observing_code.__name__}"
 IMPLICIT = f"{implicit_code.__module__}:{implicit_code.__name__}"
-
-
-def aligned(count: int) -> Array:
-    """Noughts, shape (count,), that begin where a line of the cache does: vectors across two lines take twice as long to fetch,
-    and where NumPy puts an array is left to chance."""
-    room = np.zeros(count + LINE)
-    first = -(room.ctypes.data // room.itemsize) % LINE
-    return room[first : first + count]
 
 
 class Lanes:
@@ -99,9 +90,9 @@ class Lanes:
             measures,
             numbers_of(self._rules, width, n, len(measures)),
         )
-        self._codes: tuple[Any, ...] = () if problem.collocation else (n, Codes(0, 0, 0))
+        self._codes: tuple[Any, ...] = (n, 0 if problem.collocation else Codes(0, 0, 0))
         self._step = (
-            make_collocation_stepper(n, recorded=record is not None)
+            make_collocation_stepper(recorded=record is not None)
             if problem.collocation
             else make_stepper(width, recorded=record is not None, implicit=implicit)
         )
@@ -121,8 +112,10 @@ class Lanes:
         # of so many lanes, and of eight where evaluations of one lane stand side by side
         widths = (self.width if blocks else 0, LANES if self._memory is not None else 0)
         texts = [problem.motion_text(effects, width) for width in widths if width]
-        apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)] if blocks else []
-        apart += [OBSERVING] if blocks and self.record is not None else []
+        if self.record is not None and not blocks:  # what is read of it afterwards is of one lane
+            texts.append(problem.motion_text(problem.effects, 1))
+        apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)]
+        apart += [OBSERVING] if self.record is not None else []
         open_joints = self._rules.begin, self._rules.end
         beside = f"{IMPLICIT}:{n}:{open_joints[0]}:{open_joints[1]}"
         with compiled_beside([beside] if stiff else apart):  # either is half of it
@@ -132,9 +125,12 @@ class Lanes:
                 special_code()
                 for width in widths:
                     problem.motion(effects, width)
+        special = special_code().address
         if blocks:
             implicit = implicit_code(n, *open_joints).address if stiff else 0
-            self._codes = (n, Codes(special_code().address, explicit, implicit))
+            self._codes = (n, Codes(special, explicit, implicit))
+        else:
+            self._codes = (n, special)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
         if self._rules.profile:

@@ -12,7 +12,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.lobatto import MOST_COORDINATES
 from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.stiff import STEEP
@@ -36,10 +35,10 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-LOOSEST_COLLOCATION = 1e-9
-"""Relative tolerance from which "auto" integrates a single response by collocation. It is the faster method from 1e-5 on, by
-tenths of a millisecond; but its stepper is compiled anew for each number of coordinates, which takes nine seconds before a
-first result, and a response by the pair is its ensemble's sample, step by step."""
+LOOSEST_COLLOCATION = 1e-5
+"""Relative tolerance from which "auto" integrates a single response by collocation: the faster method at equal error, and at
+this tolerance the more accurate one by 100 to 1000. At 1e-4 the pair is as fast, and good to 1e-6 m; at 1e-3 collocation
+reaches the step cap in one scene of thirty."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
@@ -308,13 +307,12 @@ def _bars_of(scene: Scene) -> Mechanism:
 
 
 def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a tight single response.
+    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
 
-    Looser than `LOOSEST_COLLOCATION` the pair is kept, so that a response is the ensemble's sample to the last digit, also
-    where the motion is chaotic, and nothing more is compiled for it. A tabulated
-    curve is smooth only twice over at every cell, and Baumgarte's nine coordinates do not fit; a free
-    linkage whose loops fold flat passes that within a ten-thousandth of a turn, which long steps see too late; where the
-    motion may be stiff, implicit steps are called for.
+    So a response and the sample of an ensemble, which takes the pair, agree to the pair's error; with the pair named for both
+    they are the same, also where the motion is chaotic. Looser than `LOOSEST_COLLOCATION` the pair is kept, and for a free
+    linkage whose loops fold flat: it passes that within a ten-thousandth of a turn, which long steps see too late. Where the
+    motion may be stiff, implicit steps are called for. Baumgarte's formulation has the pair alone.
 
     Raises
     ------
@@ -322,27 +320,21 @@ def takes_collocation(scene: Scene, single: bool) -> bool:
         If it is named and cannot be had.
     """
     minimal = scene.numerics.formulation == "minimal"
-    minimal = minimal and coordinate_count(scene) <= MOST_COORDINATES
     if scene.numerics.method == "lobatto":
         if not minimal:
             raise InputError(
-                "numerics.method",
-                "lobatto",
-                f"works in minimal coordinates only, and with {MOST_COORDINATES} of them at most",
+                "numerics.method", "lobatto", "works in minimal coordinates only",
                 'set numerics.formulation = "minimal" or another method',
-            )
+            )  # fmt: skip
         return True
-    curves: tuple[Any, ...] = (getattr(scene.drive, "torque", None), scene.effects.slider_load)
-    if scene.is_planar:
-        linkage = planar.linkage_of(scene)
-        curves = tuple(curves_of(planar.tables_of(scene)).values())
-        curves += tuple(
-            drive.rows for drive in linkage.mechanism.drives if isinstance(drive, TableDrive)
-        )
-        minimal = minimal and not (linkage.mechanism.free and linkage.forest.closures)
-    smooth = minimal and not any(isinstance(curve, tuple) for curve in curves)
     automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
-    return single and automatic and smooth and scene.numerics.rtol <= LOOSEST_COLLOCATION
+    asked = single and automatic and minimal and scene.numerics.rtol <= LOOSEST_COLLOCATION
+    return asked and not (scene.is_planar and _may_fold(planar.linkage_of(scene)))
+
+
+def _may_fold(linkage: Linkage) -> bool:
+    """Whether a linkage has loops that may fold flat under a drive that does not hold it."""
+    return bool(linkage.mechanism.free and linkage.forest.closures)
 
 
 def _cells_of_curves(

@@ -70,11 +70,12 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
     buffer = np.zeros((_CHUNK, rec.columns(n)))
     lanes = Lanes(problem, 1, buffer)
     lanes.queue(par, start, np.zeros(1, np.int64))
-    chunks = [_first_row(problem, par[0], start[0], n)]
+    chunks = []
     while lanes.pending:
         lanes.advance(0.2)
         chunks.append(lanes.take_record())
-    rows = np.concatenate(chunks)
+    # last: what it calls was compiled beside the stepper
+    rows = np.concatenate([_first_row(problem, par[0], start[0], n), *chunks])
     labels, out, finished = lanes.collect()
     s = rec.STATE
     steps = Steps(

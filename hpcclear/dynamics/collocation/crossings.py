@@ -25,6 +25,16 @@ def gap_before(work, m, p, i):
     return start, length, d0, length * m0, d1, length * m1
 
 
+@lane_function
+def leap(d0, m0, d1, m1):
+    """By how much a gap changes beyond what its rates tell.
+
+    The gap that is known of the start was found with the last sweep before, whose state was still moved a little by its
+    tolerance: a contact that begins between the two would be looked for in shorter and shorter steps.
+    """
+    return abs(d1 - d0 - 0.5 * (m0 + m1))
+
+
 @scalar_function
 def impact_in(work, m, p, settings):
     """Where in this step a joint in flight strikes, as a fraction; 2 if it does not, 1 if at the end; as `meet_impact`."""
@@ -48,8 +58,9 @@ def kink_in(work, m, p, tolerance):
     """Where in this step a gap changes sign, as a fraction; 2 if it does not, or so near an end that it does no harm."""
     for i in range(STAGES):
         start, length, d0, m0, d1, m1 = gap_before(work, m, p, i)
-        at_end = (i == 0 and abs(d0) <= tolerance) or (i == STAGES - 1 and abs(d1) <= tolerance)
-        if d0 * d1 < 0.0 and not at_end:
+        at_start = i == 0 and abs(d0) <= max(tolerance, leap(d0, m0, d1, m1))
+        at_end = i == STAGES - 1 and abs(d1) <= tolerance
+        if d0 * d1 < 0.0 and not (at_start or at_end):
             return start + length * root(d0, m0, d1, m1, 1.0)
     return 2.0
 

@@ -7,8 +7,7 @@ Houwen and Sommeijer 1990, doi:10.1016/0377-0427(90)90200-J; a guess from the po
 error from its last coefficients: Everhart 1985, doi:10.1007/978-94-009-5400-7_17, and Rein and Spiegel 2015,
 doi:10.1093/mnras/stu2164). Eight stages cost little more than one where a vector holds eight numbers.
 
-Everything stands in one flat buffer of rows of eight, at distances the compiler knows: a loop so short is only
-vectorised where no run-time check of overlap is needed. Stages are the lanes of the rows that `layout` names.
+Everything stands in one flat buffer of rows of eight, each a vector. Stages are the lanes of the rows that `layout` names.
 """
 
 import math
@@ -17,9 +16,9 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, aligned
+from hpcclear.base.eight import combined, either, fetch, nine_rows, put, spread, total_of
 from hpcclear.base.jit import lane_function
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import run_motion
 
@@ -27,28 +26,30 @@ STAGES = 8
 """Unknown stages of a step; the last stands at its end."""
 
 _ROWS = STAGES + 1  # of a matrix: one for each node, the start included
-MOST_COORDINATES = 5  # minimal ones of two open joints with a free crank
-COORDINATES = at.COORDINATES[:MOST_COORDINATES]
+_FEW = -(-at.MAX_COORDINATES // STAGES)  # rows that hold a number of each coordinate
 
 PAR = at.WORK  # parameters, the same in every lane
 NODE = PAR + at.PARAMETERS  # where the stages stand in the step, 0 to 1
 MATRIX = NODE + 1  # velocities by accelerations: row l holds the weights of node l
 SQUARE = MATRIX + _ROWS  # coordinates by accelerations, likewise
 LEGENDRE = SQUARE + _ROWS  # coefficients of degree 1 to 8 by accelerations, likewise
-NODE_ACC = LEGENDRE + _ROWS  # accelerations that the stages are made from
-CHANGE = NODE_ACC + MOST_COORDINATES  # by how much those that a sweep found differ from them
-LAST_CHANGE = CHANGE + MOST_COORDINATES  # the same of the sweep before
-LAST_ACC = LAST_CHANGE + MOST_COORDINATES  # what that found
-LAST_ONCE = LAST_ACC + MOST_COORDINATES  # its integrals from the start to the nodes, over h
-LAST_TWICE = LAST_ONCE + MOST_COORDINATES  # and theirs
-COEFFICIENT = LAST_TWICE + MOST_COORDINATES  # of degree 1 to 8, of the accelerations
-GAP_COEFFICIENT = COEFFICIENT + MOST_COORDINATES  # and of a gap
-BASE = GAP_COEFFICIENT + 1  # row: coefficient of degree 0, lane by lane a coordinate
-START_ACC = BASE + 1  # row: accelerations at the start of the step, lane by lane a coordinate
-WEIGHT = START_ACC + 1  # row: squared scale of an acceleration's error over the step, likewise
-# rows: scaled products, by stage, of the change with itself, with its own change, of that with itself
-SQUARES = WEIGHT + 1
-SCALARS = SQUARES + 3
+LAST_NODE = (
+    LEGENDRE + _ROWS
+)  # row: weights of the nodes in the integral over the step, but for the first
+NODE_ACC = LAST_NODE + 1  # accelerations that the stages are made from
+LAST_CHANGE = (
+    NODE_ACC + at.MAX_COORDINATES
+)  # by how much those that the last sweep found differ from them
+LAST_ACC = LAST_CHANGE + at.MAX_COORDINATES  # what that found
+LAST_ONCE = LAST_ACC + at.MAX_COORDINATES  # its integrals from the start to the nodes, over h
+LAST_TWICE = LAST_ONCE + at.MAX_COORDINATES  # and theirs
+COEFFICIENT = LAST_TWICE + at.MAX_COORDINATES  # of degree 1 to 8, of the accelerations
+GAP_COEFFICIENT = COEFFICIENT + at.MAX_COORDINATES  # and of a gap
+BASE = GAP_COEFFICIENT + 1  # rows: coefficient of degree 0, one coordinate after the other
+SINCE = BASE + _FEW  # row: integral of a rate from the start to the nodes, over h
+START_ACC = SINCE + 1  # rows: accelerations at the start of the step, likewise
+WEIGHT = START_ACC + _FEW  # rows: squared scale of an acceleration's error over the step, likewise
+SCALARS = WEIGHT + _FEW
 (
     POLYNOMIAL_STEP,  # s, of the step whose coefficients are kept; 0 when there are none
     FOLLOWS,  # 1 where the step to come begins at that step's end, 0 where at its start
@@ -89,7 +90,9 @@ def matrices() -> tuple[Array, Array, Array]:
 
 def new_memory() -> Array:
     """The buffer of one response, with the method's coefficients in it."""
-    return _template().copy()
+    m = aligned(MEMORY)
+    m[:] = _template()
+    return m
 
 
 @cache
@@ -102,6 +105,7 @@ def _template() -> Array:
     rows[MATRIX : MATRIX + _ROWS] = integral[1:].T
     rows[SQUARE : SQUARE + _ROWS] = double[1:].T
     rows[LEGENDRE : LEGENDRE + _ROWS] = to_coefficients[1:].T
+    rows[LAST_NODE] = integral[-1, 1:]
     return m
 
 
@@ -109,61 +113,33 @@ def _template() -> Array:
 
 
 @lane_function
-def row_of(m, row):
-    """The eight numbers of a row, as locals: the compiler need not ask whether a store changes them."""
-    j = row * STAGES
-    return m[j], m[j + 1], m[j + 2], m[j + 3], m[j + 4], m[j + 5], m[j + 6], m[j + 7]
+def mixed(m, row, new, back):
+    """What a row's new vector becomes with acceleration: less a part of its change. The row keeps the new one itself."""
+    change = either(back != 0.0, (new - fetch(m, row)) * back, spread(0.0))
+    put(m, row, new)
+    return new - change
 
 
 @lane_function
-@unrolled
-def weighted(m, matrix, start, a, i):
-    """Sum over the nodes of a matrix's weights for stage i."""
-    total = m[matrix * STAGES + i] * start
-    for s in written_out(range(STAGES)):
-        total += m[(matrix + 1 + s) * STAGES + i] * a[s]
-    return total
-
-
-@lane_function
-def mixed(m, row, new, back, i):
-    """What a row's new number becomes with acceleration: less a part of its change. The row keeps the new one itself."""
-    change = back * (new - m[row * STAGES + i])
-    m[row * STAGES + i] = new
-    return new - (change if back != 0.0 else 0.0)
-
-
-@lane_function
-def stages_of(m, work, k, h, found, back):
-    """Stages of coordinate k from the accelerations at the nodes that stand from row `found` on."""
-    q, v = work[at.Q + k], work[at.V + k]
-    start = m[START_ACC * STAGES + k]
-    a = row_of(m, found + k)
-    for i in range(STAGES):
-        # sums of what was found, mixed afterwards: they need not wait for `back`
-        dv = mixed(m, LAST_ONCE + k, weighted(m, MATRIX, start, a, i), back, i)
-        dq = mixed(m, LAST_TWICE + k, weighted(m, SQUARE, start, a, i), back, i)
-        new = m[(found + k) * STAGES + i]
-        m[(NODE_ACC + k) * STAGES + i] = mixed(m, LAST_ACC + k, new, back, i)
-        m[(at.VS + k) * STAGES + i] = v + h * dv
-        m[(at.QS + k) * STAGES + i] = q + h * (m[NODE * STAGES + i] * v + h * dq)
-
-
-@lane_function
-@unrolled
 def set_stages(m, work, n, h, found, back):
     """Coordinates and velocities of all stages, from the accelerations from row `found` on, with acceleration by `back`."""
-    for k in written_out(COORDINATES):
-        if k < n:
-            stages_of(m, work, k, h, found, back)
+    once, twice = nine_rows(m, MATRIX), nine_rows(m, SQUARE)
+    node = fetch(m, NODE)
+    for k in range(n):
+        q, v = work[at.Q + k], work[at.V + k]
+        start = m[START_ACC * STAGES + k]
+        # sums of what was found, mixed afterwards: they need not wait for `back`
+        dv = mixed(m, LAST_ONCE + k, combined(once, start, m, found + k), back)
+        dq = mixed(m, LAST_TWICE + k, combined(twice, start, m, found + k), back)
+        put(m, NODE_ACC + k, mixed(m, LAST_ACC + k, fetch(m, found + k), back))
+        put(m, at.VS + k, v + h * dv)
+        put(m, at.QS + k, q + h * (node * v + h * dq))
 
 
 @lane_function
 def set_times(m, work, h):
     """Times of all stages."""
-    t = work[at.TIME]
-    for i in range(STAGES):
-        m[at.STAGE_TIME * STAGES + i] = t + m[NODE * STAGES + i] * h
+    put(m, at.STAGE_TIME, work[at.TIME] + fetch(m, NODE) * h)
 
 
 @lane_function
@@ -173,66 +149,20 @@ def accelerations_of_stages(motion, m, tables):
 
 
 @lane_function
-def weight_of(k, n, m):
-    """Squared scale of coordinate k's acceleration."""
-    if k < n:
-        return m[WEIGHT * STAGES + k]
-    else:
-        return 0.0
-
-
-@lane_function
-@unrolled
 def compare(m, n):
-    """By how much the accelerations found differ from those that the stages were made from, and the products of that."""
-    w: dict = {}
-    for k in written_out(COORDINATES):
-        w[k] = weight_of(k, n, m)
-    for i in range(STAGES):
-        square, along, turn = 0.0, 0.0, 0.0
-        for k in written_out(COORDINATES):
-            if k < n:
-                change = m[(at.ACC + k) * STAGES + i] - m[(NODE_ACC + k) * STAGES + i]
-                bend = change - m[(LAST_CHANGE + k) * STAGES + i]
-                m[(CHANGE + k) * STAGES + i] = change
-                square += w[k] * change * change
-                along += w[k] * change * bend
-                turn += w[k] * bend * bend
-        m[SQUARES * STAGES + i] = square
-        m[(SQUARES + 1) * STAGES + i] = along
-        m[(SQUARES + 2) * STAGES + i] = turn
-
-
-@lane_function
-def sum_of(m, row):
-    """Sum over the stages."""
-    a = row_of(m, row)
-    return ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7]))
-
-
-@lane_function
-@unrolled
-def keep_change(m, n):
-    """Keep the changes for the next sweep."""
-    for i in range(STAGES):
-        for k in written_out(COORDINATES):
-            if k < n:
-                m[(LAST_CHANGE + k) * STAGES + i] = m[(CHANGE + k) * STAGES + i]
-
-
-@lane_function
-def take_accelerations(m, work, n, h, first):
-    """Stages of the next sweep from what this one found. Returns the scaled size of the change.
-
-    With Anderson's acceleration (1965, doi:10.1145/321296.321305) over two sweeps: what changes along the change before
-    falls to nothing.
-    """
-    compare(m, n)
-    turn = sum_of(m, SQUARES + 2)
-    back = sum_of(m, SQUARES + 1) / (turn + 1e-300)
-    set_stages(m, work, n, h, at.ACC, 0.0 if first else back)
-    keep_change(m, n)
-    return math.sqrt(sum_of(m, SQUARES))
+    """By how much the accelerations found differ from those that the stages were made from, scaled; and what part of each
+    change Anderson's acceleration (1965, doi:10.1145/321296.321305) over two sweeps takes back: what changes along the change
+    before falls to nothing."""
+    square, along, turn = spread(0.0), spread(0.0), spread(0.0)
+    for k in range(n):
+        change = fetch(m, at.ACC + k) - fetch(m, NODE_ACC + k)
+        bend = change - fetch(m, LAST_CHANGE + k)
+        put(m, LAST_CHANGE + k, change)
+        scaled = m[WEIGHT * STAGES + k] * change
+        square = square + scaled * change
+        along = along + scaled * bend
+        turn = turn + m[WEIGHT * STAGES + k] * bend * bend
+    return math.sqrt(total_of(square)), total_of(along) / (total_of(turn) + 1e-300)
 
 
 # ---- the polynomial ---------------------------------------------------------------------------------
@@ -241,72 +171,50 @@ def take_accelerations(m, work, n, h, first):
 @lane_function
 def coefficients_of(m, values, start, out):
     """Legendre coefficients of degree 1 to 8 of what stands at the nodes; returns that of degree 0."""
-    a = row_of(m, values)
-    for i in range(STAGES):
-        m[out * STAGES + i] = weighted(m, LEGENDRE, start, a, i)
-    c = row_of(m, out)
+    put(m, out, combined(nine_rows(m, LEGENDRE), start, m, values))
+    c = out * STAGES
     # every polynomial of odd degree is -1 at the start, every other one 1
-    return start + c[0] - c[1] + c[2] - c[3] + c[4] - c[5] + c[6] - c[7]
+    odd = (m[c] + m[c + 2]) + (m[c + 4] + m[c + 6])
+    even = (m[c + 1] + m[c + 3]) + (m[c + 5] + m[c + 7])
+    return start + (odd - even)
 
 
 @lane_function
-def continued(m, k, begin, ratio):
-    """Guess of coordinate k's accelerations at the nodes: the kept polynomial, from `begin` on, stretched by `ratio`."""
-    base = m[BASE * STAGES + k]
-    c = row_of(m, COEFFICIENT + k)
-    for i in range(STAGES):
-        x = 2.0 * (begin + ratio * m[NODE * STAGES + i]) - 1.0
-        p2 = 1.5 * x * x - 0.5
-        p3 = (5.0 / 3.0) * x * p2 - (2.0 / 3.0) * x
-        p4 = 1.75 * x * p3 - 0.75 * p2
-        p5 = 1.8 * x * p4 - 0.8 * p3
-        p6 = (11.0 / 6.0) * x * p5 - (5.0 / 6.0) * p4
-        p7 = (13.0 / 7.0) * x * p6 - (6.0 / 7.0) * p5
-        p8 = 1.875 * x * p7 - 0.875 * p6
-        low = base + c[0] * x + c[1] * p2 + c[2] * p3 + c[3] * p4
-        m[(NODE_ACC + k) * STAGES + i] = low + c[4] * p5 + c[5] * p6 + c[6] * p7 + c[7] * p8
+def continue_polynomial(m, n, begin, ratio):
+    """Guess of the accelerations at the nodes: the kept polynomial, from `begin` on, stretched by `ratio`."""
+    x = 2.0 * (begin + ratio * fetch(m, NODE)) - 1.0
+    p2 = 1.5 * x * x - 0.5
+    p3 = (5.0 / 3.0) * x * p2 - (2.0 / 3.0) * x
+    p4 = 1.75 * x * p3 - 0.75 * p2
+    p5 = 1.8 * x * p4 - 0.8 * p3
+    p6 = (11.0 / 6.0) * x * p5 - (5.0 / 6.0) * p4
+    p7 = (13.0 / 7.0) * x * p6 - (6.0 / 7.0) * p5
+    p8 = 1.875 * x * p7 - 0.875 * p6
+    for k in range(n):
+        c = (COEFFICIENT + k) * STAGES
+        low = m[BASE * STAGES + k] + m[c] * x + m[c + 1] * p2 + m[c + 2] * p3 + m[c + 3] * p4
+        put(m, NODE_ACC + k, low + m[c + 4] * p5 + m[c + 5] * p6 + m[c + 6] * p7 + m[c + 7] * p8)
 
 
 @lane_function
-def constant(m, k):
-    """Guess of coordinate k's accelerations: as at the start."""
-    a = m[START_ACC * STAGES + k]
-    for i in range(STAGES):
-        m[(NODE_ACC + k) * STAGES + i] = a
-
-
-@lane_function
-@unrolled
 def guess(m, n, h):
-    """First guess of the accelerations at the nodes."""
+    """First guess of the accelerations at the nodes; without a polynomial as at the start."""
     old = m[POLYNOMIAL_STEP]
     if old > 0.0:
-        ratio = h / old
-        begin = m[FOLLOWS]
-        for k in written_out(COORDINATES):
-            if k < n:
-                continued(m, k, begin, ratio)
+        continue_polynomial(m, n, m[FOLLOWS], h / old)
     else:
         for k in range(n):
-            constant(m, k)
+            put(m, NODE_ACC + k, spread(m[START_ACC * STAGES + k]))
 
 
 @lane_function
-def keep_coordinate(m, k):
-    """`keep_polynomial` of one coordinate."""
-    start = m[START_ACC * STAGES + k]
-    m[BASE * STAGES + k] = coefficients_of(m, NODE_ACC + k, start, COEFFICIENT + k)
-
-
-@lane_function
-@unrolled
 def keep_polynomial(m, n, h):
     """Coefficients of the accelerations over the step just converged."""
     m[POLYNOMIAL_STEP] = h
     m[FOLLOWS] = 0.0
-    for k in written_out(COORDINATES):
-        if k < n:
-            keep_coordinate(m, k)
+    for k in range(n):
+        start = m[START_ACC * STAGES + k]
+        m[BASE * STAGES + k] = coefficients_of(m, NODE_ACC + k, start, COEFFICIENT + k)
 
 
 @lane_function

@@ -11,6 +11,7 @@ from typing import Any
 from numba import njit
 
 from hpcclear.base.bits import borrowed, rough_exp2, rough_log2
+from hpcclear.base.eight import fetch, put, spread, total_of
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -22,18 +23,28 @@ from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, leave_rates
 from hpcclear.dynamics.stepping.peaks import NEAR, damping, keep_peak
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
-from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
+from hpcclear.dynamics.stepping.sample import OK, failure
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
+    FINISHED,
+    FOUND,
     MAX_STEPS,
     MOTION_OF_EIGHT,
     PARAMETER_ROWS,
     PROFILE,
     RTOL,
 )
-from hpcclear.dynamics.stepping.stops import integrate_gap, stop_free_crank, wrap_crank
+from hpcclear.dynamics.stepping.special import (
+    END_OF_REVOLUTION,
+    END_OF_SAMPLE,
+    NEXT_SAMPLE,
+    ask,
+)
+from hpcclear.dynamics.stepping.stops import integrate_gap, stop_free_crank
 
+NOTHING = -1  # is asked of `special`
 SWEEP_TOLERANCE = 0.05  # of the tolerance on a step's error
+LOG_TOLERANCE = -4.1  # log2 of a little more
 EXPONENT = (
     -0.5 / 11.0
 )  # of the square of the error: the last coefficients over the step go with h^9, their fall with h^2
@@ -51,8 +62,7 @@ BEST_CONTRACTION = 0.15  # of a sweep: longer steps need more of them than they 
 def replicate(par, m, settings):
     """Give every stage the sample's parameters."""
     for r in range(int(settings[PARAMETER_ROWS])):
-        for i in range(STAGES):
-            m[(lob.PAR + r) * STAGES + i] = par[r]
+        put(m, lob.PAR + r, spread(par[r]))
     for s in range(lob.SCALARS * STAGES, lob.MEMORY):
         m[s] = 0.0
     m[lob.CONTRACTION] = 0.1
@@ -65,19 +75,17 @@ def replicate(par, m, settings):
 def begin_contacts(rules, work, m):
     """Contact states and impact speeds of the step, for every stage."""
     for p in range(rules.begin, rules.end):
-        for i in range(STAGES):
-            m[(at.ACTIVE + p) * STAGES + i] = work[at.ACTIVE + p]
-            m[(at.INVERSE_IMPACT + p) * STAGES + i] = work[at.INVERSE_IMPACT + p]
+        put(m, at.ACTIVE + p, spread(work[at.ACTIVE + p]))
+        put(m, at.INVERSE_IMPACT + p, spread(work[at.INVERSE_IMPACT + p]))
 
 
 @lane_function
 def evaluate_start(motion, work, stages, m, tables, n):
     """Accelerations and rates at the start of the step, where they are not known."""
-    for i in range(STAGES):
-        m[at.STAGE_TIME * STAGES + i] = work[at.TIME]
-        for k in range(n):
-            m[(at.QS + k) * STAGES + i] = work[at.Q + k]
-            m[(at.VS + k) * STAGES + i] = work[at.V + k]
+    put(m, at.STAGE_TIME, spread(work[at.TIME]))
+    for k in range(n):
+        put(m, at.QS + k, spread(work[at.Q + k]))
+        put(m, at.VS + k, spread(work[at.V + k]))
     lob.accelerations_of_stages(motion, m, tables)
     for k in range(n):
         stages[k] = m[(at.ACC + k) * STAGES]
@@ -102,36 +110,41 @@ def weigh(work, stages, m, settings, strictness, n):
 
 
 @lane_function
+def converged(rate, change):
+    """Whether all changes to come are small, if each is the last times a rate."""
+    return rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate)
+
+
+@lane_function
 def sweep(motion, work, m, tables, n):
     """Iterate the stages of the step until they have converged. Returns False when they will not in `MOST_SWEEPS`."""
     h = work[at.STEP]
     ratio = h / m[lob.CONTRACTION_STEP]
     # of forces that depend on positions it goes with the square of the step, of damping with the step
     rate = min(m[lob.CONTRACTION] * ratio * max(ratio, 1.0), 0.9)
-    found = UNTESTED * rate
     log_first = 0.0
     done = 0.0
     left = lob.MOST_SWEEPS
     lob.set_times(m, work, h)
     lob.set_stages(m, work, n, h, lob.NODE_ACC, 0.0)
+    predicted = rate
     while left > 0.0:
         lob.accelerations_of_stages(motion, m, tables)
-        change = lob.take_accelerations(m, work, n, h, done == 0.0)
-        work[at.EVALUATIONS] += STAGES
+        change, back = lob.compare(m, n)
+        lob.set_stages(m, work, n, h, at.ACC, back if done > 0.0 else 0.0)
         log_change = rough_log2(change)
         if done > 0.0:
-            # with acceleration one sweep says little: the mean over them
             rate = rough_exp2((log_change - log_first) / done)
-            found = rate
         else:
             log_first = log_change
         done += 1.0
         left -= 1.0
-        # what the stages still miss, and will miss after the last sweep, if the changes go on to fall at this rate
-        if rate < 1.0 and rate * change < SWEEP_TOLERANCE * (1.0 - rate):
+        if converged(rate, change):
             left = -1.0
         elif done > PATIENCE and not rough_log2(rate) * left + log_change < 0.0:
             left = 0.0
+    work[at.EVALUATIONS] += STAGES * done
+    found = rate if done > 1.0 else UNTESTED * predicted
     m[lob.CONTRACTION] = min(max(found, 1e-4), 1e4)
     m[lob.CONTRACTION_STEP] = h
     return left < 0.0
@@ -140,7 +153,7 @@ def sweep(motion, work, m, tables, n):
 @lane_function
 def gap_tail(work, m, p, rtol):
     """Squares of the last two coefficients of joint p's gap and of the two before, scaled as its integral's error is."""
-    row = lob.GAP_COEFFICIENT  # of all joints: into a row that goes by p no vector would be stored
+    row = lob.GAP_COEFFICIENT
     lob.coefficients_of(m, at.RATE_NOW + at.GAP + p, work[at.RATE_OLD + at.GAP + p], row)
     clearance = lob.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
     scale = work[at.STEP] / (rtol * m[clearance * STAGES] * m[(lob.PAR + at.PERIOD) * STAGES])
@@ -172,9 +185,9 @@ def error_of(effects, work, m, rtol, n):
 @lane_function
 def quadrature(work, m, rate):
     """Integral of a rate over the step, over h."""
-    row = lob.row_of(m, at.RATE_NOW + rate)
+    inner = total_of(fetch(m, lob.LAST_NODE) * fetch(m, at.RATE_NOW + rate))
     start = work[at.RATE_OLD + rate]
-    work[at.RATE_SUM + rate] = lob.weighted(m, lob.MATRIX, start, row, STAGES - 1)
+    work[at.RATE_SUM + rate] = m[lob.MATRIX * STAGES + STAGES - 1] * start + inner
 
 
 @lane_function
@@ -289,63 +302,55 @@ def judge_end(effects, block, m, settings, n):
 
 
 @lane_function
-def next_sample(n, block, queue, settings, m):
-    """Take the next sample of the queue, if there is one."""
-    load(0, 1, n, block, queue, settings)
-    replicate(block.par, m, settings)
+def change_sample(special, asked, block, queue, method, m):
+    """Have a revolution or a sample ended, or one begun; the stages get the parameters of the next."""
+    before = queue.counters[FINISHED]
+    ask(special, asked, 0, method.numbers, block, queue, method.settings)
+    if asked == NEXT_SAMPLE or queue.counters[FINISHED] > before:
+        replicate(block.par, m, method.settings)
 
 
 @lane_function
-def advance(n, rules, block, queue, method, record, m, budget):
+def advance(n, special, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample."""
     block, queue, method = borrowed_all(block, queue, method, 1)
     m = borrowed(m)  # type: ignore[call-arg]
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
-    work, stages, book = block.work, block.stages, block.book
+    work, stages, book, numbers = block.work, block.stages, block.book, method.numbers
     if work[at.RUNNING] == 0.0:
-        next_sample(n, block, queue, settings, m)
+        change_sample(special, NEXT_SAMPLE, block, queue, method, m)
     full = False
     while budget > 0 and work[at.RUNNING] > 0.0 and not full:
         budget -= 1
-        try_step(effects, method.numbers[MOTION_OF_EIGHT], block, m, tables, settings, n)
+        asked = NOTHING
+        try_step(effects, numbers[MOTION_OF_EIGHT], block, m, tables, settings, n)
         status = judge_end(effects, block, m, settings, n)
-        goes_on = status == OK
-        if goes_on and work[at.ACCEPT] == 1.0:
+        if status != OK:
+            numbers[FOUND] = status
+            asked = END_OF_SAMPLE
+        elif work[at.ACCEPT] == 1.0:
             record_nodes(record, counters, work, m, book, n)
             if rules.profile:
-                run_motion(method.numbers[PROFILE], work, tables)
-            ended = commit(effects, work, stages, n, 1)
+                run_motion(numbers[PROFILE], work, tables)
+            if commit(effects, work, stages, n, 1) > 0.0:
+                asked = END_OF_REVOLUTION
             record_step(record, counters, work, stages, book, n, 1)
             full = no_room(record, counters)
             after_step(work, m)
-            if ended > 0.0:
-                if rules.turning:
-                    wrap_crank(0, 1, work, n - 1, settings)
-                status = end_revolution(0, 1, work, book, settings)
-                goes_on = status == UNFINISHED
-        if not goes_on:
-            finish(0, 1, n, status, block, queue, settings)
-            next_sample(n, block, queue, settings, m)
+        if asked != NOTHING:
+            change_sample(special, asked, block, queue, method, m)
     return work[at.RUNNING] > 0.0
 
 
 @cache
-def make_collocation_stepper(n: int, *, recorded: bool = False) -> Any:
-    """Return the compiled stepper of one response with n coordinates, whatever joints are open.
+def make_collocation_stepper(*, recorded: bool = False) -> Any:
+    """Return the compiled stepper of one response, whatever its coordinates and joints.
 
-    Its arguments are those of `stepper.make_stepper` with an implicit method, but for the first two; the tableau is not read,
+    Its arguments are those of `stepper.make_stepper` with an implicit method, but for its codes, of which it takes the address
+    of `special.special_code` alone; the tableau is not read,
     and `memory` is what `lobatto.new_memory` makes.
-
-    Raises
-    ------
-    ValueError
-        If there are not 1 to `lobatto.MOST_COORDINATES` coordinates.
     """
-    if not 1 <= n <= lob.MOST_COORDINATES:
-        raise ValueError(f"collocation holds 1 to {lob.MOST_COORDINATES} coordinates, not {n}")
-    known: dict[str, Any] = {"n": n}
-    if not recorded:
-        known["record"] = None
+    known: dict[str, Any] = {} if recorded else {"record": None}
     text = one_text(advance, "collocation", **known)
     return njit(error_model="numpy", fastmath=FASTMATH, cache=True)(text)  # type: ignore[no-any-return]

@@ -1,8 +1,9 @@
 """Keeping every accepted step of a single response: the raw material of time series. Off in ensembles."""
 
+from hpcclear.base.eight import combined, nine_rows, put
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.lobatto import MATRIX, STAGES, row_of, weighted
+from hpcclear.dynamics.collocation.lobatto import MATRIX, SINCE, STAGES
 from hpcclear.dynamics.stepping.settings import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
@@ -47,7 +48,7 @@ def record_nodes(record, counters, work, m, book, n):
     """Append the inner nodes of a step of collocation, which stand in the lanes of `m`, before it is committed."""
     if record is not None:
         for i in range(STAGES - 1):
-            row = counters[RECORDED]
+            row = counters[RECORDED] + i
             turn_time = m[at.STAGE_TIME * STAGES + i]
             record[row, TIME] = book[at.ELAPSED] + turn_time
             record[row, TURN_TIME] = turn_time
@@ -55,17 +56,20 @@ def record_nodes(record, counters, work, m, book, n):
             for k in range(JOINTS):
                 record[row, CONTACTS + k] = m[(at.ACTIVE + k) * STAGES]
                 record[row, CONTACTS + JOINTS + k] = m[(at.INVERSE_IMPACT + k) * STAGES]
-            for r in range(4):
-                power = at.DRIVE_POWER + r
-                rates = row_of(m, at.RATE_NOW + power)
-                since = weighted(m, MATRIX, work[at.RATE_OLD + power], rates, i)
-                done = book[at.TOTAL + at.WORKS + r] + work[at.INTEGRAL + power]
-                record[row, DRIVE_WORK + r] = done + work[at.STEP] * since
             for k in range(n):
                 record[row, STATE + k] = m[(at.QS + k) * STAGES + i]
                 record[row, STATE + n + k] = m[(at.VS + k) * STAGES + i]
                 record[row, STATE + 2 * n + k] = m[(at.ACC + k) * STAGES + i]
-            counters[RECORDED] = row + 1
+        first = counters[RECORDED]
+        counters[RECORDED] = first + STAGES - 1
+        for r in range(4):
+            power = at.DRIVE_POWER + r
+            start = work[at.RATE_OLD + power]
+            put(m, SINCE, combined(nine_rows(m, MATRIX), start, m, at.RATE_NOW + power))
+            done = book[at.TOTAL + at.WORKS + r] + work[at.INTEGRAL + power]
+            for i in range(STAGES - 1):
+                since = m[SINCE * STAGES + i]
+                record[first + i, DRIVE_WORK + r] = done + work[at.STEP] * since
 
 
 @lane_function

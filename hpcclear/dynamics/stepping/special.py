@@ -34,8 +34,8 @@ from hpcclear.dynamics.stepping.stops import (
     wrap_crank,
 )
 
-NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION = range(3)
-"""What may be asked."""
+NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION, END_OF_SAMPLE = range(4)
+"""What may be asked; the status of a sample that ends stands in `FOUND`."""
 
 
 @scalar_function
@@ -78,6 +78,8 @@ def answer(numbers, rules, block, queue, settings):
             wrap_crank(lane, W, block.work, n - 1, settings)
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
+    elif asked == END_OF_SAMPLE:
+        status = numbers[FOUND]
     before = block.work[at.RUNNING * W + lane]
     if ends:
         change_sample(lane, W, n, status, block, queue, settings)

@@ -1,0 +1,193 @@
+"""Vectors of eight numbers as values of compiled code, for what has eight stages side by side.
+
+The compiler makes vectors of short loops only where it can show that no store meets a load, which it cannot once a row's
+place is a number that comes at run time; and Numba reads every one of eight copies that are written out instead, which took
+most of the time to compile. A vector is one value here, whatever rows it comes from. Where registers hold fewer numbers LLVM
+splits it.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.extending import intrinsic, lower_builtin, register_model
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+
+EIGHT = 8
+_LINE = 8  # bytes that a row's place is known to be a multiple of
+
+
+class Eight(types.Type):  # type: ignore[misc]
+    """Numba's type of a vector of eight doubles."""
+
+    def __init__(self) -> None:
+        super().__init__("Eight")
+
+
+eight = Eight()
+_DOUBLE = ir.DoubleType()
+_VECTOR = ir.VectorType(_DOUBLE, EIGHT)
+
+
+def _emitted(function: Callable[..., Any]) -> Any:
+    """What compiled code calls by the name of a function that emits it."""
+    return intrinsic(function)
+
+
+@register_model(Eight)
+class _EightModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _VECTOR)
+
+
+def _spread(builder, number):
+    """A vector of eight times the same number."""
+    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), number, _index(0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), EIGHT), None)
+    return builder.shuffle_vector(one, ir.Constant(_VECTOR, ir.Undefined), mask)
+
+
+def _index(k):
+    return ir.Constant(ir.IntType(32), k)
+
+
+def _indices(first, count):
+    kind = ir.VectorType(ir.IntType(32), count)
+    return ir.Constant(kind, [_index(first + k) for k in range(count)])
+
+
+def _place(context, builder, kind, array, row):
+    """Address of a row of a flat array, as that of a vector."""
+    data = context.make_array(kind)(context, builder, array).data
+    start = builder.mul(row, ir.Constant(row.type, EIGHT))
+    return builder.bitcast(builder.gep(data, [start]), _VECTOR.as_pointer())
+
+
+_CASES = [
+    signature(eight, eight, eight),
+    signature(eight, eight, types.float64),
+    signature(eight, types.float64, eight),
+]
+
+
+def _define(function, name):
+    """`function` of two vectors, or of a vector and a number on either side."""
+
+    class Template(ConcreteTemplate):  # type: ignore[misc]
+        cases = _CASES
+
+    infer_global(function)(Template)
+
+    def lowered(context, builder, sig, args):
+        vectors = [
+            value if kind == eight else _spread(builder, value)
+            for kind, value in zip(sig.args, args, strict=True)
+        ]
+        return getattr(builder, name)(*vectors)
+
+    for case in _CASES:
+        lower_builtin(function, *case.args)(lowered)
+
+
+for _function, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _define(_function, _name)
+
+
+@_emitted
+def fetch(typingctx, array, row):
+    """Row of a flat array of doubles: what stands from 8 row on."""
+
+    def codegen(context, builder, sig, args):
+        return builder.load(_place(context, builder, sig.args[0], *args), align=_LINE)
+
+    return eight(array, types.intp), codegen
+
+
+@_emitted
+def put(typingctx, array, row, vector):
+    """Put a vector into a row of a flat array of doubles."""
+
+    def codegen(context, builder, sig, args):
+        place = _place(context, builder, sig.args[0], *args[:2])
+        builder.store(args[2], place, align=_LINE)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, eight), codegen
+
+
+@_emitted
+def spread(typingctx, number):
+    """A vector of eight times the same number."""
+
+    def codegen(context, builder, sig, args):
+        return _spread(builder, args[0])
+
+    return eight(types.float64), codegen
+
+
+@_emitted
+def nine_rows(typingctx, array, row):
+    """Nine rows of a flat array, one after the other: kept in registers as far as there are any."""
+    kind = types.UniTuple(eight, EIGHT + 1)
+
+    def codegen(context, builder, sig, args):
+        rows = [builder.add(args[1], ir.Constant(args[1].type, k)) for k in range(EIGHT + 1)]
+        vectors = [
+            builder.load(_place(context, builder, sig.args[0], args[0], one), align=_LINE)
+            for one in rows
+        ]
+        return context.make_tuple(builder, kind, vectors)
+
+    return kind(array, types.intp), codegen
+
+
+@_emitted
+def combined(typingctx, rows, first, array, row):
+    """Nine rows times nine numbers, summed: `first`, then those of a row of a flat array."""
+
+    def codegen(context, builder, sig, args):
+        vectors = cgutils.unpack_tuple(builder, args[0])
+        data = context.make_array(sig.args[2])(context, builder, args[2]).data
+        start = builder.mul(args[3], ir.Constant(args[3].type, EIGHT))
+        total = builder.fmul(vectors[0], _spread(builder, args[1]))
+        for k in range(EIGHT):
+            place = builder.gep(data, [builder.add(start, ir.Constant(start.type, k))])
+            number = _spread(builder, builder.load(place))
+            total = builder.fadd(total, builder.fmul(vectors[k + 1], number))
+        return total
+
+    return eight(rows, types.float64, array, types.intp), codegen
+
+
+@_emitted
+def total_of(typingctx, vector):
+    """Sum of a vector's numbers, by halves."""
+
+    def codegen(context, builder, sig, args):
+        left, count = args[0], EIGHT
+        while count > 1:
+            count //= 2
+            halves = [
+                builder.shuffle_vector(
+                    left, ir.Constant(left.type, ir.Undefined), _indices(first, count)
+                )
+                for first in (0, count)
+            ]
+            left = builder.fadd(*halves)
+        return builder.extract_element(left, _index(0))
+
+    return types.float64(eight), codegen
+
+
+@_emitted
+def either(typingctx, condition, vector, other):
+    """The first of two vectors where a condition holds, else the second."""
+
+    def codegen(context, builder, sig, args):
+        return builder.select(args[0], args[1], args[2])
+
+    return eight(types.boolean, eight, eight), codegen
