@@ -93,7 +93,9 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
 
 def methods_agree(scene: Scene, methods: Sequence[str]) -> None:
     """That f is the same to 1e-8 whichever method integrates."""
-    found = {name: run(scene.with_({"numerics.method": name})).out.objective for name in methods}
+    found = {
+        name: float(run(scene.with_({"numerics.method": name})).out.objective) for name in methods
+    }
     assert found == pytest.approx(dict.fromkeys(found, found[methods[0]]), rel=1e-8)
 
 

@@ -78,9 +78,6 @@ def test_what_does_not_fit_is_refused():
         replace(problem, coordinates=25, atol=50 * problem.atol[:1])
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])
-    nine = problem_of(scene_with({"numerics.formulation": "baumgarte"}))
-    with pytest.raises(ValueError, match="collocation holds 1 to 5"):
-        Lanes(replace(nine, collocation=True), 1)
     three = np.eye(3)
     with pytest.raises(ValueError, match="pairs of 7 stages"):
         tab.Tableau("short", 2, 1, three, three[0], three[0], "none")

@@ -72,6 +72,9 @@ _CASES = [
     signature(eight, eight, types.float64),
     signature(eight, types.float64, eight),
 ]
+_OPERATIONS = (
+    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")
+)  # fmt: skip
 
 
 def _define(function, name):
@@ -93,7 +96,7 @@ def _define(function, name):
         lower_builtin(function, *case.args)(lowered)
 
 
-for _function, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+for _function, _name in _OPERATIONS:
     _define(_function, _name)
 
 
@@ -184,6 +187,20 @@ def total_of(typingctx, vector):
 
 
 @_emitted
+def largest_of(typingctx, vector):
+    """The largest of a vector's numbers; which of them where one is none is not said."""
+
+    def codegen(context, builder, sig, args):
+        numbers = [builder.extract_element(args[0], _index(k)) for k in range(EIGHT)]
+        while len(numbers) > 1:
+            pairs = zip(numbers[::2], numbers[1::2], strict=True)
+            numbers = [builder.select(builder.fcmp_ordered(">", a, b), a, b) for a, b in pairs]
+        return numbers[0]
+
+    return types.float64(eight), codegen
+
+
+@_emitted
 def either(typingctx, condition, vector, other):
     """The first of two vectors where a condition holds, else the second."""
 
@@ -191,3 +208,43 @@ def either(typingctx, condition, vector, other):
         return builder.select(args[0], args[1], args[2])
 
     return eight(types.boolean, eight, eight), codegen
+
+
+@_emitted
+def above(typingctx, vector, yes, no):
+    """Of two vectors, number by number, the first where a third is above 0, else the second."""
+
+    def codegen(context, builder, sig, args):
+        nothing = _spread(builder, ir.Constant(_DOUBLE, 0.0))
+        return builder.select(builder.fcmp_ordered(">", args[0], nothing), args[1], args[2])
+
+    return eight(eight, eight, eight), codegen
+
+
+@_emitted
+def size(typingctx, vector):
+    """A vector's numbers without their signs."""
+
+    def codegen(context, builder, sig, args):
+        kind = ir.VectorType(ir.IntType(64), EIGHT)
+        mask = ir.Constant(kind, [ir.Constant(ir.IntType(64), (1 << 63) - 1)] * EIGHT)
+        bits = builder.and_(builder.bitcast(args[0], kind), mask)
+        return builder.bitcast(bits, _VECTOR)
+
+    return eight(eight), codegen
+
+
+@_emitted
+def column(typingctx, array, row, place):
+    """What stands at a place of eight rows of a flat array, one after the other."""
+
+    def codegen(context, builder, sig, args):
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        start = builder.add(builder.mul(args[1], ir.Constant(args[1].type, EIGHT)), args[2])
+        vector = ir.Constant(_VECTOR, ir.Undefined)
+        for k in range(EIGHT):
+            address = builder.gep(data, [builder.add(start, ir.Constant(start.type, EIGHT * k))])
+            vector = builder.insert_element(vector, builder.load(address), _index(k))
+        return vector
+
+    return eight(array, types.intp, types.intp), codegen

@@ -17,7 +17,7 @@ from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.explicit.steps import explicit_code
 from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.memory import LANES
-from hpcclear.dynamics.implicit.stiff import implicit_code
+from hpcclear.dynamics.implicit.stiff import blocks_of, implicit_code
 from hpcclear.dynamics.linkage.observe import observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
@@ -116,8 +116,7 @@ class Lanes:
             texts.append(problem.motion_text(problem.effects, 1))
         apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)]
         apart += [OBSERVING] if self.record is not None else []
-        open_joints = self._rules.begin, self._rules.end
-        beside = f"{IMPLICIT}:{n}:{open_joints[0]}:{open_joints[1]}"
+        beside = f"{IMPLICIT}:{blocks_of(n)}"
         with compiled_beside([beside] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, stiff).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
@@ -127,7 +126,7 @@ class Lanes:
                     problem.motion(effects, width)
         special = special_code().address
         if blocks:
-            implicit = implicit_code(n, *open_joints).address if stiff else 0
+            implicit = implicit_code(blocks_of(n)).address if stiff else 0
             self._codes = (n, Codes(special, explicit, implicit))
         else:
             self._codes = (n, special)

@@ -152,7 +152,7 @@ def explicit_steps(stiff, W, numbers, lanes, settings, weights, tables, measures
         entries[ATOL:SETTINGS],
         of[WIDTH] & 127,
     )
-    effects = at.Stepped(rules_in(of, None, None), carray(measures, of[MEASURES]))
+    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
     take_explicit_steps(effects, of[MOTION], step, carray(tables, at.TABLES), stiff, W)
 
 

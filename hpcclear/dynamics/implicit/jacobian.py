@@ -5,17 +5,15 @@ each law and topology, could not be cheaper.
 """
 
 from hpcclear.base.bits import beyond
+from hpcclear.base.eight import column, fetch, put, spread
 from hpcclear.base.jit import lane_function, scalar_function
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.memory import LANES
+from hpcclear.dynamics.implicit.memory import BLOCKS, LANES
 from hpcclear.dynamics.linkage.rhs import run_motion
 
 _RELATIVE = 1.5e-8  # square root of the round-off
 SECOND_OFFSET = mem.SECOND * LANES
-FIRSTS = range(0, mem.COLUMNS, LANES)
-"""First of each group of columns of the Jacobian."""
 
 
 @scalar_function
@@ -25,97 +23,48 @@ def evaluate_bank(motion, bank, tables):
 
 
 @lane_function
-def fill(m, row, value):
-    """Give a row the same number in every lane."""
-    for i in range(LANES):
-        m[row * LANES + i] = value
-
-
-@lane_function
 def increment(before, least, reach):
     """How far a number is displaced, exactly."""
     return before + min(_RELATIVE * max(abs(before), least), reach * least) - before
 
 
 @lane_function
-def coordinate(k, n, m):
-    """Coordinate k and its velocity at the middle stage, and their increments."""
-    if k < n:
-        q = m[(at.QS + k) * LANES + mem.MIDDLE]
-        v = m[(at.VS + k) * LANES + mem.MIDDLE]
-        by_q = increment(q, m[mem.LEAST + k], m[mem.REACH])
-        return q, v, by_q, increment(v, m[mem.LEAST + n + k], m[mem.REACH])
-    else:
-        return 0.0, 0.0, 0.0, 0.0
+def displace(m, row, least, number, first):
+    """A row of the second bank: that of the middle stage, and in the lane that stands for its own column displaced.
 
-
-@lane_function
-def mark(m, column, i):
-    """1 in the lane that stands for a column of those at hand, else 0."""
-    if 0 <= column < LANES:
-        return m[(mem.MARK + column) * LANES + i]
-    else:
-        return 0.0
-
-
-@lane_function
-def displace(k, n, m, c, first, i):
-    """Coordinate k and its velocity in lane i of the second bank, which stands for a column. Returns its increment."""
-    if k < n:
-        by_q = c[2] * mark(m, k - first, i)
-        by_v = c[3] * mark(m, n + k - first, i)
-        m[(mem.SECOND + at.QS + k) * LANES + i] = c[0] + by_q
-        m[(mem.SECOND + at.VS + k) * LANES + i] = c[1] + by_v
-        return by_q + by_v
-    else:
-        return 0.0
-
-
-@lane_function
-@unrolled
-def displace_all(n, m, first):
-    """States of the second bank: that of the first one's middle stage, each displaced along one coordinate or velocity.
-
-    All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
+    `least`: its size there; `number`: of its column, of which the bank holds those from `first` on.
     """
-    time = m[at.STAGE_TIME * LANES + mem.MIDDLE]
-    c: dict = {}
-    for k in written_out(at.COORDINATES):
-        c[k] = coordinate(k, n, m)
-    for i in range(LANES):
-        m[(mem.SECOND + at.STAGE_TIME) * LANES + i] = time
-        by = 0.0
-        for k in written_out(at.COORDINATES):
-            by += displace(k, n, m, c[k], first, i)
-        m[mem.INCREMENT * LANES + i] = by
-
-
-@lane_function
-def take_differences(n, m, first):
-    """Columns of the Jacobian from `first` on, as many as there are lanes."""
-    for i in range(LANES):
-        inverse = 1.0 / m[mem.INCREMENT * LANES + i]
-        for r in range(n):
-            change = m[(mem.SECOND + at.ACC + r) * LANES + i] - m[mem.BASE + r]
-            m[mem.JACOBIAN + r * mem.COLUMNS + first + i] = change * inverse
-
-
-@lane_function
-def columns(motion, n, m, tables, first):
-    """As many columns of the Jacobian as there are lanes, from `first` on."""
-    if first < 2 * n:
-        displace_all(n, m, first)
-        bank = beyond(m, SECOND_OFFSET)  # type: ignore[call-arg, var-annotated]
-        evaluate_bank(motion, bank, tables)
-        take_differences(n, m, first)
+    value = m[row * LANES + mem.MIDDLE]
+    by = increment(value, least, m[mem.REACH])
+    m[mem.INCREMENT * LANES + number] = by
+    place = number - first
+    mark = place if 0 <= place < LANES else LANES
+    put(m, mem.SECOND + row, value + by * fetch(m, mem.MARK + mark))
 
 
 @scalar_function
-@unrolled
-def difference_jacobian(motion, n, m, tables):
-    """Partial derivatives of the accelerations at the state of the middle stage, into mem.JACOBIAN.
+def displace_all(n, m, first):
+    """States of the second bank: that of the first one's middle stage, each displaced along one coordinate or velocity."""
+    put(m, mem.SECOND + at.STAGE_TIME, spread(m[at.STAGE_TIME * LANES + mem.MIDDLE]))
+    for k in range(n):
+        displace(m, at.QS + k, m[mem.LEAST * LANES + k], k, first)
+        displace(m, at.VS + k, m[(mem.LEAST + BLOCKS) * LANES + k], n + k, first)
+
+
+@scalar_function
+def difference_jacobian(motion, n, blocks, m, tables):
+    """Partial derivatives of the accelerations at the state of the middle stage, into mem.JACOBIAN, column by column.
 
     mem.BASE holds the accelerations there.
     """
-    for first in written_out(FIRSTS):
-        columns(motion, n, m, tables, first)
+    first = 0
+    while first < 2 * n:
+        displace_all(n, m, first)
+        bank = beyond(m, SECOND_OFFSET)  # type: ignore[call-arg, var-annotated]
+        evaluate_bank(motion, bank, tables)
+        for i in range(min(LANES, 2 * n - first)):
+            inverse = 1.0 / m[mem.INCREMENT * LANES + first + i]
+            for b in range(blocks):
+                change = column(m, mem.SECOND + at.ACC + LANES * b, i) - fetch(m, mem.BASE + b)
+                put(m, mem.JACOBIAN + (first + i) * BLOCKS + b, change * inverse)
+        first += LANES

@@ -5,6 +5,7 @@ stages does not converge, so an implicit step is cut to end just beyond the firs
 solution. Each kink is the zero of a smooth function: damping factor, sliding speed at one side of the ramp, at the other, gap.
 """
 
+from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
@@ -29,80 +30,59 @@ LEAST_CUT = 0.02
 
 
 @lane_function
-def entry(m, p, entry, i):
-    """A parameter of joint p."""
-    return m[(mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry) * LANES + i]
+def entry(m, p, entry):
+    """A parameter of joint p, the same in every lane."""
+    return m[(mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry) * LANES]
 
 
 @lane_function
-def damping_part(rules, m, p, rate, i):
+def damping_part(rules, m, p, rate):
     """Damping factor of the normal force; 1 without damping or contact."""
-    damping = entry(m, p, at.DAMPING, i)
+    damping = entry(m, p, at.DAMPING)
     if rules.latched:
-        return 1.0 + damping * rate * m[(at.INVERSE_IMPACT + p) * LANES + i]
+        return 1.0 + damping * m[(at.INVERSE_IMPACT + p) * LANES] * rate
     elif rules.fixed:
         return 1.0 + damping * rate
     else:
-        return 1.0
+        return spread(1.0)
 
 
 @lane_function
-def in_contact(rules, m, gap, p, i):
-    """Whether the joint transmits a force but for its damping."""
-    if rules.latched:
-        return gap > 0.0 and m[(at.ACTIVE + p) * LANES + i] == 1.0
-    else:
-        return gap > 0.0
-
-
-@lane_function
-def impact_ahead(rules, m, p, i):
-    """Whether a change of the gap's sign is the stepper's to find: an impact to be located."""
-    if rules.latched:
-        return m[(at.ACTIVE + p) * LANES + i] == 0.0
-    else:
-        return False
-
-
-@lane_function
-def ramp_sides(rules, m, p, sliding, i):
+def ramp_sides(rules, m, p, sliding):
     """Functions that vanish where friction's ramp begins and ends."""
-    inverse_ramp = entry(m, p, at.INVERSE_RAMP, i)
+    inverse_ramp = entry(m, p, at.INVERSE_RAMP)
     if rules.coulomb:
         return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
     elif rules.ambrosio:
-        ramp = (abs(sliding) - entry(m, p, at.DEAD_SPEED, i)) * inverse_ramp
+        ramp = (size(sliding) - entry(m, p, at.DEAD_SPEED)) * inverse_ramp
         return ramp, ramp - 1.0
     else:
-        return 0.0, 0.0
+        return spread(0.0), spread(0.0)
 
 
 @lane_function
-def kinks_of_joint(rules, m, p, i):
-    """The four functions of joint p at the state in lane i; 0 where no kink can be felt."""
+def kinks_of_joint(rules, m, p):
+    """The four functions of joint p at the states of all lanes; 0 where no kink can be felt."""
     row = mem.KINKS + mem.KINKS_A_JOINT * p
-    gap = m[(at.RATE_NOW + at.GAP + p) * LANES + i]
-    rate = m[(at.RATE_NOW + at.GAP_RATE + p) * LANES + i]
-    sliding = m[(at.RATE_NOW + at.SLIDINGS + p) * LANES + i]
-    factor = damping_part(rules, m, p, rate, i)
-    touches = in_contact(rules, m, gap, p, i)
-    pushes = touches and factor > 0.0
-    low, high = ramp_sides(rules, m, p, sliding, i)
-    free = impact_ahead(rules, m, p, i)
-    unit = GAP_UNIT * entry(m, p, at.CLEARANCE, i)
-    m[row * LANES + i] = factor if touches else 0.0
-    m[(row + 1) * LANES + i] = low if pushes else 0.0
-    m[(row + 2) * LANES + i] = high if pushes else 0.0
-    m[(row + 3) * LANES + i] = 0.0 if free else gap / unit
+    gap = fetch(m, at.RATE_NOW + at.GAP + p)
+    nothing = spread(0.0)
+    # in flight no force is transmitted, and a change of the gap's sign is the stepper's to find: an impact to be located
+    free = rules.latched and m[(at.ACTIVE + p) * LANES] == 0.0
+    touching = nothing if free else gap
+    factor = damping_part(rules, m, p, fetch(m, at.RATE_NOW + at.GAP_RATE + p))
+    factor = above(touching, factor, nothing)
+    low, high = ramp_sides(rules, m, p, fetch(m, at.RATE_NOW + at.SLIDINGS + p))
+    put(m, row, factor)
+    put(m, row + 1, above(factor, low, nothing))
+    put(m, row + 2, above(factor, high, nothing))
+    put(m, row + 3, touching * (1.0 / (GAP_UNIT * entry(m, p, at.CLEARANCE))))
 
 
 @scalar_function
 def kink_functions(rules, m):
     """Kink functions of all open joints at the states of the first bank, as evaluated."""
     for joint in range(rules.begin, rules.end):
-        p = place(joint)
-        for i in range(LANES):
-            kinks_of_joint(rules, m, p, i)
+        kinks_of_joint(rules, m, place(joint))
 
 
 @lane_function

@@ -1,34 +1,57 @@
-"""What the implicit method remembers of a lane from step to step, and its scratch: one flat row of numbers a lane.
+"""What the implicit method remembers of a lane from step to step, and its scratch: one flat row of numbers a lane, in rows of
+eight, each a vector.
 
-It starts with two banks of rows of eight, each laid out like `work` with eight lanes and followed by the lane's parameters, so
-that the functions that run on lanes run on them too. In the first the stages of a step stand side by side, in the second
-the displaced states that the Jacobian's differences are taken from: eight evaluations take no longer than one.
+It starts with two banks laid out like `work` with eight lanes and followed by the lane's parameters, so that the functions that
+run on lanes run on them too. In the first the stages of a step stand side by side, in the second the displaced states that
+the Jacobian's differences are taken from: eight evaluations take no longer than one. Behind them stand vectors over the
+coordinates, each in `BLOCKS` rows: the linear algebra of a step is done on these.
 """
 
 from hpcclear.dynamics import layout as at
 
 LANES = 8
+BLOCKS = -(-at.MAX_COORDINATES // LANES)  # rows that a number of each coordinate takes
 _N = at.MAX_COORDINATES
 
 PAR = at.WORK  # row of the first parameter in a bank
 SECOND = PAR + at.PARAMETERS  # row where the second bank starts
-NODE = 2 * SECOND  # row: where the stages stand in the step; the last one from END on
+# rows:
+NODE = 2 * SECOND  # where the stages stand in the step; the last one from END on
 MATRIX = (
     NODE + 1
-)  # rows: coefficients of the velocities' increments in the stages of the coordinates
-UNIT = MATRIX + 3  # rows: the same in the stages of the velocities
-MARK = UNIT + 3  # rows: the unit matrix
-INCREMENT = MARK + LANES  # row: the increments of the Jacobian's differences
+)  # three: coefficients of the velocities' increments in the stages of the coordinates
+UNIT = MATRIX + 3  # three: the same in the stages of the velocities
+MARK = UNIT + 3  # the unit matrix, and one row of noughts
+HOLE = MARK + LANES + 1  # 1 less these
 KINKS_A_JOINT = 4
 ALL_KINKS = KINKS_A_JOINT * at.MAX_JOINTS
-KINKS = INCREMENT + 1  # rows: kink functions, joint by joint, lane by lane the stages
-COLUMNS = 6 * LANES  # of the Jacobian: by coordinates, then by velocities; the rest is not used
-JACOBIAN = (KINKS + ALL_KINKS) * LANES  # d a_r by the k-th of them at r COLUMNS + k
-SCALARS = JACOBIAN + _N * COLUMNS
+KINKS = HOLE + LANES + 1  # kink functions, joint by joint, lane by lane the stages
+INCREMENT = KINKS + ALL_KINKS  # of the Jacobian's differences, by coordinates, then velocities
+JACOBIAN = INCREMENT + 2 * BLOCKS  # its columns, vectors, by the n coordinates, then velocities
 MIDDLE, END = (
     1,
     2,
-)  # lanes of the second stage and of the last, which stands at the end of the step, as do those after it
+)  # lanes of the second stage and of the last, at the end of the step, as those after it
+# vectors over the coordinates:
+Q = JACOBIAN + 2 * _N * BLOCKS  # at the start of the step
+V = Q + BLOCKS
+Z = V + BLOCKS  # increments of the velocities at the three stages
+KEPT = Z + 3 * BLOCKS  # the same of the step before
+TRANSFORMED = KEPT + 3 * BLOCKS  # those of Z, decoupled
+CHANGE = TRANSFORMED + 3 * BLOCKS
+START = CHANGE + 3 * BLOCKS  # accelerations at the start of the step
+SHIFTED = START + BLOCKS  # those at a start the error estimate has moved, and moves of velocities
+BASE = SHIFTED + 2 * BLOCKS  # accelerations at the state that the Jacobian holds for
+INVERSE_SCALE = BASE + BLOCKS  # of tolerances of coordinates, then of velocities
+LEAST = INVERSE_SCALE + 2 * BLOCKS  # sizes at which absolute and relative tolerance weigh the same
+PIVOT = LEAST + 2 * BLOCKS  # rows that were exchanged of the real system, and of the complex one
+COMPLEX_PIVOT = PIVOT + BLOCKS
+REAL = COMPLEX_PIVOT + BLOCKS  # columns of the inverse of the real system
+COMPLEX_RE = REAL + _N * BLOCKS  # and of the complex one's, real and imaginary part
+COMPLEX_IM = COMPLEX_RE + _N * BLOCKS
+# numbers:
+START_KINKS = (COMPLEX_IM + _N * BLOCKS) * LANES  # kink functions at the start of the step
+SCALARS = START_KINKS + ALL_KINKS
 (
     TIME,  # s, since the start of the revolution
     STEP,  # s
@@ -41,7 +64,7 @@ MIDDLE, END = (
     CONTRACTION,  # of Newton's iteration, rate over 1 - rate
     RATE,  # its last rate of convergence
     RATE_SLOPE,  # 1/s, that rate over the step, when last seen with a new Jacobian; 0 when not since a kink
-    FACTORED_STEP,  # s, for which the factors hold; 0 when they do not
+    FACTORED_STEP,  # s, for which the inverses hold; 0 when they do not
     NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
     KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
@@ -49,23 +72,4 @@ MIDDLE, END = (
     TOLERANCE,  # relative, of a step's error
     REACH,  # of a difference at most, as a part of LEAST
 ) = range(SCALARS, SCALARS + 18)
-Q = SCALARS + 18  # coordinates at the start of the step
-V = Q + _N
-Z = V + _N  # increments of the velocities at the stages, stage by stage
-KEPT = Z + 3 * _N  # the same of the step before
-TRANSFORMED = KEPT + 3 * _N  # those of Z, decoupled
-CHANGE = TRANSFORMED + 3 * _N
-START = CHANGE + 3 * _N  # accelerations at the start of the step
-SHIFTED = (
-    START + _N
-)  # accelerations at a start that the error estimate has moved, and the moves of its velocities
-BASE = SHIFTED + 2 * _N  # accelerations at the state that the Jacobian holds for
-SCALE = BASE + _N  # tolerances of coordinates, then velocities
-LEAST = SCALE + 2 * _N  # sizes at which absolute and relative tolerance weigh the same, likewise
-REAL = LEAST + 2 * _N  # factors of the real system, then of the complex one
-COMPLEX_RE = REAL + _N * _N
-COMPLEX_IM = COMPLEX_RE + _N * _N
-PIVOT = COMPLEX_IM + _N * _N
-COMPLEX_PIVOT = PIVOT + _N
-START_KINKS = COMPLEX_PIVOT + _N  # kink functions at the start of the step
-MEMORY = -(-(START_KINKS + ALL_KINKS) // LANES) * LANES
+MEMORY = -(-(SCALARS + 18) // LANES) * LANES

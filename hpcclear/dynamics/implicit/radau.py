@@ -8,21 +8,24 @@ q' = v allows:
   ``mu/h - da/dv - (h/mu) da/dq``.
 
 The lane's numbers are in `m`, a row as laid out in `memory`: its three stages stand side by side in the first bank, and are
-evaluated together. n is the number of coordinates.
+evaluated together; what is done for all coordinates alike is done on vectors of them. n is the number of coordinates,
+`blocks` that of a vector's rows.
 """
 
 import math
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, aligned
+from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.eight import column, fetch, put, spread, total_of
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.dense import factorise, factorise_complex, solve, solve_complex
-from hpcclear.dynamics.implicit.jacobian import evaluate_bank, fill
-from hpcclear.dynamics.implicit.memory import END, LANES
+from hpcclear.dynamics.implicit.dense import invert_both
+from hpcclear.dynamics.implicit.jacobian import evaluate_bank
+from hpcclear.dynamics.implicit.memory import BLOCKS, END, LANES
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -73,197 +76,198 @@ def new_memory(width: int) -> Array:
 
     Lanes of a bank that no stage needs repeat the last one: what they hold must be a state like any other.
     """
-    m = np.zeros((width, mem.MEMORY))
-    rows = m[:, : mem.JACOBIAN].reshape(width, -1, LANES)
+    m = aligned(width * mem.MEMORY).reshape(width, mem.MEMORY)
+    rows = m.reshape(width, -1, LANES)
     stage = np.minimum(np.arange(LANES), END)
     rows[:, mem.NODE] = NODES[stage]
     rows[:, mem.MATRIX : mem.MATRIX + 3] = MATRIX[stage].T
     rows[:, mem.UNIT : mem.UNIT + 3] = np.eye(3)[stage].T
     rows[:, mem.MARK : mem.MARK + LANES] = np.eye(LANES)
+    rows[:, mem.HOLE : mem.HOLE + LANES + 1] = 1.0 - np.eye(LANES + 1, LANES)
+    rows[:, mem.LEAST : mem.LEAST + 2 * BLOCKS] = 1.0  # of coordinates that are not there
     return m
 
 
 @scalar_function
 def start_of_step(n, m):
     """The start of the step as a stage, in every lane."""
-    fill(m, at.STAGE_TIME, m[mem.TIME])
+    put(m, at.STAGE_TIME, spread(m[mem.TIME]))
     for k in range(n):
-        fill(m, at.QS + k, m[mem.Q + k])
-        fill(m, at.VS + k, m[mem.V + k])
+        put(m, at.QS + k, spread(m[mem.Q * LANES + k]))
+        put(m, at.VS + k, spread(m[mem.V * LANES + k]))
 
 
 @scalar_function
-def factorise_both(n, m, h):
-    """Factors of the real and the complex system for step h. Returns False if one is singular."""
+def make_inverses(n, blocks, m, h):
+    """Inverses of the real and the complex system for step h. Returns False if one is singular."""
     square = MU_RE * MU_RE + MU_IM * MU_IM
-    for r in range(n):
-        for c in range(n):
-            j = r * n + c
-            unit = 1.0 / h if r == c else 0.0
-            by_q = m[mem.JACOBIAN + r * mem.COLUMNS + c]
-            by_v = m[mem.JACOBIAN + r * mem.COLUMNS + n + c]
-            m[mem.REAL + j] = MU * unit - by_v - (h / MU) * by_q
-            m[mem.COMPLEX_RE + j] = MU_RE * unit - by_v - (h * MU_RE / square) * by_q
-            m[mem.COMPLEX_IM + j] = MU_IM * unit + (h * MU_IM / square) * by_q
     m[mem.FACTORED_STEP] = h
-    real = factorise(n, m, mem.REAL, mem.PIVOT)
-    return factorise_complex(n, m, mem.COMPLEX_RE, mem.COMPLEX_IM, mem.COMPLEX_PIVOT) and real
+    for c in range(n * BLOCKS):
+        by_q, by_v = fetch(m, mem.JACOBIAN + c), fetch(m, mem.JACOBIAN + n * BLOCKS + c)
+        less = spread(0.0) - by_v
+        put(m, mem.REAL + c, less - (h / MU) * by_q)
+        put(m, mem.COMPLEX_RE + c, less - (h * MU_RE / square) * by_q)
+        put(m, mem.COMPLEX_IM + c, (h * MU_IM / square) * by_q)
+    for c in range(n):
+        place = c * BLOCKS * LANES + c
+        m[mem.REAL * LANES + place] += MU / h
+        m[mem.COMPLEX_RE * LANES + place] += MU_RE / h
+        m[mem.COMPLEX_IM * LANES + place] += MU_IM / h
+    return invert_both(n, blocks, m)
+
+
+@lane_function
+def weights_at(x):
+    """Weights of the three stages in the polynomial at x."""
+    return (
+        x * (BASIS[0, 0] + x * (BASIS[0, 1] + x * BASIS[0, 2])),
+        x * (BASIS[1, 0] + x * (BASIS[1, 1] + x * BASIS[1, 2])),
+        x * (BASIS[2, 0] + x * (BASIS[2, 1] + x * BASIS[2, 2])),
+    )
+
+
+@lane_function
+@unrolled
+def put_stages(m, b, z0, z1, z2):
+    """Keep the velocities' increments at the three stages, and these decoupled."""
+    put(m, mem.Z + b, z0)
+    put(m, mem.Z + BLOCKS + b, z1)
+    put(m, mem.Z + 2 * BLOCKS + b, z2)
+    for s in written_out(range(3)):
+        row = mem.TRANSFORMED + s * BLOCKS + b
+        put(m, row, T_INVERSE[s, 0] * z0 + T_INVERSE[s, 1] * z1 + T_INVERSE[s, 2] * z2)
 
 
 @scalar_function
-def guess_stages(n, m, h):
+def guess_stages(blocks, m, h):
     """First guess of the stages: the polynomial of the step before, or of the longer try from the same start.
 
     Without either, the velocities at the start.
     """
     old = m[mem.POLYNOMIAL_STEP]
-    continues = m[mem.CONTINUES] == 1.0
-    for s in range(3):
-        for k in range(n):
-            m[mem.CHANGE + s * n + k] = 0.0
-        if old > 0.0:
-            x = NODES[s] * h / old
-            x = 1.0 + x if continues else x
-            for j in range(3):
-                weight = x * (BASIS[j, 0] + x * (BASIS[j, 1] + x * BASIS[j, 2]))
-                weight -= 1.0 if (continues and j == 2) else 0.0
-                for k in range(n):
-                    m[mem.CHANGE + s * n + k] += weight * m[mem.Z + j * n + k]
-    for s in range(3):
-        for k in range(n):
-            m[mem.Z + s * n + k] = m[mem.CHANGE + s * n + k]
-    for s in range(3):
-        for k in range(n):
-            total = 0.0
-            for j in range(3):
-                total += T_INVERSE[s, j] * m[mem.Z + j * n + k]
-            m[mem.TRANSFORMED + s * n + k] = total
+    after = 1.0 if m[mem.CONTINUES] == 1.0 else 0.0
+    ratio = h / old if old > 0.0 else 0.0
+    there = 1.0 if old > 0.0 else 0.0
+    w0 = weights_at(after + NODES[0] * ratio)
+    w1 = weights_at(after + NODES[1] * ratio)
+    w2 = weights_at(after + NODES[2] * ratio)
+    for b in range(blocks):
+        z0 = there * fetch(m, mem.Z + b)
+        z1 = there * fetch(m, mem.Z + BLOCKS + b)
+        z2 = there * fetch(m, mem.Z + 2 * BLOCKS + b)
+        put_stages(
+            m, b,
+            w0[0] * z0 + w0[1] * z1 + (w0[2] - after) * z2,
+            w1[0] * z0 + w1[1] * z1 + (w1[2] - after) * z2,
+            w2[0] * z0 + w2[1] * z1 + (w2[2] - after) * z2,
+        )  # fmt: skip
 
 
 @scalar_function
-def guess_from_start(n, m, h):
+def guess_from_start(blocks, m, h):
     """First guess of the stages: the accelerations at the start."""
-    for s in range(3):
-        for k in range(n):
-            m[mem.Z + s * n + k] = NODES[s] * h * m[mem.START + k]
+    for b in range(blocks):
+        a = h * fetch(m, mem.START + b)
+        put_stages(m, b, NODES[0] * a, NODES[1] * a, NODES[2] * a)
     m[mem.POLYNOMIAL_STEP] = h
     m[mem.CONTINUES] = 0.0
-    guess_stages(n, m, h)
 
 
 @scalar_function
-def copy_polynomial(n, m, source, target):
+def copy_polynomial(m, source, target):
     """Copy the increments at the stages."""
-    for j in range(3 * n):
-        m[target + j] = m[source + j]
+    for j in range(3 * BLOCKS):
+        put(m, target + j, fetch(m, source + j))
+
+
+@scalar_function
+def evaluate_stages(motion, n, m, tables, h):
+    """Coordinates and velocities of the stages from the increments of the velocities; accelerations and rates there."""
+    node = fetch(m, mem.NODE)
+    u0, u1, u2 = fetch(m, mem.UNIT), fetch(m, mem.UNIT + 1), fetch(m, mem.UNIT + 2)
+    a0, a1, a2 = fetch(m, mem.MATRIX), fetch(m, mem.MATRIX + 1), fetch(m, mem.MATRIX + 2)
+    put(m, at.STAGE_TIME, m[mem.TIME] + node * h)
+    for k in range(n):
+        v = m[mem.V * LANES + k]
+        z0, z1, z2 = (
+            m[mem.Z * LANES + k],
+            m[(mem.Z + BLOCKS) * LANES + k],
+            m[(mem.Z + 2 * BLOCKS) * LANES + k],
+        )
+        put(m, at.VS + k, v + (u0 * z0 + u1 * z1 + u2 * z2))
+        put(m, at.QS + k, m[mem.Q * LANES + k] + h * (node * v + (a0 * z0 + a1 * z1 + a2 * z2)))
+    evaluate_bank(motion, m, tables)
 
 
 @lane_function
-def start_and_increments(k, n, m):
-    """Coordinate k and its velocity at the start of the step, and the velocity's increments at the stages."""
-    if k < n:
-        z = mem.Z + k
-        return m[mem.Q + k], m[mem.V + k], m[z], m[z + n], m[z + 2 * n]
-    else:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
+def residuals(blocks, m, h):
+    """What is left of the decoupled equations, to mem.CHANGE."""
+    lam, re, im = MU / h, MU_RE / h, MU_IM / h
+    for b in range(blocks):
+        row = at.ACC + LANES * b
+        f0, f1, f2 = column(m, row, 0), column(m, row, 1), column(m, row, 2)
+        w0 = fetch(m, mem.TRANSFORMED + b)
+        w1 = fetch(m, mem.TRANSFORMED + BLOCKS + b)
+        w2 = fetch(m, mem.TRANSFORMED + 2 * BLOCKS + b)
+        r0 = T_INVERSE[0, 0] * f0 + T_INVERSE[0, 1] * f1 + T_INVERSE[0, 2] * f2
+        r1 = T_INVERSE[1, 0] * f0 + T_INVERSE[1, 1] * f1 + T_INVERSE[1, 2] * f2
+        r2 = T_INVERSE[2, 0] * f0 + T_INVERSE[2, 1] * f1 + T_INVERSE[2, 2] * f2
+        put(m, mem.CHANGE + b, r0 - lam * w0)
+        put(m, mem.CHANGE + BLOCKS + b, r1 - (re * w1 - im * w2))
+        put(m, mem.CHANGE + 2 * BLOCKS + b, r2 - (re * w2 + im * w1))
 
 
 @lane_function
-def weighted(m, row, c, i):
-    """Sum of a coordinate's increments with the weights that three rows give them in lane i."""
-    total = m[row * LANES + i] * c[2]
-    total += m[(row + 1) * LANES + i] * c[3]
-    total += m[(row + 2) * LANES + i] * c[4]
-    return total
-
-
-@lane_function
-def stage_of(k, n, m, c, h, i):
-    """Coordinate k and its velocity at stage i."""
-    if k < n:
-        m[(at.VS + k) * LANES + i] = c[1] + weighted(m, mem.UNIT, c, i)
-        change = m[mem.NODE * LANES + i] * c[1] + weighted(m, mem.MATRIX, c, i)
-        m[(at.QS + k) * LANES + i] = c[0] + h * change
+def solved(n, m, b):
+    """Block b of the three decoupled changes, from what is left of their equations."""
+    x, y, z = spread(0.0), spread(0.0), spread(0.0)
+    for k in range(n):
+        c0 = m[mem.CHANGE * LANES + k]
+        c1 = m[(mem.CHANGE + BLOCKS) * LANES + k]
+        c2 = m[(mem.CHANGE + 2 * BLOCKS) * LANES + k]
+        i = k * BLOCKS + b
+        re, im = fetch(m, mem.COMPLEX_RE + i), fetch(m, mem.COMPLEX_IM + i)
+        x = x + c0 * fetch(m, mem.REAL + i)
+        y = y + c1 * re - c2 * im
+        z = z + c2 * re + c1 * im
+    return x, y, z
 
 
 @scalar_function
 @unrolled
-def evaluate_stages(motion, n, m, tables, h):
-    """Coordinates and velocities of the stages from the increments of the velocities; accelerations and rates there.
-
-    All in one loop, and from locals: the compiler vectorises neither shorter loops nor what a store might change.
-    """
-    t = m[mem.TIME]
-    c: dict = {}
-    for k in written_out(at.COORDINATES):
-        c[k] = start_and_increments(k, n, m)
-    for i in range(LANES):
-        m[at.STAGE_TIME * LANES + i] = t + m[mem.NODE * LANES + i] * h
-        for k in written_out(at.COORDINATES):
-            stage_of(k, n, m, c[k], h, i)
-    evaluate_bank(motion, m, tables)
-
-
-@scalar_function
-def correct(n, m, h):
+def correct(n, blocks, m, h):
     """One correction of simplified Newton. Returns its size relative to the tolerance."""
-    lam, re, im = MU / h, MU_RE / h, MU_IM / h
-    for k in range(n):
-        row = (at.ACC + k) * LANES
-        f0, f1, f2 = m[row], m[row + 1], m[row + 2]
-        w0, w1, w2 = (
-            m[mem.TRANSFORMED + k],
-            m[mem.TRANSFORMED + n + k],
-            m[mem.TRANSFORMED + 2 * n + k],
-        )
-        r0 = T_INVERSE[0, 0] * f0 + T_INVERSE[0, 1] * f1 + T_INVERSE[0, 2] * f2
-        r1 = T_INVERSE[1, 0] * f0 + T_INVERSE[1, 1] * f1 + T_INVERSE[1, 2] * f2
-        r2 = T_INVERSE[2, 0] * f0 + T_INVERSE[2, 1] * f1 + T_INVERSE[2, 2] * f2
-        m[mem.CHANGE + k] = r0 - lam * w0
-        m[mem.CHANGE + n + k] = r1 - (re * w1 - im * w2)
-        m[mem.CHANGE + 2 * n + k] = r2 - (re * w2 + im * w1)
-    solve(n, m, mem.REAL, mem.PIVOT, mem.CHANGE)
-    solve_complex(
-        n,
-        m,
-        mem.COMPLEX_RE,
-        mem.COMPLEX_IM,
-        mem.COMPLEX_PIVOT,
-        mem.CHANGE + n,
-        mem.CHANGE + 2 * n,
-    )
-    total = 0.0
-    for k in range(n):
-        inverse_v = 1.0 / m[mem.SCALE + n + k]
-        inverse_q = h / (MU * m[mem.SCALE + k])
-        weight = inverse_v * inverse_v + inverse_q * inverse_q
-        for s in range(3):
-            change = m[mem.CHANGE + s * n + k]
-            total += weight * change * change
-            m[mem.TRANSFORMED + s * n + k] += change
-        w0, w1, w2 = (
-            m[mem.TRANSFORMED + k],
-            m[mem.TRANSFORMED + n + k],
-            m[mem.TRANSFORMED + 2 * n + k],
-        )
-        for s in range(3):
-            m[mem.Z + s * n + k] = T[s, 0] * w0 + T[s, 1] * w1 + T[s, 2] * w2
-    return math.sqrt(total / (3.0 * n))
+    residuals(blocks, m, h)
+    total = spread(0.0)
+    for b in range(blocks):
+        x, y, z = solved(n, m, b)
+        by_q = (h / MU) * fetch(m, mem.INVERSE_SCALE + b)
+        by_v = fetch(m, mem.INVERSE_SCALE + BLOCKS + b)
+        total = total + (by_v * by_v + by_q * by_q) * (x * x + y * y + z * z)
+        w0 = fetch(m, mem.TRANSFORMED + b) + x
+        w1 = fetch(m, mem.TRANSFORMED + BLOCKS + b) + y
+        w2 = fetch(m, mem.TRANSFORMED + 2 * BLOCKS + b) + z
+        put(m, mem.TRANSFORMED + b, w0)
+        put(m, mem.TRANSFORMED + BLOCKS + b, w1)
+        put(m, mem.TRANSFORMED + 2 * BLOCKS + b, w2)
+        for s in written_out(range(3)):
+            put(m, mem.Z + s * BLOCKS + b, T[s, 0] * w0 + T[s, 1] * w1 + T[s, 2] * w2)
+    return math.sqrt(total_of(total) / (3.0 * n))
 
 
 @scalar_function
-def newton(motion, n, m, tables, h, known):
+def newton(motion, n, blocks, m, tables, h, known):
     """Solve for the stages. Returns how many iterations it took, negative if it did not converge.
 
     `known`: the stages of the first guess have been evaluated already.
     """
     before = 1.0
-    contraction = max(m[mem.CONTRACTION], 1e-16) ** 0.8
+    contraction = rough_exp2(0.8 * rough_log2(max(m[mem.CONTRACTION], 1e-16)))
     m[mem.RATE] = 0.0
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0 or not known:
             evaluate_stages(motion, n, m, tables, h)
-        change = correct(n, m, h)
+        change = correct(n, blocks, m, h)
         if iteration > 0:
             rate = change / before
             m[mem.RATE] = max(m[mem.RATE], rate)
@@ -271,7 +275,7 @@ def newton(motion, n, m, tables, h, known):
                 return -(iteration + 1)
             contraction = rate / (1.0 - rate)
             left = MAX_ITERATIONS - 1 - iteration
-            if contraction * change * rate**left > NEWTON_TOLERANCE:
+            if contraction * change * rough_exp2(left * rough_log2(rate)) > NEWTON_TOLERANCE:
                 return -(iteration + 1)
         if not change < 1e10:
             return -(iteration + 1)
@@ -282,48 +286,62 @@ def newton(motion, n, m, tables, h, known):
     return -MAX_ITERATIONS
 
 
+@lane_function
+def product(n, m, matrix, vector, b):
+    """Block b of a matrix times a vector, both by their first rows."""
+    total = spread(0.0)
+    for k in range(n):
+        total = total + m[vector * LANES + k] * fetch(m, matrix + k * BLOCKS + b)
+    return total
+
+
 @scalar_function
-def filtered_error(n, m, h):
+def filtered_error(n, blocks, m, h):
     """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in mem.CHANGE (v, then q).
 
     Reads the accelerations at the start and shifts of the velocities there from mem.SHIFTED on. Returns the sum of the
     scaled squares.
     """
-    for k in range(n):
-        sum_q = 0.0
-        sum_v = 0.0
-        for j in range(3):
-            sum_q += ERROR_BY_MATRIX[j] * m[mem.Z + j * n + k]
-            sum_v += ERROR_WEIGHTS[j] * m[mem.Z + j * n + k]
-        m[mem.CHANGE + n + k] = m[mem.SHIFTED + n + k] + sum_q
-        m[mem.CHANGE + k] = m[mem.SHIFTED + k] + sum_v / h
-    for r in range(n):
-        total = 0.0
-        for k in range(n):
-            total += m[mem.JACOBIAN + r * mem.COLUMNS + k] * m[mem.CHANGE + n + k]
-        m[mem.CHANGE + r] += h / MU * total
-    solve(n, m, mem.REAL, mem.PIVOT, mem.CHANGE)
-    total = 0.0
-    for k in range(n):
-        m[mem.CHANGE + n + k] = h / MU * (m[mem.CHANGE + k] + m[mem.CHANGE + n + k])
-        v = m[mem.CHANGE + k] / m[mem.SCALE + n + k]
-        q = m[mem.CHANGE + n + k] / m[mem.SCALE + k]
-        total += v * v + q * q
-    return total
+    by_v, by_q = mem.CHANGE, mem.CHANGE + BLOCKS
+    for b in range(blocks):
+        z0, z1, z2 = (
+            fetch(m, mem.Z + b),
+            fetch(m, mem.Z + BLOCKS + b),
+            fetch(m, mem.Z + 2 * BLOCKS + b),
+        )
+        q = ERROR_BY_MATRIX[0] * z0 + ERROR_BY_MATRIX[1] * z1 + ERROR_BY_MATRIX[2] * z2
+        v = ERROR_WEIGHTS[0] * z0 + ERROR_WEIGHTS[1] * z1 + ERROR_WEIGHTS[2] * z2
+        put(m, by_q + b, fetch(m, mem.SHIFTED + BLOCKS + b) + q)
+        put(m, by_v + b, fetch(m, mem.SHIFTED + b) + (1.0 / h) * v)
+    for b in range(blocks):
+        put(m, by_v + b, fetch(m, by_v + b) + (h / MU) * product(n, m, mem.JACOBIAN, by_q, b))
+    total = spread(0.0)
+    for b in range(blocks):  # behind what is still read
+        put(m, mem.CHANGE + 2 * BLOCKS + b, product(n, m, mem.REAL, by_v, b))
+    for b in range(blocks):
+        v = fetch(m, mem.CHANGE + 2 * BLOCKS + b)
+        q = (h / MU) * (v + fetch(m, by_q + b))
+        put(m, by_v + b, v)
+        put(m, by_q + b, q)
+        v = v * fetch(m, mem.INVERSE_SCALE + BLOCKS + b)
+        q = q * fetch(m, mem.INVERSE_SCALE + b)
+        total = total + v * v + q * q
+    return total_of(total)
 
 
 @scalar_function
-def refilter_error(motion, n, m, tables, h):
+def refilter_error(motion, n, blocks, m, tables, h):
     """The estimate once more, from the start moved by the estimate: for a first try that looked too inaccurate."""
-    fill(m, at.STAGE_TIME, m[mem.TIME])
+    put(m, at.STAGE_TIME, spread(m[mem.TIME]))
     for k in range(n):
-        fill(m, at.VS + k, m[mem.V + k] + m[mem.CHANGE + k])
-        fill(m, at.QS + k, m[mem.Q + k] + m[mem.CHANGE + n + k])
+        by_q = m[(mem.CHANGE + BLOCKS) * LANES + k]
+        put(m, at.VS + k, spread(m[mem.V * LANES + k] + m[mem.CHANGE * LANES + k]))
+        put(m, at.QS + k, spread(m[mem.Q * LANES + k] + by_q))
     evaluate_bank(motion, m, tables)
-    for k in range(n):
-        m[mem.SHIFTED + k] = m[(at.ACC + k) * LANES + END]
-        m[mem.SHIFTED + n + k] = m[mem.CHANGE + k]
-    return filtered_error(n, m, h)
+    for b in range(blocks):
+        put(m, mem.SHIFTED + b, column(m, at.ACC + LANES * b, END))
+        put(m, mem.SHIFTED + BLOCKS + b, fetch(m, mem.CHANGE + b))
+    return filtered_error(n, blocks, m, h)
 
 
 @lane_function
@@ -370,8 +388,9 @@ def next_step(m, h, error, iterations):
     """Step size for the next try: by the error, and predictive after Gustafsson 1994 (doi:10.1145/198429.198437)."""
     safety = STEP_SAFETY * (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
     error = max(error, 1e-10)
-    factor = safety * error**-0.25
+    factor = safety / math.sqrt(math.sqrt(error))
     if error <= 1.0 and m[mem.ACCEPTED_STEP] > 0.0:
-        trend = h / m[mem.ACCEPTED_STEP] * (m[mem.ACCEPTED_ERROR] / (error * error)) ** 0.25
+        before = math.sqrt(m[mem.ACCEPTED_ERROR]) / error
+        trend = h / m[mem.ACCEPTED_STEP] * math.sqrt(before)
         factor = min(factor, STEP_SAFETY * trend)
     return h * min(max(factor, LARGEST_SHRINK), LARGEST_GROWTH)

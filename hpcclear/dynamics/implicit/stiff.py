@@ -12,11 +12,12 @@ from typing import Any
 from numba import carray, cfunc, types
 
 from hpcclear.base.bits import call_at
+from hpcclear.base.eight import column, fetch, largest_of, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank, fill
+from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
 from hpcclear.dynamics.implicit.kinks import (
     BEYOND,
     GUESSED_BEYOND,
@@ -24,15 +25,15 @@ from hpcclear.dynamics.implicit.kinks import (
     kink_fraction,
     kinks_of_start,
 )
-from hpcclear.dynamics.implicit.memory import END, LANES
+from hpcclear.dynamics.implicit.memory import BLOCKS, END, LANES
 from hpcclear.dynamics.implicit.radau import (
     copy_polynomial,
     evaluate_stages,
-    factorise_both,
     filtered_error,
     gap_errors,
     guess_from_start,
     guess_stages,
+    make_inverses,
     means_of_step,
     newton,
     next_step,
@@ -42,6 +43,7 @@ from hpcclear.dynamics.implicit.radau import (
 from hpcclear.dynamics.stepping.control import leave_rates
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
+    COORDINATES,
     LANE,
     MEASURES,
     MOTION_OF_EIGHT,
@@ -135,11 +137,13 @@ def fit_to_ramp(m, settings):
 def take_over(n, lane, W, par, m, settings):
     """Forget what is known of an earlier stretch: the lane comes from the explicit method or is new."""
     for k in range(int(settings[PARAMETER_ROWS])):
-        fill(m, mem.PAR + k, par[k * W + lane])
-        fill(m, mem.SECOND + mem.PAR + k, par[k * W + lane])
+        value = spread(par[k * W + lane])
+        put(m, mem.PAR + k, value)
+        put(m, mem.SECOND + mem.PAR + k, value)
     for k in range(n):
-        m[mem.LEAST + k] = settings[ATOL + k] / settings[RTOL]
-        m[mem.LEAST + n + k] = settings[ATOL + at.MAX_COORDINATES + k] / settings[RTOL]
+        by_v = settings[ATOL + at.MAX_COORDINATES + k]
+        m[mem.LEAST * LANES + k] = settings[ATOL + k] / settings[RTOL]
+        m[(mem.LEAST + BLOCKS) * LANES + k] = by_v / settings[RTOL]
     m[mem.POLYNOMIAL_STEP] = 0.0
     m[mem.KEPT_STEP] = 0.0
     m[mem.CONTINUES] = 1.0
@@ -160,12 +164,13 @@ def fetch_contacts(rules, lane, W, work, m):
     """Contact states of the open joints, in both banks."""
     for p in range(rules.begin, rules.end):
         for row in (at.ACTIVE + p, at.INVERSE_IMPACT + p):
-            fill(m, row, work[row * W + lane])
-            fill(m, mem.SECOND + row, work[row * W + lane])
+            value = spread(work[row * W + lane])
+            put(m, row, value)
+            put(m, mem.SECOND + row, value)
 
 
 @scalar_function
-def fetch(effects, motion, n, lane, W, block, m, tables):
+def fetch_start(effects, motion, n, blocks, lane, W, block, m, tables):
     """Bring the start of the step into the lane's memory."""
     work, stages = block.work, block.stages
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
@@ -173,8 +178,8 @@ def fetch(effects, motion, n, lane, W, block, m, tables):
     m[mem.STEP] = work[at.STEP * W + lane]
     fetch_contacts(effects.rules, lane, W, work, m)
     for k in range(n):
-        m[mem.Q + k] = work[(at.Q + k) * W + lane]
-        m[mem.V + k] = work[(at.V + k) * W + lane]
+        m[mem.Q * LANES + k] = work[(at.Q + k) * W + lane]
+        m[mem.V * LANES + k] = work[(at.V + k) * W + lane]
     fresh = work[at.FRESH * W + lane] == 1.0
     unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if unknown:
@@ -193,32 +198,32 @@ def fetch(effects, motion, n, lane, W, block, m, tables):
         m[mem.RATE_SLOPE] = 0.0
         m[mem.CEILING] = math.inf
         m[mem.KEPT_STEP] = 0.0
-    rtol = m[mem.TOLERANCE]
     for k in range(n):
-        m[mem.START + k] = stages[k * W + lane]
-        m[mem.SCALE + k] = rtol * (m[mem.LEAST + k] + abs(m[mem.Q + k]))
-        m[mem.SCALE + n + k] = rtol * (m[mem.LEAST + n + k] + abs(m[mem.V + k]))
+        m[mem.START * LANES + k] = stages[k * W + lane]
+    for b in range(blocks):
+        for row in (0, BLOCKS):  # coordinates, then velocities
+            there = fetch(m, mem.LEAST + row + b) + size(fetch(m, mem.Q + row + b))
+            put(m, mem.INVERSE_SCALE + row + b, 1.0 / (m[mem.TOLERANCE] * there))
 
 
 @scalar_function
-def norm_of_jacobian(n, m):
+def norm_of_jacobian(n, blocks, m):
     """Estimate of the largest eigenvalue in 1/s from row sums, in units that make angles and lengths comparable."""
-    by_q = 0.0
-    by_v = 0.0
-    for r in range(n):
-        row_q = 0.0
-        row_v = 0.0
+    by_q, by_v = 0.0, 0.0
+    for b in range(blocks):
+        rows_q, rows_v = spread(0.0), spread(0.0)
         for k in range(n):
-            unit = m[mem.LEAST + n + k] / m[mem.LEAST + n + r]
-            row_q += abs(m[mem.JACOBIAN + r * mem.COLUMNS + k]) * unit
-            row_v += abs(m[mem.JACOBIAN + r * mem.COLUMNS + n + k]) * unit
-        by_q = max(by_q, row_q)
-        by_v = max(by_v, row_v)
+            unit = m[(mem.LEAST + BLOCKS) * LANES + k]
+            rows_q = rows_q + unit * size(fetch(m, mem.JACOBIAN + k * BLOCKS + b))
+            rows_v = rows_v + unit * size(fetch(m, mem.JACOBIAN + (n + k) * BLOCKS + b))
+        unit = 1.0 / fetch(m, mem.LEAST + BLOCKS + b)
+        by_q = max(by_q, largest_of(rows_q * unit))
+        by_v = max(by_v, largest_of(rows_v * unit))
     return by_v + math.sqrt(by_q)
 
 
 @scalar_function
-def cut_at_kink(effects, motion, n, lane, W, work, m, tables):
+def cut_at_kink(effects, motion, n, blocks, lane, W, work, m, tables):
     """Evaluate the guessed stages, and cut the step if they show a kink."""
     h = m[mem.STEP]
     evaluate_stages(motion, n, m, tables, h)
@@ -231,26 +236,27 @@ def cut_at_kink(effects, motion, n, lane, W, work, m, tables):
         work[at.STEP * W + lane] = h
         work[at.ENDING * W + lane] = 0.0
         m[mem.CONTINUES] = 0.0
-        guess_stages(n, m, h)
+        guess_stages(blocks, m, h)
         evaluate_stages(motion, n, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 3.0
 
 
 @scalar_function
-def new_jacobian(motion, n, m, tables, guessed):
+def new_jacobian(motion, n, blocks, m, tables, guessed):
     """Jacobian at the second guessed stage, or at the start where there is no guess."""
     if not guessed:
         start_of_step(n, m)
-    for k in range(n):
-        m[mem.BASE + k] = m[(at.ACC + k) * LANES + mem.MIDDLE] if guessed else m[mem.START + k]
-    difference_jacobian(motion, n, m, tables)
-    m[mem.NORM] = norm_of_jacobian(n, m)
+    for b in range(blocks):
+        here = column(m, at.ACC + LANES * b, mem.MIDDLE) if guessed else fetch(m, mem.START + b)
+        put(m, mem.BASE + b, here)
+    difference_jacobian(motion, n, blocks, m, tables)
+    m[mem.NORM] = norm_of_jacobian(n, blocks, m)
     m[mem.NEW_JACOBIAN] = 1.0
     m[mem.FACTORED_STEP] = 0.0
 
 
 @scalar_function
-def begin_step(effects, motion, n, lane, W, block, m, tables, settings):
+def begin_step(effects, motion, n, blocks, lane, W, block, m, tables, settings):
     """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
     work = block.work
     first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
@@ -260,42 +266,42 @@ def begin_step(effects, motion, n, lane, W, block, m, tables, settings):
         m[mem.ACCEPTED_STEP] = m[mem.STEP]
         m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
         m[mem.NEW_JACOBIAN] = 0.0
-        copy_polynomial(n, m, mem.Z, mem.KEPT)
+        copy_polynomial(m, mem.Z, mem.KEPT)
         m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
         m[mem.CONTINUES] = 1.0
-    fetch(effects, motion, n, lane, W, block, m, tables)
+    fetch_start(effects, motion, n, blocks, lane, W, block, m, tables)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
     if first:
-        guess_from_start(n, m, m[mem.STEP])
+        guess_from_start(blocks, m, m[mem.STEP])
     else:
-        guess_stages(n, m, m[mem.STEP])
+        guess_stages(blocks, m, m[mem.STEP])
     return m[mem.POLYNOMIAL_STEP] > 0.0
 
 
 @scalar_function
-def solve_step(effects, motion, n, lane, W, work, m, tables, guessed):
+def solve_step(effects, motion, n, blocks, lane, W, work, m, tables, guessed):
     """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
     if guessed:
-        cut_at_kink(effects, motion, n, lane, W, work, m, tables)
+        cut_at_kink(effects, motion, n, blocks, lane, W, work, m, tables)
     h = m[mem.STEP]
     stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
     if stale and m[mem.NEW_JACOBIAN] == 0.0:
-        new_jacobian(motion, n, m, tables, guessed)
+        new_jacobian(motion, n, blocks, m, tables, guessed)
         work[at.EVALUATIONS * W + lane] += 2.0 * n
-    if m[mem.FACTORED_STEP] != h and not factorise_both(n, m, h):
+    if m[mem.FACTORED_STEP] != h and not make_inverses(n, blocks, m, h):
         return -1
-    iterations = newton(motion, n, m, tables, h, guessed)
+    iterations = newton(motion, n, blocks, m, tables, h, guessed)
     evaluated = abs(iterations) - 1 if guessed else abs(iterations)
     work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
     return iterations
 
 
 @scalar_function
-def give_up(n, lane, W, work, m):
+def give_up(lane, W, work, m):
     """The iteration failed: a shorter step by the polynomial of the step before, with a Jacobian that is nearer."""
     h = m[mem.STEP]
-    copy_polynomial(n, m, mem.KEPT, mem.Z)
+    copy_polynomial(m, mem.KEPT, mem.Z)
     m[mem.POLYNOMIAL_STEP] = m[mem.KEPT_STEP]
     m[mem.CONTINUES] = 1.0
     m[mem.NEW_JACOBIAN] = 0.0
@@ -308,14 +314,14 @@ def give_up(n, lane, W, work, m):
 
 
 @scalar_function
-def implicit_step(effects, motion, n, lane, W, block, tables, memory, settings):
+def implicit_step(effects, motion, n, blocks, lane, W, block, tables, memory, settings):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
     work = block.work
-    guessed = begin_step(effects, motion, n, lane, W, block, m, tables, settings)
-    iterations = solve_step(effects, motion, n, lane, W, work, m, tables, guessed)
+    guessed = begin_step(effects, motion, n, blocks, lane, W, block, m, tables, settings)
+    iterations = solve_step(effects, motion, n, blocks, lane, W, work, m, tables, guessed)
     if iterations < 0:
-        give_up(n, lane, W, work, m)
+        give_up(lane, W, work, m)
         return
     h = m[mem.STEP]
     m[mem.POLYNOMIAL_STEP] = h
@@ -329,20 +335,20 @@ def implicit_step(effects, motion, n, lane, W, block, tables, memory, settings):
         work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
     else:
         m[mem.KINK_CUTS] = 0.0
-        judge(effects, motion, n, lane, W, work, m, tables, iterations)
+        judge(effects, motion, n, blocks, lane, W, work, m, tables, iterations)
 
 
 @scalar_function
-def judge(effects, motion, n, lane, W, work, m, tables, iterations):
+def judge(effects, motion, n, blocks, lane, W, work, m, tables, iterations):
     """Error of a converged step, its integrals, its end and the step to try next."""
     h = m[mem.STEP]
-    for k in range(n):
-        m[mem.SHIFTED + k] = m[mem.START + k]
-        m[mem.SHIFTED + n + k] = 0.0
-    total = filtered_error(n, m, h)
+    for b in range(blocks):
+        put(m, mem.SHIFTED + b, fetch(m, mem.START + b))
+        put(m, mem.SHIFTED + BLOCKS + b, spread(0.0))
+    total = filtered_error(n, blocks, m, h)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
     if total > 2.0 * n and uneasy:
-        total = refilter_error(motion, n, m, tables, h)
+        total = refilter_error(motion, n, blocks, m, tables, h)
         work[at.EVALUATIONS * W + lane] += 1.0
     # as the last correction left them: integrals fit the end of the step
     evaluate_stages(motion, n, m, tables, h)
@@ -392,11 +398,11 @@ def leave(effects, n, lane, W, work, m):
 
 
 @scalar_function
-def implicit_steps(n, begin, end, numbers, work, stages, par, settings, tables, measures, memory):
-    """`implicit_step` of one lane, with arrays at addresses; the joints from `begin` to `end` are open."""
+def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measures, memory):
+    """`implicit_step` of one lane, with arrays at addresses."""
     of = carray(numbers, NUMBERS)
     W = of[WIDTH]
-    effects = at.Stepped(rules_in(of, begin, end), carray(measures, of[MEASURES]))
+    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
     block = at.Block(
         carray(work, at.WORK * W),
         carray(stages, at.MAX_COORDINATES * W),
@@ -404,8 +410,8 @@ def implicit_steps(n, begin, end, numbers, work, stages, par, settings, tables, 
         None,
     )
     implicit_step(
-        effects, of[MOTION_OF_EIGHT], n, of[LANE], W, block, carray(tables, at.TABLES), carray(memory, (W, mem.MEMORY)),
-        carray(settings, SETTINGS),
+        effects, of[MOTION_OF_EIGHT], of[COORDINATES], blocks, of[LANE], W, block, carray(tables, at.TABLES),
+        carray(memory, (W, mem.MEMORY)), carray(settings, SETTINGS),
     )  # fmt: skip
 
 
@@ -413,11 +419,16 @@ _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
 SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
 
 
+def blocks_of(n: int) -> int:
+    """Rows that a vector over n coordinates takes."""
+    return -(-n // LANES)
+
+
 @cache
-def implicit_code(n: int, begin: int, end: int) -> Any:
-    """The compiled implicit step of n coordinates and the open joints from `begin` to `end`, for any lanes; its ``address`` is
-    what steppers take. Loops over so few joints are dear unless their ends are known."""
-    text = one_text(implicit_steps, f"implicit_{n}_{begin}_{end}", n=n, begin=begin, end=end)
+def implicit_code(blocks: int) -> Any:
+    """The compiled implicit step of any lanes and joints, and of as many coordinates as so many rows of eight hold, nearly
+    always one; its ``address`` is what steppers take."""
+    text = one_text(implicit_steps, f"implicit_{blocks}", blocks=blocks)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
 
 

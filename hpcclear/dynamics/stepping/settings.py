@@ -45,14 +45,9 @@ def numbers_of(rules: at.Rules, width: int, n: int, measures: int) -> Integers:
 
 
 @lane_function
-def rules_in(numbers, begin, end):
-    """The rules among such numbers; `begin` and `end` where they are compiled in, or None."""
+def rules_in(numbers):
+    """The rules among such numbers."""
     r = RULES
-    if begin is not None:
-        return at.Rules(
-            numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
-            numbers[r + 5], numbers[r + 6], numbers[r + 7], begin, end,
-        )  # fmt: skip
     return at.Rules(
         numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
         numbers[r + 5], numbers[r + 6], numbers[r + 7], numbers[r + 8], numbers[r + 9],

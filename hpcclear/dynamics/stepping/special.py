@@ -106,7 +106,7 @@ def special(numbers, work, stages, par, book, settings, queued, starts, out, fin
         carray(finished, slots),
         counts,
     )
-    answer(of, rules_in(of, None, None), block, queue, entries)
+    answer(of, rules_in(of), block, queue, entries)
 
 
 _NUMBERS, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
