@@ -506,6 +506,18 @@ def test_what_is_far_dearer_without_an_effect_ends_as_failed():
     assert aimed.simulated((0,)).numerics.target_revolutions == 350
 
 
+def test_fewer_implicit_steps_make_as_many_evaluations():
+    steep = ["effects.friction.ramp_speed=1e-4", "effects.friction.coefficient=0.3"]
+    trial = Trial(load_scene(SCENE, [*steep, "effects.gravity=9.81"]))
+    records = np.zeros(4, OUTCOME)
+    records["rhs_evaluations"] = 96_000
+    trial.seen(Asked((), 0, 1), records)
+    names = [one.name for one in trial.switches]
+    most = {name: trial.simulated((names.index(name),)).numerics.max_steps for name in names}
+    assert most["gravity"] == 5 * 96_000 // 16 + 1000
+    assert most["friction in joints"] == 5 * 96_000 // 6 + 1000
+
+
 # ---- points ----------------------------------------------------------------------------------------
 
 
