@@ -268,10 +268,10 @@ def test_a_response_is_the_ensemble_s_sample(name: str, method: str, rtol: float
 
 def test_who_takes_collocation():
     def taken(changes, **options) -> bool:
-        return problem_of(scene_with(changes, rtol=1e-5), **options).collocation
+        return problem_of(scene_with(changes, rtol=3e-5), **options).collocation
 
     smooth = {"effects.contact": HUNT_CROSSLEY}
-    assert not taken(smooth | {"numerics.rtol": 2e-5}, single=True)  # the pair is as fast
+    assert not taken(smooth | {"numerics.rtol": 4e-5}, single=True)  # the pair is as fast
     assert taken(smooth, single=True)
     assert not taken(smooth)  # an ensemble
     assert taken(smooth | {"numerics.method": "lobatto"})

@@ -13,8 +13,6 @@ from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 TURN = 6.283185307179586  # rad
 
 MAX_COORDINATES = 24
-COORDINATES = np.arange(MAX_COORDINATES)
-"""For loops written out over them: as numbers they would have every function compiled anew for each of them."""
 
 
 class Effects(NamedTuple):

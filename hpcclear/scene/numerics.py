@@ -24,7 +24,7 @@ class Numerics(Table):
     """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
     "radau" always, "auto" as "switching" in scenes with steep friction ramps, strong damping, oil or bristles, as "radau"
     where bars bend in modes too fast for explicit steps, in others
-    "lobatto" for a single response with rtol up to 1e-5 and else "tsitouras"."""
+    "lobatto" for a single response with rtol up to 3e-5 and else "tsitouras"."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None

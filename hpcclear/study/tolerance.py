@@ -76,7 +76,7 @@ def _verify(run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice
         if rung == last:
             bias, error = FALL * bias, FALL * error
         # what chance may have made counts no more: a needless tolerance is dear
-        known = np.sqrt(np.maximum(bias**2 - error**2, 0.0))
+        known = np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0)))
         if rung < last and not (known <= left).all():
             rung, taken = rung + 1, {}
             continue
