@@ -156,12 +156,15 @@ def combined(typingctx, rows, first, array, row):
         vectors = cgutils.unpack_tuple(builder, args[0])
         data = context.make_array(sig.args[2])(context, builder, args[2]).data
         start = builder.mul(args[3], ir.Constant(args[3].type, EIGHT))
-        total = builder.fmul(vectors[0], _spread(builder, args[1]))
+        # two sums side by side: each addition waits for the one before
+        sums = [builder.fmul(vectors[0], _spread(builder, args[1])), None]
         for k in range(EIGHT):
             place = builder.gep(data, [builder.add(start, ir.Constant(start.type, k))])
             number = _spread(builder, builder.load(place))
-            total = builder.fadd(total, builder.fmul(vectors[k + 1], number))
-        return total
+            product, which = builder.fmul(vectors[k + 1], number), (k + 1) % 2
+            before = sums[which]
+            sums[which] = product if before is None else builder.fadd(before, product)
+        return builder.fadd(*sums)
 
     return eight(rows, types.float64, array, types.intp), codegen
 

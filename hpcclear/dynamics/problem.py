@@ -37,8 +37,8 @@ IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 
 LOOSEST_COLLOCATION = 10.0**-4.5
 """Relative tolerance from which "auto" integrates a single response by collocation: the faster method at equal error, and at
-this tolerance the more accurate one by 100 to 1000. At 1e-4 the pair is as fast, and good to 1e-6 m; there collocation takes one
-mechanism of ten, a platform on three loops, so far off that it jams (never in 800 of its variants at 5e-5)."""
+this tolerance the more accurate one by 100 to 1000. At 1e-4 the pair is as fast, and good to 1e-6 m; there collocation takes
+one mechanism of seven, a platform on three loops, so far off that it jams (never in 800 of its variants at 5e-5)."""
 
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""

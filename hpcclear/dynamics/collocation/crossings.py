@@ -1,5 +1,6 @@
 """Contacts that begin or end inside a step of collocation: found between its nodes, and the step cut to end there."""
 
+from hpcclear.base.eight import fetch, largest_of
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto as lob
@@ -76,13 +77,8 @@ def contact_change(latched, work, m, p, settings):
 @lane_function
 def range_of(work, m, rate):
     """Least and greatest value of a rate at the start and at the nodes."""
-    low = work[at.RATE_OLD + rate]
-    high = low
-    for i in range(STAGES):
-        value = m[(at.RATE_NOW + rate) * STAGES + i]
-        low = min(low, value)
-        high = max(high, value)
-    return low, high
+    start, nodes = work[at.RATE_OLD + rate], fetch(m, at.RATE_NOW + rate)
+    return min(start, -largest_of(-1.0 * nodes)), max(start, largest_of(nodes))
 
 
 @lane_function

@@ -11,7 +11,7 @@ from typing import Any
 from numba import njit
 
 from hpcclear.base.bits import borrowed, rough_exp2, rough_log2
-from hpcclear.base.eight import fetch, put, spread, total_of
+from hpcclear.base.eight import fetch, largest_of, put, spread, total_of
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -211,9 +211,17 @@ def end_of_step(effects, work, m, n):
 
 
 @lane_function
+def may_hold_peaks(work, m, p):
+    """Whether joint p's force or penetration in this step may be the largest so far: mostly it is in flight."""
+    force = max(largest_of(fetch(m, at.RATE_NOW + at.FORCE + p)), work[at.RATE_OLD + at.FORCE + p])
+    depth = max(largest_of(fetch(m, at.RATE_NOW + at.GAP + p)), work[at.RATE_OLD + at.GAP + p])
+    return NEAR * force > work[at.PEAK + p] or NEAR * depth > work[at.DEEPEST + p]
+
+
+@lane_function
 def peaks_between(rules, work, par, m, p):
     """Extremes of joint p at the nodes of an accepted step and between them, its end left to `commit`."""
-    if work[at.AVERAGING] == 1.0:
+    if work[at.AVERAGING] == 1.0 and may_hold_peaks(work, m, p):
         c = damping(rules, work, par, p, 0, 1)
         force = work[at.RATE_OLD + at.FORCE + p]
         for i in range(STAGES):
