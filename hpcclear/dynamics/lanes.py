@@ -112,8 +112,6 @@ class Lanes:
         # of so many lanes, and of eight where evaluations of one lane stand side by side
         widths = (self.width if blocks else 0, LANES if self._memory is not None else 0)
         texts = [problem.motion_text(effects, width) for width in widths if width]
-        if self.record is not None and not blocks:  # what is read of it afterwards is of one lane
-            texts.append(problem.motion_text(problem.effects, 1))
         apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)]
         apart += [OBSERVING] if self.record is not None else []
         beside = f"{IMPLICIT}:{blocks_of(n)}"

@@ -13,6 +13,7 @@ from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
+from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import outcome_records, responses_told
@@ -114,15 +115,11 @@ def _observed(
     n = problem.coordinates
     out = np.zeros((len(times), n + Rates.size))
     states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
-    observe(
-        problem.motion(problem.effects, 1).address,
-        par,
-        problem.tables,
-        states,
-        contacts,
-        times,
-        out,
-    )
+    # by the motion that is compiled anyway
+    width = STAGES if problem.collocation else 1
+    effects = problem.effects._replace(sliding=1) if problem.collocation else problem.effects
+    motion = problem.motion(effects, width).address
+    observe(motion, par, problem.tables, states, contacts, times, out, width)
     return out[:, :n], Rates(out[:, n:])
 
 
@@ -297,7 +294,7 @@ def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Recor
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
     steps, record, par = integrate(scene, copy)
     times = instants(scene, steps)
-    problem = problem_of(scene, ledger=True, series=True)
+    problem = problem_of(scene, ledger=True, series=True, single=True)
     turning = bool(at.rules_of(problem.effects).turning)  # the crank angle is the last coordinate
     q, v, contacts, k, s = _between(steps, times, problem.cycle if turning else 0.0)
     turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]

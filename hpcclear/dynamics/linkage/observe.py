@@ -12,15 +12,17 @@ from hpcclear.dynamics.linkage.rhs import run_motion
 
 
 def observe(
-    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: Array, out: Array
-) -> None:
+    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: Array, out: Array,
+    width: int = 1,
+) -> None:  # fmt: skip
     """Fill `out` (instants, n + RATES) with accelerations and rates.
 
-    `motion`: address of a motion of one lane (`rhs.motion_of`); `states` (instants, 2 n): coordinates, then velocities;
+    `motion`: address of a motion of so many lanes (`rhs.motion_of`); `states` (instants, 2 n): coordinates, then velocities;
     `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times` (instants,): since the start of the revolution;
     `tables`: as `Problem.tables`.
     """
-    _observe(motion, new_lane(par), tables, states, contacts, times, out)
+    lanes = np.repeat(new_lane(par), width)
+    _observe(motion, width, lanes, tables, states, contacts, times, out)
 
 
 def new_lane(par: Array) -> Array:
@@ -29,33 +31,36 @@ def new_lane(par: Array) -> Array:
 
 
 @scalar_function
-def _observe(motion, lane, tables, states, contacts, times, out):
-    """`observe` by a lane at hand."""
-    n = states.shape[1] // 2
-    for row in range(len(times)):
-        put_state(lane, contacts[row], times[row], states[row], n)
-        run_motion(motion, lane, tables)
-        for k in range(n):
-            out[row, k] = lane[at.ACC + k]
-        for r in range(at.RATES):
-            out[row, n + r] = lane[at.RATE_NOW + r]
+def _observe(motion, W, lanes, tables, states, contacts, times, out):
+    """`observe` by lanes at hand; those that are left over at the end repeat the last instant."""
+    n, count = states.shape[1] // 2, len(times)
+    for first in range(0, count, W):
+        for i in range(W):
+            row = min(first + i, count - 1)
+            put_state(lanes, contacts[row], times[row], states[row], n, W, i)
+        run_motion(motion, lanes, tables)
+        for i in range(min(W, count - first)):
+            for k in range(n):
+                out[first + i, k] = lanes[(at.ACC + k) * W + i]
+            for r in range(at.RATES):
+                out[first + i, n + r] = lanes[(at.RATE_NOW + r) * W + i]
 
 
 def observing_code() -> None:
     """Compile what `observe` calls, before there is anything to observe."""
     row, table = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
-    _observe.compile((types.int64, row, row, table, table, row, table))
+    _observe.compile((types.int64, types.int64, row, row, table, table, row, table))
 
 
 @scalar_function
-def put_state(work, contacts, time, state, n):
-    """What a motion of one lane reads besides parameters."""
+def put_state(work, contacts, time, state, n, W, i):
+    """What a motion reads of lane i besides parameters."""
     for k in range(n):
-        work[at.QS + k] = state[k]
-        work[at.VS + k] = state[n + k]
+        work[(at.QS + k) * W + i] = state[k]
+        work[(at.VS + k) * W + i] = state[n + k]
     for k in range(2 * at.MAX_JOINTS):
-        work[at.ACTIVE + k] = contacts[k]
-    work[at.STAGE_TIME] = time
+        work[(at.ACTIVE + k) * W + i] = contacts[k]
+    work[at.STAGE_TIME * W + i] = time
 
 
 OPEN, FORCE, RATE = 0, 1, 2
@@ -84,7 +89,7 @@ def derivative(motion, tables, contacts, time, y, out, joints, lane):
     `lane`: as in `Seen`.
     """
     n = (len(y) - len(joints)) // 2
-    put_state(lane, contacts, time, y, n)
+    put_state(lane, contacts, time, y, n, 1, 0)
     run_motion(motion, lane, tables)
     for k in range(n):
         out[k] = y[n + k]
