@@ -4,6 +4,7 @@ import pathlib
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,12 @@ from commands import warm
 from patience import crowded
 
 from hpcclear.base.errors import InputError
+from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.allocation import Evidence, cheapest, evidence
-from hpcclear.study import budget, extent, run_study
+from hpcclear.study import budget, extent, run_study, simulations
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -272,6 +274,23 @@ def test_a_tolerance_that_alpha_needs_tighter_than_the_pilot_is_taken(tmp_path, 
     assert 0.0003 < float(alpha["mean_within"]) <= 0.001
     assert formula.run_in_pieces(scene_of(), str(tmp_path / "out"), alone()) > 5
     assert contents(tmp_path / "out") == contents(tmp_path / "it")
+
+
+def test_pairs_take_what_verification_simulates_anyway(tmp_path, monkeypatch):
+    """At the tolerance that is verified at no simulation goes to anything but the designs that the table holds."""
+    made: Counter[tuple[str, float]] = Counter()
+
+    def counted(scene, points, *arguments, stage, **named):
+        made[stage.partition(":")[0], scene.numerics.rtol] += len(points)
+        return sample_points(scene, points, *arguments, stage=stage, **named)
+
+    monkeypatch.setattr(simulations, "sample_points", counted)
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
+    found = dataset.read(tmp_path / "it" / "verification.nc")
+    ends = found["samples"].sel(design=["play alpha", "play beta"]).sum()
+    once = found["samples"].sum() - ends  # they are ends of the swarm too, and stand there twice
+    assert made["verification", 1e-5] == once
+    assert 0 < made["pairs", 1e-6] < made["verification", 1e-5]
 
 
 def test_no_tolerance_is_tightened_for_what_most_samples_ended(tmp_path):

@@ -1,9 +1,13 @@
 """Vectors of eight as values of compiled code, against NumPy."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numba import njit
 
+import hpcclear
 from hpcclear.base import eight
 from hpcclear.base.eight import (
     above,
@@ -18,6 +22,7 @@ from hpcclear.base.eight import (
     spread,
     total_of,
 )
+from hpcclear.base.jit import _compiled_sources
 
 ROWS = 24
 
@@ -62,6 +67,18 @@ def test_what_is_no_number_is_not_above(rows):
     rows[0, ::2] = np.nan
     operate(rows.ravel(), 0.7)
     np.testing.assert_array_equal(rows[5, ::2], 0.7)
+
+
+def test_whatever_emits_code_is_in_the_key_of_what_was_compiled():
+    """Numba's own cache would serve what an older version of such a file had emitted."""
+    package = Path(hpcclear.__file__).parent
+    known = set(_compiled_sources(package))
+    emitting = {
+        path for path in package.rglob("*.py")
+        if re.search(r"^\s*(from|import) (numba|llvmlite)", path.read_text(), re.MULTILINE)
+    }  # fmt: skip
+    assert Path(eight.__file__) in emitting
+    assert emitting <= known
 
 
 @pytest.mark.parametrize("row", [10, 20])

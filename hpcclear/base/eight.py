@@ -18,7 +18,7 @@ from numba.core.extending import intrinsic, lower_builtin, register_model
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 
 EIGHT = 8
-_LINE = 8  # bytes that a row's place is known to be a multiple of
+_ALIGNED = 8  # bytes that a row's address is known to be a multiple of
 
 
 class Eight(types.Type):  # type: ignore[misc]
@@ -105,7 +105,7 @@ def fetch(typingctx, array, row):
     """Row of a flat array of doubles: what stands from 8 row on."""
 
     def codegen(context, builder, sig, args):
-        return builder.load(_place(context, builder, sig.args[0], *args), align=_LINE)
+        return builder.load(_place(context, builder, sig.args[0], *args), align=_ALIGNED)
 
     return eight(array, types.intp), codegen
 
@@ -116,7 +116,7 @@ def put(typingctx, array, row, vector):
 
     def codegen(context, builder, sig, args):
         place = _place(context, builder, sig.args[0], *args[:2])
-        builder.store(args[2], place, align=_LINE)
+        builder.store(args[2], place, align=_ALIGNED)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, eight), codegen
@@ -140,7 +140,7 @@ def nine_rows(typingctx, array, row):
     def codegen(context, builder, sig, args):
         rows = [builder.add(args[1], ir.Constant(args[1].type, k)) for k in range(EIGHT + 1)]
         vectors = [
-            builder.load(_place(context, builder, sig.args[0], args[0], one), align=_LINE)
+            builder.load(_place(context, builder, sig.args[0], args[0], one), align=_ALIGNED)
             for one in rows
         ]
         return context.make_tuple(builder, kind, vectors)

@@ -32,11 +32,16 @@ FASTMATH = {"contract", "nsz", "arcp"}
 def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
     parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
-    parts |= {path for path in root.rglob("*.py") if b"jit" in path.read_bytes()}
+    parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
     parts |= set((root / "base" / "text").glob("*.py"))
     return sorted(
         parts | {root / "base" / name for name in ("one_text.py", "outcome.py", "unrolled.py")}
     )
+
+
+def _compiles(source: bytes) -> bool:
+    """Whether a file has what is compiled, or what emits it."""
+    return any(word in source for word in (b"jit", b"numba", b"llvmlite"))
 
 
 @cache

@@ -179,9 +179,8 @@ class Expressions:
         left, right = self.expression(node.left, scope), self.expression(node.right, scope)
         if isinstance(left, Known) and isinstance(right, Known):
             return Known(_OPERATORS[type(node.op)](left.value, right.value))
-        if isinstance(
-            node.op, ast.Add | ast.Mult
-        ):  # of one lane, of the first row: less to read for the compiler
+        if isinstance(node.op, ast.Add | ast.Mult):
+            # of one lane, or of a first row: less to read for the compiler
             nothing = 0 if isinstance(node.op, ast.Add) else 1
             for one, other in ((left, right), (right, left)):
                 if isinstance(one, Known) and type(one.value) is int and one.value == nothing:

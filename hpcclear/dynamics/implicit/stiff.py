@@ -59,7 +59,7 @@ CHEAP_CONTRACTION = 0.002
 """While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
 
 KEPT_TO = 1.2
-"""A step that would grow by less keeps its size, and the factors."""
+"""A step that would grow by less keeps its size, and the inverses."""
 
 BEST_RATE = 0.3
 """Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
@@ -216,9 +216,9 @@ def norm_of_jacobian(n, blocks, m):
             unit = m[(mem.LEAST + BLOCKS) * LANES + k]
             rows_q = rows_q + unit * size(fetch(m, mem.JACOBIAN + k * BLOCKS + b))
             rows_v = rows_v + unit * size(fetch(m, mem.JACOBIAN + (n + k) * BLOCKS + b))
-        unit = 1.0 / fetch(m, mem.LEAST + BLOCKS + b)
-        by_q = max(by_q, largest_of(rows_q * unit))
-        by_v = max(by_v, largest_of(rows_v * unit))
+        own = fetch(m, mem.LEAST + BLOCKS + b)
+        by_q = max(by_q, largest_of(rows_q / own))
+        by_v = max(by_v, largest_of(rows_v / own))
     return by_v + math.sqrt(by_q)
 
 
