@@ -90,7 +90,7 @@ class Lanes:
             measures,
             numbers_of(self._rules, width, n, len(measures)),
         )
-        self._codes: tuple[Any, ...] = (n, 0 if problem.collocation else Codes(0, 0, 0))
+        self._codes: tuple[Any, ...] = (0,) if problem.collocation else (n, Codes(0, 0, 0))
         self._step = (
             make_collocation_stepper(recorded=record is not None)
             if problem.collocation
@@ -127,7 +127,7 @@ class Lanes:
             implicit = implicit_code(blocks_of(n)).address if stiff else 0
             self._codes = (n, Codes(special, explicit, implicit))
         else:
-            self._codes = (n, special)
+            self._codes = (special,)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
         if self._rules.profile:

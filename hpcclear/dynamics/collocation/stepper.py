@@ -26,6 +26,7 @@ from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, failure
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
+    COORDINATES,
     FINISHED,
     FOUND,
     MAX_STEPS,
@@ -319,13 +320,14 @@ def change_sample(special, asked, block, queue, method, m):
 
 
 @lane_function
-def advance(n, special, rules, block, queue, method, record, m, budget):
+def advance(special, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample."""
     block, queue, method = borrowed_all(block, queue, method, 1)
     m = borrowed(m)  # type: ignore[call-arg]
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book, numbers = block.work, block.stages, block.book, method.numbers
+    n = numbers[COORDINATES]
     if work[at.RUNNING] == 0.0:
         change_sample(special, NEXT_SAMPLE, block, queue, method, m)
     full = False

@@ -7,10 +7,11 @@ step would.
 
 import math
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import carray, cfunc, types
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.bits import call_at
 from hpcclear.base.eight import column, fetch, largest_of, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
@@ -88,6 +89,15 @@ second number, and in proportion below; and the least that this comes to."""
 
 KINK_REACH, MOST_CUTS = 0.005, 12.0
 """A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
+
+
+class Moved(NamedTuple):
+    """What is stepped: the address of its motion of eight lanes, coordinates, rows of a vector over them, tables."""
+
+    motion: int
+    n: int
+    blocks: int
+    tables: Array
 
 
 @scalar_function
@@ -170,25 +180,25 @@ def fetch_contacts(rules, lane, W, work, m):
 
 
 @scalar_function
-def fetch_start(effects, motion, n, blocks, lane, W, block, m, tables):
+def fetch_start(effects, moved, lane, W, block, m):
     """Bring the start of the step into the lane's memory."""
     work, stages = block.work, block.stages
     follows = work[at.ACCEPT * W + lane] == 1.0  # it is where the lane's last implicit step ended
     m[mem.TIME] = work[at.TIME * W + lane]
     m[mem.STEP] = work[at.STEP * W + lane]
     fetch_contacts(effects.rules, lane, W, work, m)
-    for k in range(n):
+    for k in range(moved.n):
         m[mem.Q * LANES + k] = work[(at.Q + k) * W + lane]
         m[mem.V * LANES + k] = work[(at.V + k) * W + lane]
     fresh = work[at.FRESH * W + lane] == 1.0
     unknown = fresh or work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if unknown:
-        start_of_step(n, m)
-        evaluate_bank(motion, m, tables)
+        start_of_step(moved.n, m)
+        evaluate_bank(moved.motion, m, moved.tables)
         work[at.EVALUATIONS * W + lane] += 1.0
     if fresh:
         m[mem.NEW_JACOBIAN] = 0.0
-        for k in range(n):
+        for k in range(moved.n):
             stages[k * W + lane] = m[(at.ACC + k) * LANES + END]
         for r in range(at.RATES):
             work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
@@ -198,9 +208,9 @@ def fetch_start(effects, motion, n, blocks, lane, W, block, m, tables):
         m[mem.RATE_SLOPE] = 0.0
         m[mem.CEILING] = math.inf
         m[mem.KEPT_STEP] = 0.0
-    for k in range(n):
+    for k in range(moved.n):
         m[mem.START * LANES + k] = stages[k * W + lane]
-    for b in range(blocks):
+    for b in range(moved.blocks):
         for row in (0, BLOCKS):  # coordinates, then velocities
             there = fetch(m, mem.LEAST + row + b) + size(fetch(m, mem.Q + row + b))
             put(m, mem.INVERSE_SCALE + row + b, 1.0 / (m[mem.TOLERANCE] * there))
@@ -223,10 +233,10 @@ def norm_of_jacobian(n, blocks, m):
 
 
 @scalar_function
-def cut_at_kink(effects, motion, n, blocks, lane, W, work, m, tables):
+def cut_at_kink(effects, moved, lane, W, work, m):
     """Evaluate the guessed stages, and cut the step if they show a kink."""
     h = m[mem.STEP]
-    evaluate_stages(motion, n, m, tables, h)
+    evaluate_stages(moved.motion, moved.n, m, moved.tables, h)
     work[at.EVALUATIONS * W + lane] += 3.0
     fraction = kink_fraction(effects.rules, m, GUESSED_BEYOND)
     if fraction < 1.0:
@@ -236,32 +246,32 @@ def cut_at_kink(effects, motion, n, blocks, lane, W, work, m, tables):
         work[at.STEP * W + lane] = h
         work[at.ENDING * W + lane] = 0.0
         m[mem.CONTINUES] = 0.0
-        guess_stages(blocks, m, h)
-        evaluate_stages(motion, n, m, tables, h)
+        guess_stages(moved.blocks, m, h)
+        evaluate_stages(moved.motion, moved.n, m, moved.tables, h)
         work[at.EVALUATIONS * W + lane] += 3.0
 
 
 @scalar_function
-def new_jacobian(motion, n, blocks, m, tables, guessed):
+def new_jacobian(moved, m, guessed):
     """Jacobian at the second guessed stage, or at the start where there is no guess."""
     if not guessed:
-        start_of_step(n, m)
-    for b in range(blocks):
+        start_of_step(moved.n, m)
+    for b in range(moved.blocks):
         here = column(m, at.ACC + LANES * b, mem.MIDDLE) if guessed else fetch(m, mem.START + b)
         put(m, mem.BASE + b, here)
-    difference_jacobian(motion, n, blocks, m, tables)
-    m[mem.NORM] = norm_of_jacobian(n, blocks, m)
+    difference_jacobian(moved.motion, moved.n, moved.blocks, m, moved.tables)
+    m[mem.NORM] = norm_of_jacobian(moved.n, moved.blocks, m)
     m[mem.NEW_JACOBIAN] = 1.0
     m[mem.FACTORED_STEP] = 0.0
 
 
 @scalar_function
-def begin_step(effects, motion, n, blocks, lane, W, block, m, tables, settings):
+def begin_step(effects, moved, lane, W, block, m, settings):
     """Bring the lane's step into its memory, and guess its stages. Returns whether there is a guess."""
     work = block.work
     first = work[at.STIFF_STEPS_HERE * W + lane] == 0.0
     if first:
-        take_over(n, lane, W, block.par, m, settings)
+        take_over(moved.n, lane, W, block.par, m, settings)
     elif work[at.ACCEPT * W + lane] == 1.0:
         m[mem.ACCEPTED_STEP] = m[mem.STEP]
         m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
@@ -269,29 +279,29 @@ def begin_step(effects, motion, n, blocks, lane, W, block, m, tables, settings):
         copy_polynomial(m, mem.Z, mem.KEPT)
         m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
         m[mem.CONTINUES] = 1.0
-    fetch_start(effects, motion, n, blocks, lane, W, block, m, tables)
+    fetch_start(effects, moved, lane, W, block, m)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
     if first:
-        guess_from_start(blocks, m, m[mem.STEP])
+        guess_from_start(moved.blocks, m, m[mem.STEP])
     else:
-        guess_stages(blocks, m, m[mem.STEP])
+        guess_stages(moved.blocks, m, m[mem.STEP])
     return m[mem.POLYNOMIAL_STEP] > 0.0
 
 
 @scalar_function
-def solve_step(effects, motion, n, blocks, lane, W, work, m, tables, guessed):
+def solve_step(effects, moved, lane, W, work, m, guessed):
     """Cut the step where its guess shows a kink, and solve for its stages. Returns what `newton` does."""
     if guessed:
-        cut_at_kink(effects, motion, n, blocks, lane, W, work, m, tables)
+        cut_at_kink(effects, moved, lane, W, work, m)
     h = m[mem.STEP]
     stale = m[mem.RATE] > CHEAP_CONTRACTION or m[mem.FACTORED_STEP] != h
     if stale and m[mem.NEW_JACOBIAN] == 0.0:
-        new_jacobian(motion, n, blocks, m, tables, guessed)
-        work[at.EVALUATIONS * W + lane] += 2.0 * n
-    if m[mem.FACTORED_STEP] != h and not make_inverses(n, blocks, m, h):
+        new_jacobian(moved, m, guessed)
+        work[at.EVALUATIONS * W + lane] += 2.0 * moved.n
+    if m[mem.FACTORED_STEP] != h and not make_inverses(moved.n, moved.blocks, m, h):
         return -1
-    iterations = newton(motion, n, blocks, m, tables, h, guessed)
+    iterations = newton(moved.motion, moved.n, moved.blocks, m, moved.tables, h, guessed)
     evaluated = abs(iterations) - 1 if guessed else abs(iterations)
     work[at.EVALUATIONS * W + lane] += 3.0 * evaluated
     return iterations
@@ -314,12 +324,12 @@ def give_up(lane, W, work, m):
 
 
 @scalar_function
-def implicit_step(effects, motion, n, blocks, lane, W, block, tables, memory, settings):
+def implicit_step(effects, moved, lane, W, block, memory, settings):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
     work = block.work
-    guessed = begin_step(effects, motion, n, blocks, lane, W, block, m, tables, settings)
-    iterations = solve_step(effects, motion, n, blocks, lane, W, work, m, tables, guessed)
+    guessed = begin_step(effects, moved, lane, W, block, m, settings)
+    iterations = solve_step(effects, moved, lane, W, work, m, guessed)
     if iterations < 0:
         give_up(lane, W, work, m)
         return
@@ -335,28 +345,28 @@ def implicit_step(effects, motion, n, blocks, lane, W, block, tables, memory, se
         work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
     else:
         m[mem.KINK_CUTS] = 0.0
-        judge(effects, motion, n, blocks, lane, W, work, m, tables, iterations)
+        judge(effects, moved, lane, W, work, m, iterations)
 
 
 @scalar_function
-def judge(effects, motion, n, blocks, lane, W, work, m, tables, iterations):
+def judge(effects, moved, lane, W, work, m, iterations):
     """Error of a converged step, its integrals, its end and the step to try next."""
     h = m[mem.STEP]
-    for b in range(blocks):
+    for b in range(moved.blocks):
         put(m, mem.SHIFTED + b, fetch(m, mem.START + b))
         put(m, mem.SHIFTED + BLOCKS + b, spread(0.0))
-    total = filtered_error(n, blocks, m, h)
+    total = filtered_error(moved.n, moved.blocks, m, h)
     uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP] == 0.0
-    if total > 2.0 * n and uneasy:
-        total = refilter_error(motion, n, blocks, m, tables, h)
+    if total > 2.0 * moved.n and uneasy:
+        total = refilter_error(moved.motion, moved.n, moved.blocks, m, moved.tables, h)
         work[at.EVALUATIONS * W + lane] += 1.0
     # as the last correction left them: integrals fit the end of the step
-    evaluate_stages(motion, n, m, tables, h)
+    evaluate_stages(moved.motion, moved.n, m, moved.tables, h)
     work[at.EVALUATIONS * W + lane] += 1.0
     gaps = gap_errors(effects.rules, m, work, lane, W)
     means_of_step(effects, m, work, lane, W)
-    leave(effects, n, lane, W, work, m)
-    mean = (total + gaps) * (0.5 / n)
+    leave(effects, moved.n, lane, W, work, m)
+    mean = (total + gaps) * (0.5 / moved.n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
     work[at.ERROR * W + lane] = mean
     propose(lane, W, work, m, iterations)
@@ -409,10 +419,9 @@ def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measure
         carray(par, at.PARAMETERS * W),
         None,
     )
-    implicit_step(
-        effects, of[MOTION_OF_EIGHT], of[COORDINATES], blocks, of[LANE], W, block, carray(tables, at.TABLES),
-        carray(memory, (W, mem.MEMORY)), carray(settings, SETTINGS),
-    )  # fmt: skip
+    moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], blocks, carray(tables, at.TABLES))
+    lanes = carray(memory, (W, mem.MEMORY))
+    implicit_step(effects, moved, of[LANE], W, block, lanes, carray(settings, SETTINGS))
 
 
 _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
