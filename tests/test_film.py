@@ -72,8 +72,9 @@ def test_a_journal_that_leaves_the_wall_is_hardly_held():
 def test_the_angle_of_the_half_circle():
     for psi in np.linspace(1e-3, math.pi - 1e-3, 300):
         for r in (0.1, 1.0):
-            found, sine = film.half_circle_angle(-r * math.cos(psi), r * math.sin(psi), r)
-            assert found == pytest.approx(psi, rel=1e-12)
+            a, s = -r * math.cos(psi), r * math.sin(psi)
+            sine = film.half_angle_sine(a, s, r)
+            assert film.half_circle_angle(a, s) == pytest.approx(psi, rel=1e-12)
             assert sine == pytest.approx(math.sin(0.5 * psi), rel=1e-12)
 
 
@@ -81,11 +82,11 @@ def test_a_film_gets_no_thinner_than_the_roughness():
     """From the depth itself to the floor without a kink."""
     floor = 0.01
     for depth in (1.0, 0.3, 0.021):
-        assert film.film_thickness(depth, floor) == pytest.approx(depth, rel=1e-14)
+        assert film.film_thickness(-depth, 1.0, floor) == pytest.approx(depth, rel=1e-14)
     for depth in (0.0, -0.5):
-        assert film.film_thickness(depth, floor) == floor
+        assert film.film_thickness(-2.0 * depth, 2.0, floor) == floor
     depth = np.linspace(-0.01, 0.04, 5001)
-    seen = np.array([film.film_thickness(d, floor) for d in depth])
+    seen = np.array([film.film_thickness(-d, 1.0, floor) for d in depth])
     slope = np.diff(seen) / np.diff(depth)
     assert (slope >= -1e-9).all()
     assert slope.max() < 1.0 + 1e-9

@@ -7,10 +7,11 @@ import pytest
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.control import fit_to_ramp
 from hpcclear.dynamics.implicit.dense import invert_both
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
 from hpcclear.dynamics.implicit.radau import new_memory
-from hpcclear.dynamics.implicit.stiff import blocks_of, fit_to_ramp
+from hpcclear.dynamics.implicit.stiff import blocks_of
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters
@@ -43,14 +44,14 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     q += 1e-3 * np.random.default_rng(n).uniform(-1.0, 1.0, n)  # |e| above the clearance
     m = new_memory(1)[0]
     rows = m.reshape(-1, mem.LANES)
-    for bank in (rows[: mem.SECOND], rows[mem.SECOND : 2 * mem.SECOND]):
+    for bank in (rows[: at.BANK], rows[mem.SECOND : mem.SECOND + at.BANK]):
         bank[mem.PAR : mem.PAR + len(par[0])] = par[0][:, None]
         bank[at.STAGE_TIME] = 1e-4
     rows[at.QS : at.QS + n], rows[at.VS : at.VS + n] = q[:, None], v[:, None]
     settings = problem.settings()
     vector(m, mem.LEAST)[:n] = settings.atol_coordinates[:n] / settings.rtol
     vector(m, mem.LEAST + mem.BLOCKS)[:n] = settings.atol_velocities[:n] / settings.rtol
-    fit_to_ramp(m, settings.rows)
+    fit_to_ramp(par[0], 0, 1, m, 0, settings.rows)
     return problem, m
 
 

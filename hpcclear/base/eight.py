@@ -31,6 +31,7 @@ class Eight(types.Type):  # type: ignore[misc]
 eight = Eight()
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, EIGHT)
+_FLAGS = ("contract", "nsz", "arcp")  # as `jit.FASTMATH`
 
 
 def _emitted(function: Callable[..., Any]) -> Any:
@@ -90,7 +91,7 @@ def _define(function, name):
             value if kind == eight else _spread(builder, value)
             for kind, value in zip(sig.args, args, strict=True)
         ]
-        return getattr(builder, name)(*vectors)
+        return getattr(builder, name)(*vectors, flags=_FLAGS)
 
     for case in _CASES:
         lower_builtin(function, *case.args)(lowered)

@@ -89,8 +89,9 @@ def correction(ratio: float) -> Array:
     for s2 in s**2:
         e = float(np.sqrt(1.0 - s2))
         for angle, force in zip(angles, forces(e, ratio, angles), strict=True):
-            along, across, sine = short_impedance(e * np.cos(angle), -e * np.sin(angle), s2)
-            places.append(finite_scales(s2, sine))
+            a = e * np.cos(angle)
+            along, across = short_impedance(a, -e * np.sin(angle), s2)
+            places.append(finite_scales(a, s2))
             sides.append(s2 * np.array([along, across]) / force)
             weights.append(np.abs(force) / np.hypot(*force))
     x, y = np.array(places).T

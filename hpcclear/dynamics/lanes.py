@@ -16,6 +16,8 @@ from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.explicit.steps import explicit_code
 from hpcclear.dynamics.implicit import radau
+from hpcclear.dynamics.implicit.abreast import abreast_code
+from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.memory import LANES
 from hpcclear.dynamics.implicit.stiff import blocks_of, implicit_code
 from hpcclear.dynamics.linkage.observe import observing_code
@@ -40,6 +42,7 @@ NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
 OBSERVING = f"{observing_code.__module__}:{observing_code.__name__}"
+ABREAST = f"{abreast_code.__module__}:{abreast_code.__name__}"
 IMPLICIT = f"{implicit_code.__module__}:{implicit_code.__name__}"
 
 
@@ -77,7 +80,8 @@ class Lanes:
             book=np.zeros(at.BOOK * width),
         )
         implicit = problem.implicit != "never"
-        self._memory = radau.new_memory(width) if implicit else None
+        memory = radau.new_memory if problem.single else new_columns
+        self._memory = memory(width) if implicit else None
         if problem.collocation:
             self._memory = lobatto.new_memory()
         effects = problem.effects._replace(sliding=None if self._memory is None else 1)
@@ -114,7 +118,7 @@ class Lanes:
         texts = [problem.motion_text(effects, width) for width in widths if width]
         apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)]
         apart += [OBSERVING] if self.record is not None else []
-        beside = f"{IMPLICIT}:{blocks_of(n)}"
+        beside = f"{IMPLICIT}:{blocks_of(n)}" if problem.single else ABREAST
         with compiled_beside([beside] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, stiff).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
@@ -124,7 +128,7 @@ class Lanes:
                     problem.motion(effects, width)
         special = special_code().address
         if blocks:
-            implicit = implicit_code(blocks_of(n)).address if stiff else 0
+            implicit = self._implicit_address() if stiff else 0
             self._codes = (n, Codes(special, explicit, implicit))
         else:
             self._codes = (special,)
@@ -135,6 +139,11 @@ class Lanes:
         self._compiled = (
             True  # last: a stepper must not call what an interrupted compilation left out
         )
+
+    def _implicit_address(self) -> int:
+        """Of the implicit steps: a response's stages stand side by side, the samples of an ensemble."""
+        n, single = self.problem.coordinates, self.problem.single
+        return int((implicit_code(blocks_of(n)) if single else abreast_code()).address)
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:
         arrays = (self._rules, self._block, self._queue, self._method)

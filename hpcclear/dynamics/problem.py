@@ -14,7 +14,7 @@ from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
-from hpcclear.dynamics.implicit.stiff import STEEP
+from hpcclear.dynamics.implicit.control import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
 from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
@@ -102,6 +102,8 @@ class Problem:
     """Cubic cells of a linkage's tables."""
     chosen: tuple[int, ...] = ()
     """Places of the joints whose gaps count for f; none for all."""
+    single: bool = False
+    """Whether it is for one response, whose implicit steps have its stages side by side; those of ensembles go abreast."""
     from_rest: bool = False
     """Whether the body that a torque drives may begin at rest."""
 
@@ -384,6 +386,7 @@ def problem_of(
         load_table=cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
+        single=single,
         cycle=turns * at.TURN,
         parameter_rows=parameter_rows(scene),
         linkage=linkage,

@@ -82,7 +82,7 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
         if stiff < running:
             ask_explicit(codes.explicit, block, method)
         if stiff > 0.0:
-            ask_implicit(codes.implicit, numbers, block, method, memory, W)
+            ask_implicit(codes.implicit, numbers, block, method, memory)
         running += judge_steps(codes.special, rules, n, numbers, block, queue, settings, W)
         if rules.profile:
             run_motion(numbers[PROFILE], work, method.tables)

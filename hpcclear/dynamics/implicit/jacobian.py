@@ -12,7 +12,7 @@ from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.memory import BLOCKS, LANES
 from hpcclear.dynamics.linkage.rhs import run_motion
 
-_RELATIVE = 1.5e-8  # square root of the round-off
+RELATIVE = 1.5e-8  # square root of the round-off
 SECOND_OFFSET = mem.SECOND * LANES
 
 
@@ -25,7 +25,7 @@ def evaluate_bank(motion, bank, tables):
 @lane_function
 def increment(before, least, reach):
     """How far a number is displaced, exactly."""
-    return before + min(_RELATIVE * max(abs(before), least), reach * least) - before
+    return before + min(RELATIVE * max(abs(before), least), reach * least) - before
 
 
 @lane_function

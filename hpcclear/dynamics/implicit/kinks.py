@@ -25,14 +25,11 @@ NEAR = 5e-4
 GAP_UNIT = 0.1
 """Of the clearance: the unit in which the gap, whose sign is a kink too, is of order 1."""
 
-LEAST_CUT = 0.02
-"""A step is cut to this fraction at least: a kink that is nearer is stepped over."""
-
 
 @lane_function
 def entry(m, p, entry):
-    """A parameter of joint p, the same in every lane."""
-    return m[(mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry) * LANES]
+    """A parameter of joint p in all lanes."""
+    return fetch(m, mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + entry)
 
 
 @lane_function
@@ -40,7 +37,7 @@ def damping_part(rules, m, p, rate):
     """Damping factor of the normal force; 1 without damping or contact."""
     damping = entry(m, p, at.DAMPING)
     if rules.latched:
-        return 1.0 + damping * m[(at.INVERSE_IMPACT + p) * LANES] * rate
+        return 1.0 + damping * fetch(m, at.INVERSE_IMPACT + p) * rate
     elif rules.fixed:
         return 1.0 + damping * rate
     else:
@@ -61,28 +58,27 @@ def ramp_sides(rules, m, p, sliding):
 
 
 @lane_function
-def kinks_of_joint(rules, m, p):
-    """The four functions of joint p at the states of all lanes; 0 where no kink can be felt."""
-    row = mem.KINKS + mem.KINKS_A_JOINT * p
+def kinks_of_joint(rules, m, p, row):
+    """The four functions of joint p at the states of all lanes, into rows from `row` on; 0 where no kink can be felt."""
     gap = fetch(m, at.RATE_NOW + at.GAP + p)
     nothing = spread(0.0)
     # in flight no force is transmitted, and a change of the gap's sign is the stepper's to find: an impact to be located
-    free = rules.latched and m[(at.ACTIVE + p) * LANES] == 0.0
-    touching = nothing if free else gap
+    touching = above(fetch(m, at.ACTIVE + p), gap, nothing) if rules.latched else gap
     factor = damping_part(rules, m, p, fetch(m, at.RATE_NOW + at.GAP_RATE + p))
     factor = above(touching, factor, nothing)
     low, high = ramp_sides(rules, m, p, fetch(m, at.RATE_NOW + at.SLIDINGS + p))
     put(m, row, factor)
     put(m, row + 1, above(factor, low, nothing))
     put(m, row + 2, above(factor, high, nothing))
-    put(m, row + 3, touching * (1.0 / (GAP_UNIT * entry(m, p, at.CLEARANCE))))
+    put(m, row + 3, touching / (GAP_UNIT * entry(m, p, at.CLEARANCE)))
 
 
 @scalar_function
-def kink_functions(rules, m):
-    """Kink functions of all open joints at the states of the first bank, as evaluated."""
+def kink_functions(rules, m, first):
+    """Kink functions of all open joints at the states of the first bank, as evaluated, into rows from `first` on."""
     for joint in range(rules.begin, rules.end):
-        kinks_of_joint(rules, m, place(joint))
+        p = place(joint)
+        kinks_of_joint(rules, m, p, first + mem.KINKS_A_JOINT * p)
 
 
 @lane_function
@@ -101,15 +97,20 @@ def after_functions(rules):
 def kinks_of_start(rules, m):
     """Keep the functions at the last state evaluated, where a step begins; True where one has changed its sign, or come or
     gone, since the start kept before."""
-    kink_functions(rules, m)
+    kink_functions(rules, m, mem.KINKS)
     changed = False
     for f in range(first_function(rules), after_functions(rules)):
         before = m[mem.START_KINKS + f]
         now = m[(mem.KINKS + f) * LANES + END]
         m[mem.START_KINKS + f] = now
-        if not (before * now > 0.0 or (before == 0.0 and now == 0.0)):
-            changed = True
+        changed = changed or sign_changed(before, now)
     return changed
+
+
+@lane_function
+def sign_changed(before, now):
+    """Whether a function has changed its sign, or come or gone."""
+    return not (before * now > 0.0 or (before == 0.0 and now == 0.0))
 
 
 @scalar_function
@@ -118,42 +119,50 @@ def kink_fraction(rules, m, beyond):
 
     `beyond`: how far, in units of the kink's function, a stage must be for it to count.
     """
-    kink_functions(rules, m)
+    kink_functions(rules, m, mem.KINKS)
     first = 2.0
     for f in range(first_function(rules), after_functions(rules)):
         start = m[mem.START_KINKS + f]
         row = (mem.KINKS + f) * LANES
-        if min(start * m[row], start * m[row + 1], start * m[row + 2]) < 0.0:
-            first = min(first, crossing(m, start, row, beyond))
+        first = min(first, crossing(start, m[row], m[row + 1], m[row + 2], beyond))
     return first
 
 
+@lane_function
+def crossing(start, one, two, three, beyond):
+    """Where a function with these values at the start of the step and at its stages gets `beyond` its zero; 2 if never."""
+    if min(start * one, start * two, start * three) < 0.0:
+        return crossing_between(start, one, two, three, beyond)
+    else:
+        return 2.0
+
+
 @scalar_function
-def crossing(m, start, row, beyond):
-    """Where one function gets `BEYOND` its zero; 2 if it does not. `row`: where its values at the stages are."""
+def crossing_between(start, one, two, three, beyond):
+    """The same where its sign changes."""
     sign = 1.0 if start > 0.0 else -1.0
-    if m[row + END] == 0.0 or abs(start) < NEAR:
+    if three == 0.0 or abs(start) < NEAR:
         return 2.0
     low = 0.0
+    values = (one, two, three)
     for s in range(3):
-        value = m[row + s]
-        if value == 0.0:
+        if values[s] == 0.0:
             return 2.0
-        if value * sign < -beyond:
-            return bisect(m, start, row, low, NODES[s], sign)
+        if values[s] * sign < -beyond:
+            return bisect(start, values, low, NODES[s], sign)
         low = NODES[s]
     return 2.0
 
 
 @scalar_function
-def bisect(m, start, row, low, high, sign):
+def bisect(start, values, low, high, sign):
     """Upper end of a small bracket of the crossing between `low` and `high`."""
     for _ in range(30):
         x = 0.5 * (low + high)
         value = start
         for j in range(3):
             weight = x * (BASIS[j, 0] + x * (BASIS[j, 1] + x * BASIS[j, 2]))
-            value += weight * (m[row + j] - start)
+            value += weight * (values[j] - start)
         if value * sign < -0.5 * BEYOND:
             high = x
         else:

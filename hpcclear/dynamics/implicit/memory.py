@@ -7,6 +7,9 @@ the Jacobian's differences are taken from: eight evaluations take no longer than
 coordinates, each in `BLOCKS` rows: the linear algebra of a step is done on these.
 """
 
+from typing import NamedTuple
+
+from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 
 LANES = 8
@@ -14,9 +17,30 @@ BLOCKS = -(-at.MAX_COORDINATES // LANES)  # rows that a number of each coordinat
 _N = at.MAX_COORDINATES
 
 PAR = at.WORK  # row of the first parameter in a bank
-SECOND = PAR + at.PARAMETERS  # row where the second bank starts
+NUMBERS = at.BANK  # row of the first of a lane's numbers, behind the first bank; where each begins, each for eight lanes:
+(
+    TIME,  # s, since the start of the revolution
+    STEP,  # s
+    POLYNOMIAL_STEP,  # s, of the step whose stages are kept; 0 when there are none
+    CONTINUES,  # 1 where that step ended at the start of this one, 0 where both have the same start
+    KEPT_STEP,  # s, of the step before, should its stages be asked for again; 0 when there are none
+    TRIED_ERROR,  # of the step last tried
+    ACCEPTED_STEP,  # s, of the step last accepted, for the predictive control
+    ACCEPTED_ERROR,
+    CONTRACTION,  # of Newton's iteration, rate over 1 - rate
+    RATE,  # its last rate of convergence
+    RATE_SLOPE,  # 1/s, that rate over the step, when last seen with a new Jacobian; 0 when not since a kink
+    FACTORED_STEP,  # s, for which the inverses hold; 0 when they do not
+    NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
+    NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
+    KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
+    CEILING,  # s, of the next steps: some way below one that Newton's iteration failed on
+    TOLERANCE,  # relative, of a step's error
+    REACH,  # of a difference at most, as a part of LEAST
+) = range(NUMBERS * LANES, (NUMBERS + 18) * LANES, LANES)
+SECOND = NUMBERS + 18  # row where the second bank starts
 # rows:
-NODE = 2 * SECOND  # where the stages stand in the step; the last one from END on
+NODE = SECOND + at.BANK  # where the stages stand in the step; the last one from END on
 MATRIX = (
     NODE + 1
 )  # three: coefficients of the velocities' increments in the stages of the coordinates
@@ -49,27 +73,14 @@ COMPLEX_PIVOT = PIVOT + BLOCKS
 REAL = COMPLEX_PIVOT + BLOCKS  # columns of the inverse of the real system
 COMPLEX_RE = REAL + _N * BLOCKS  # and of the complex one's, real and imaginary part
 COMPLEX_IM = COMPLEX_RE + _N * BLOCKS
-# numbers:
 START_KINKS = (COMPLEX_IM + _N * BLOCKS) * LANES  # kink functions at the start of the step
-SCALARS = START_KINKS + ALL_KINKS
-(
-    TIME,  # s, since the start of the revolution
-    STEP,  # s
-    POLYNOMIAL_STEP,  # s, of the step whose stages are kept; 0 when there are none
-    CONTINUES,  # 1 where that step ended at the start of this one, 0 where both have the same start
-    KEPT_STEP,  # s, of the step before, should its stages be asked for again; 0 when there are none
-    TRIED_ERROR,  # of the step last tried
-    ACCEPTED_STEP,  # s, of the step last accepted, for the predictive control
-    ACCEPTED_ERROR,
-    CONTRACTION,  # of Newton's iteration, rate over 1 - rate
-    RATE,  # its last rate of convergence
-    RATE_SLOPE,  # 1/s, that rate over the step, when last seen with a new Jacobian; 0 when not since a kink
-    FACTORED_STEP,  # s, for which the inverses hold; 0 when they do not
-    NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
-    NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
-    KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
-    CEILING,  # s, of the next steps: some way below one that Newton's iteration failed on
-    TOLERANCE,  # relative, of a step's error
-    REACH,  # of a difference at most, as a part of LEAST
-) = range(SCALARS, SCALARS + 18)
-MEMORY = -(-(SCALARS + 18) // LANES) * LANES
+MEMORY = -(-(START_KINKS + ALL_KINKS) // LANES) * LANES
+
+
+class Moved(NamedTuple):
+    """What is stepped: the address of its motion of eight lanes, coordinates, rows of a vector over them, tables."""
+
+    motion: int
+    n: int
+    blocks: int
+    tables: Array

@@ -17,12 +17,12 @@ import math
 import numpy as np
 
 from hpcclear.base.arrays import Array, aligned
-from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.eight import column, fetch, put, spread, total_of
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.control import MAX_ITERATIONS, begin_iteration, rate_of
 from hpcclear.dynamics.implicit.dense import invert_both
 from hpcclear.dynamics.implicit.jacobian import evaluate_bank
 from hpcclear.dynamics.implicit.memory import BLOCKS, END, LANES
@@ -64,11 +64,6 @@ BASIS = np.array(
         [1.0 / 3.0, -8.0 / 3.0, 10.0 / 3.0],
     ]
 )
-
-MAX_ITERATIONS = 10
-NEWTON_TOLERANCE = 0.005  # of the tolerance on the step's error: the energy balance closes no better than the iteration
-STEP_SAFETY = 0.9
-LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
 
 def new_memory(width: int) -> Array:
@@ -262,26 +257,14 @@ def newton(motion, n, blocks, m, tables, h, known):
     `known`: the stages of the first guess have been evaluated already.
     """
     before = 1.0
-    contraction = rough_exp2(0.8 * rough_log2(max(m[mem.CONTRACTION], 1e-16)))
-    m[mem.RATE] = 0.0
+    begin_iteration(m, 0)
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0 or not known:
             evaluate_stages(motion, n, m, tables, h)
         change = correct(n, blocks, m, h)
-        if iteration > 0:
-            rate = change / before
-            m[mem.RATE] = max(m[mem.RATE], rate)
-            if not rate < 0.99:
-                return -(iteration + 1)
-            contraction = rate / (1.0 - rate)
-            left = MAX_ITERATIONS - 1 - iteration
-            if contraction * change * rough_exp2(left * rough_log2(rate)) > NEWTON_TOLERANCE:
-                return -(iteration + 1)
-        if not change < 1e10:
-            return -(iteration + 1)
-        if contraction * change <= NEWTON_TOLERANCE:
-            m[mem.CONTRACTION] = contraction
-            return iteration + 1
+        iterations = rate_of(m, 0, iteration, change, before)
+        if iterations != 0:
+            return iterations
         before = max(change, 1e-300)
     return -MAX_ITERATIONS
 
@@ -381,16 +364,3 @@ def means_of_step(effects, m, work, lane, W):
         mean_of_step(m, work, at.GAP + p, lane, W)
     for r in range(len(effects.measures)):
         mean_of_step(m, work, effects.measures[r], lane, W)
-
-
-@scalar_function
-def next_step(m, h, error, iterations):
-    """Step size for the next try: by the error, and predictive after Gustafsson 1994 (doi:10.1145/198429.198437)."""
-    safety = STEP_SAFETY * (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)
-    error = max(error, 1e-10)
-    factor = safety / math.sqrt(math.sqrt(error))
-    if error <= 1.0 and m[mem.ACCEPTED_STEP] > 0.0:
-        before = math.sqrt(m[mem.ACCEPTED_ERROR]) / error
-        trend = h / m[mem.ACCEPTED_STEP] * math.sqrt(before)
-        factor = min(factor, STEP_SAFETY * trend)
-    return h * min(max(factor, LARGEST_SHRINK), LARGEST_GROWTH)

@@ -1,4 +1,4 @@
-"""Implicit steps for lanes whose motion is stiff (which those are: `switching`).
+"""Implicit steps of a single response where its motion is stiff (where that is: `switching`); those of ensembles: `abreast`.
 
 A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
 revolutions, books, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
@@ -7,26 +7,37 @@ step would.
 
 import math
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba import carray, cfunc, types
 
-from hpcclear.base.arrays import Array
 from hpcclear.base.bits import call_at
 from hpcclear.base.eight import column, fetch, largest_of, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.control import (
+    CHEAP_CONTRACTION,
+    KINK_REACH,
+    LEAST_CUT,
+    MOST_CUTS,
+    cut_again,
+    fit_to_ramp,
+    forget,
+    forget_kinks,
+    give_up,
+    go_on,
+    propose,
+)
 from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
 from hpcclear.dynamics.implicit.kinks import (
     BEYOND,
     GUESSED_BEYOND,
-    LEAST_CUT,
     kink_fraction,
     kinks_of_start,
 )
-from hpcclear.dynamics.implicit.memory import BLOCKS, END, LANES
+from hpcclear.dynamics.implicit.memory import BLOCKS, END, LANES, Moved
 from hpcclear.dynamics.implicit.radau import (
     copy_polynomial,
     evaluate_stages,
@@ -37,7 +48,6 @@ from hpcclear.dynamics.implicit.radau import (
     make_inverses,
     means_of_step,
     newton,
-    next_step,
     refilter_error,
     start_of_step,
 )
@@ -45,7 +55,6 @@ from hpcclear.dynamics.stepping.control import leave_rates
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
     COORDINATES,
-    LANE,
     MEASURES,
     MOTION_OF_EIGHT,
     NUMBERS,
@@ -55,92 +64,6 @@ from hpcclear.dynamics.stepping.settings import (
     WIDTH,
     rules_in,
 )
-
-CHEAP_CONTRACTION = 0.002
-"""While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
-
-KEPT_TO = 1.2
-"""A step that would grow by less keeps its size, and the inverses."""
-
-BEST_RATE = 0.3
-"""Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
-
-SLOPE_MEMORY = 0.5
-"""How much of that rate is still believed after a step that one iteration solved."""
-
-FAILED_SHRINK = 0.1
-"""At most, after the iteration failed."""
-
-CEILING, CEILING_GROWTH = 0.6, 1.05
-"""Of the failed step, for those after it; and how that is forgotten, step by step."""
-
-CALM_STIFFNESS = 2.0
-"""h |J| below which the explicit method would do."""
-
-STEEP = 100.0
-"""s/m, friction coefficient over ramp speed, from which kinks decide how long implicit steps are."""
-
-ERROR_IN_RAMP, DIFFERENCE_IN_RAMP = 0.03, 1e-3
-"""Of a step, and of the Jacobian's differences, at most: as a part of friction's ramp."""
-
-ERROR_IN_FILM, FILM_AT, LEAST_IN_FILM = 2e-3, 1e-6, 2e-11
-"""Of a step at most, as a part of the speed at which a film is squeezed by the forces of inertia, where `rtol` is at least the
-second number, and in proportion below; and the least that this comes to."""
-
-KINK_REACH, MOST_CUTS = 0.005, 12.0
-"""A kink so near the end of a step, as a part of it, is left there; and how often a step is cut."""
-
-
-class Moved(NamedTuple):
-    """What is stepped: the address of its motion of eight lanes, coordinates, rows of a vector over them, tables."""
-
-    motion: int
-    n: int
-    blocks: int
-    tables: Array
-
-
-@scalar_function
-def loosened(rtol, strictness, steep, smooth):
-    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
-
-    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
-    the result is no better than the estimate, most of all where a steep friction ramp sticks and tears loose. There the
-    energy balance closes as well as elsewhere only with an exponent of 1, which costs next to nothing: kinks hold the
-    steps down anyway.
-    `strictness`: square of how many times tighter this sample's tolerances are.
-    """
-    asked = rtol / math.sqrt(strictness)
-    return 0.05 * asked if steep else 0.1 * asked ** (2.0 / 3.0 if smooth else 0.9)
-
-
-@scalar_function
-def fit_to_ramp(m, settings):
-    """Relative tolerance of implicit steps and reach of the Jacobian's differences: both keep well within friction's ramp.
-
-    Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
-    and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
-    ramp's end would hide its slope. A film is squeezed as slowly where it carries: an error of that speed would be one of all
-    forces, and the energy balance would not close.
-    """
-    steepest = 1e-300
-    film = 1e-300
-    slope = 0.0
-    for k in range(at.MAX_JOINTS):
-        block = mem.PAR + at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        inverse = m[(block + at.INVERSE_RAMP) * LANES]
-        steepest = max(steepest, inverse)
-        slope = max(slope, m[(block + at.FRICTION) * LANES] * inverse)
-        film = max(film, m[(block + at.FILM_STEEPNESS) * LANES])
-    ramp = 1.0 / steepest
-    speed = m[(mem.PAR + at.SPEED) * LANES] * m[(mem.PAR + at.CRANK_LENGTH) * LANES]
-    strictness = m[(mem.PAR + at.STRICTNESS) * LANES]
-    asked = min(settings[RTOL] / (FILM_AT * math.sqrt(strictness)), 1.0) ** 0.9
-    squeezed = max(ERROR_IN_FILM / film * asked / (1.0 + speed), LEAST_IN_FILM)
-    within = min(ERROR_IN_RAMP * ramp / (1.0 + speed), squeezed)
-    smooth = film > 1e-300
-    m[mem.TOLERANCE] = min(loosened(settings[RTOL], strictness, slope >= STEEP, smooth), within)
-    m[mem.REACH] = DIFFERENCE_IN_RAMP * ramp
 
 
 @scalar_function
@@ -154,19 +77,8 @@ def take_over(n, lane, W, par, m, settings):
         by_v = settings[ATOL + at.MAX_COORDINATES + k]
         m[mem.LEAST * LANES + k] = settings[ATOL + k] / settings[RTOL]
         m[(mem.LEAST + BLOCKS) * LANES + k] = by_v / settings[RTOL]
-    m[mem.POLYNOMIAL_STEP] = 0.0
-    m[mem.KEPT_STEP] = 0.0
-    m[mem.CONTINUES] = 1.0
-    m[mem.ACCEPTED_STEP] = 0.0
-    m[mem.CONTRACTION] = 1.0
-    m[mem.RATE] = 1.0
-    m[mem.RATE_SLOPE] = 0.0
-    m[mem.CEILING] = math.inf
-    m[mem.FACTORED_STEP] = 0.0
-    m[mem.NEW_JACOBIAN] = 0.0
-    m[mem.TRIED_ERROR] = 0.0
-    m[mem.KINK_CUTS] = 0.0
-    fit_to_ramp(m, settings)
+    forget(m, 0)
+    fit_to_ramp(par, lane, W, m, 0, settings)
 
 
 @scalar_function
@@ -204,10 +116,7 @@ def fetch_start(effects, moved, lane, W, block, m):
             work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * LANES + END]
         work[at.FRESH * W + lane] = 0.0
     if (unknown or follows) and kinks_of_start(effects.rules, m):
-        m[mem.RATE] = 1.0
-        m[mem.RATE_SLOPE] = 0.0
-        m[mem.CEILING] = math.inf
-        m[mem.KEPT_STEP] = 0.0
+        forget_kinks(m, 0)
     for k in range(moved.n):
         m[mem.START * LANES + k] = stages[k * W + lane]
     for b in range(moved.blocks):
@@ -273,12 +182,8 @@ def begin_step(effects, moved, lane, W, block, m, settings):
     if first:
         take_over(moved.n, lane, W, block.par, m, settings)
     elif work[at.ACCEPT * W + lane] == 1.0:
-        m[mem.ACCEPTED_STEP] = m[mem.STEP]
-        m[mem.ACCEPTED_ERROR] = max(m[mem.TRIED_ERROR], 1e-2)
-        m[mem.NEW_JACOBIAN] = 0.0
+        go_on(m, 0)
         copy_polynomial(m, mem.Z, mem.KEPT)
-        m[mem.KEPT_STEP] = m[mem.POLYNOMIAL_STEP]
-        m[mem.CONTINUES] = 1.0
     fetch_start(effects, moved, lane, W, block, m)
     work[at.STIFF_STEPS_HERE * W + lane] += 1.0
     work[at.STIFF_STEPS * W + lane] += 1.0
@@ -308,22 +213,6 @@ def solve_step(effects, moved, lane, W, work, m, guessed):
 
 
 @scalar_function
-def give_up(lane, W, work, m):
-    """The iteration failed: a shorter step by the polynomial of the step before, with a Jacobian that is nearer."""
-    h = m[mem.STEP]
-    copy_polynomial(m, mem.KEPT, mem.Z)
-    m[mem.POLYNOMIAL_STEP] = m[mem.KEPT_STEP]
-    m[mem.CONTINUES] = 1.0
-    m[mem.NEW_JACOBIAN] = 0.0
-    shrink = BEST_RATE / m[mem.RATE] if m[mem.RATE] > 0.0 else 0.0
-    m[mem.RATE] = 1.0
-    m[mem.CONTRACTION] = 1.0
-    m[mem.CEILING] = CEILING * h
-    work[at.ERROR * W + lane] = 1e6
-    work[at.NEXT_STEP * W + lane] = min(max(shrink, FAILED_SHRINK), 0.5) * h
-
-
-@scalar_function
 def implicit_step(effects, moved, lane, W, block, memory, settings):
     """Try one step of `work[STEP]` on one lane: new state, rates, error and next step go into its rows."""
     m = memory[lane]
@@ -331,18 +220,15 @@ def implicit_step(effects, moved, lane, W, block, memory, settings):
     guessed = begin_step(effects, moved, lane, W, block, m, settings)
     iterations = solve_step(effects, moved, lane, W, work, m, guessed)
     if iterations < 0:
-        give_up(lane, W, work, m)
+        copy_polynomial(m, mem.KEPT, mem.Z)
+        give_up(lane, W, work, m, 0)
         return
     h = m[mem.STEP]
     m[mem.POLYNOMIAL_STEP] = h
     m[mem.CONTINUES] = 0.0
     fraction = kink_fraction(effects.rules, m, BEYOND)
     if fraction < 1.0 - KINK_REACH and m[mem.KINK_CUTS] < MOST_CUTS:
-        # the guess did not show it; the solution is a good guess for the part before it
-        m[mem.KINK_CUTS] += 1.0
-        m[mem.RATE] = 1.0
-        work[at.ERROR * W + lane] = 2.0
-        work[at.NEXT_STEP * W + lane] = h * max(fraction, LEAST_CUT)
+        cut_again(lane, W, work, m, 0, fraction)
     else:
         m[mem.KINK_CUTS] = 0.0
         judge(effects, moved, lane, W, work, m, iterations)
@@ -369,32 +255,7 @@ def judge(effects, moved, lane, W, work, m, iterations):
     mean = (total + gaps) * (0.5 / moved.n)
     m[mem.TRIED_ERROR] = math.sqrt(mean)
     work[at.ERROR * W + lane] = mean
-    propose(lane, W, work, m, iterations)
-
-
-@scalar_function
-def propose(lane, W, work, m, iterations):
-    """The step to try next, and whether the explicit method could have taken this one."""
-    h = m[mem.STEP]
-    proposal = next_step(m, h, m[mem.TRIED_ERROR], iterations)
-    if iterations == 1:
-        m[mem.RATE_SLOPE] *= SLOPE_MEMORY
-    elif m[mem.NEW_JACOBIAN] == 1.0:
-        m[mem.RATE_SLOPE] = m[mem.RATE] / h
-    if m[mem.RATE_SLOPE] > 0.0:
-        proposal = min(proposal, BEST_RATE / m[mem.RATE_SLOPE])
-    proposal = min(proposal, m[mem.CEILING])
-    m[mem.CEILING] *= CEILING_GROWTH
-    if m[mem.TRIED_ERROR] <= 1.0:
-        if work[at.REJECTED * W + lane] == 1.0:
-            proposal = min(proposal, h)
-        if work[at.ENDING * W + lane] == 1.0:
-            proposal = max(proposal, work[at.NEXT_STEP * W + lane])
-        if m[mem.RATE] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
-            proposal = h
-        calm = h * m[mem.NORM] < CALM_STIFFNESS and proposal < 2.0 * h
-        work[at.CALM * W + lane] = work[at.CALM * W + lane] + 1.0 if calm else 0.0
-    work[at.NEXT_STEP * W + lane] = proposal
+    propose(lane, W, work, m, 0, iterations)
 
 
 @scalar_function
@@ -409,7 +270,7 @@ def leave(effects, n, lane, W, work, m):
 
 @scalar_function
 def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measures, memory):
-    """`implicit_step` of one lane, with arrays at addresses."""
+    """`implicit_step` of every stiff lane, with arrays at addresses."""
     of = carray(numbers, NUMBERS)
     W = of[WIDTH]
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
@@ -421,7 +282,9 @@ def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measure
     )
     moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], blocks, carray(tables, at.TABLES))
     lanes = carray(memory, (W, mem.MEMORY))
-    implicit_step(effects, moved, of[LANE], W, block, lanes, carray(settings, SETTINGS))
+    for lane in range(W):
+        if block.work[at.STIFF * W + lane] * block.work[at.RUNNING * W + lane] == 1.0:
+            implicit_step(effects, moved, lane, W, block, lanes, carray(settings, SETTINGS))
 
 
 _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
@@ -442,14 +305,10 @@ def implicit_code(blocks: int) -> Any:
 
 
 @lane_function
-def ask_implicit(address, numbers, block, method, memory, W):
+def ask_implicit(address, numbers, block, method, memory):
     """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
     if memory is not None:
-        work = block.work
         arrays = (
-            numbers, work, block.stages, block.par, method.settings, method.tables, method.measures, memory
+            numbers, block.work, block.stages, block.par, method.settings, method.tables, method.measures, memory
         )  # fmt: skip
-        for i in range(W):
-            if work[at.STIFF * W + i] * work[at.RUNNING * W + i] == 1.0:
-                numbers[LANE] = i
-                call_at(address, arrays)  # type: ignore[call-arg]
+        call_at(address, arrays)  # type: ignore[call-arg]

@@ -53,8 +53,8 @@ def finite_force(flag, par, joint, eccentricity, w, s2, i, W):
     if flag is not None:
         wx, wy = w
         a, b = along_and_across(eccentricity, w)
-        along, across, sine = short_impedance(a, b, s2)
-        x, y = finite_scales(s2, sine)
+        along, across = short_impedance(a, b, s2)
+        x, y = finite_scales(a, s2)
         along = along * corrected(par, joint.finite, s2, x, y, i, W)
         across = across * corrected(par, joint.finite + 90, s2, x, y, i, W)
         scale = par[(joint.block + at.FILM_FINITE) * W + i]
@@ -85,7 +85,7 @@ def film_of(effects, par, joint, relative, contact, i, W):
         ex, ey, vx, vy, spin_journal, spin_bearing = relative
         nx, ny, gap = contact
         floor = par[(block + at.FILM_FLOOR) * W + i]
-        thickness = film_thickness(-gap / par[(block + at.CLEARANCE) * W + i], floor)
+        thickness = film_thickness(gap, par[(block + at.CLEARANCE) * W + i], floor)
         eccentricity = 1.0 - thickness
         s2 = thickness * (1.0 + eccentricity)
         mean = 0.5 * (spin_journal + spin_bearing)
@@ -96,7 +96,8 @@ def film_of(effects, par, joint, relative, contact, i, W):
         ux, uy = finite_force(finite, par, joint, place, w, s2, i, W)
         fx, fy = sx + lx + ux, sy + ly + uy  # on the journal
         turning = spin_journal - spin_bearing
-        shear = par[(block + at.FILM_SHEAR) * W + i] / math.sqrt(s2) * turning
+        # one reciprocal, as the film's: of quotients by the same number the compiler makes products in lanes, and not alone
+        shear = par[(block + at.FILM_SHEAR) * W + i] * math.sqrt(s2) * (1.0 / s2) * turning
         half = 0.5 * (ex * fy - ey * fx)
         return -fx, -fy, shear - half, -shear - half, shear * turning - fx * w[0] - fy * w[1]
     else:

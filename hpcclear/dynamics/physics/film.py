@@ -24,6 +24,9 @@ from hpcclear.base.jit import lane_function
 LEAST_S = 0.19899748742132398
 """s at an eccentricity of 0.98, up to which finite bearings are fitted."""
 
+EIGHTH = math.tan(math.pi / 8.0)
+HALF_TURN = math.pi
+
 _TINY = 1e-300  # keeps the direction of a film at rest defined (and zero)
 
 
@@ -46,25 +49,37 @@ def small_arctan(t):
 
 
 @lane_function
-def half_circle_angle(a, s, r):
-    """psi from 0 to pi whose tangent is s/-a, for s > 0 and r = sqrt(a^2 + s^2), and sin(psi/2).
+def half_circle_angle(a, s):
+    """psi from 0 to pi whose tangent is s/-a, for s > 0.
 
-    Halved three times, in place of branches.
+    From one quotient, of the smaller by the larger, or near their balance of their difference by their sum; chosen, in place of
+    branches: roots and quotients are what a film's force costs.
     """
-    far = r + abs(a)
-    less = far if a <= 0.0 else s * s / far  # r - a = r (1 + cos psi)
-    chord = math.sqrt(2.0 * r * less)
-    half = s / (less + chord)  # tan(psi/4)
-    return 8.0 * small_arctan(half / (1.0 + math.sqrt(1.0 + half * half))), s / chord
+    size = abs(a)
+    flat, steep = s <= EIGHTH * size, size <= EIGHTH * s
+    over = size if flat else (-s if steep else s + size)
+    under = s if flat else (size if steep else s - size)
+    base = 0.0 if flat else (HALF_TURN / 2.0 if steep else HALF_TURN / 4.0)
+    angle = base + small_arctan(under / over)
+    return angle if a <= 0.0 else HALF_TURN - angle
 
 
 @lane_function
-def film_thickness(depth, floor):
-    """Least film thickness over the clearance, for `depth`: 1 less the eccentricity over the clearance.
+def half_angle_sine(a, s, r):
+    """sin(psi/2) for r = sqrt(a^2 + s^2)."""
+    far = r + abs(a)
+    less = far if a <= 0.0 else s * s / far  # r - a = r (1 + cos psi)
+    return s / math.sqrt(2.0 * r * less)
 
-    It is the depth from twice the `floor` on, and the floor where surfaces touch, a parabola between: so does the mean gap
-    between surfaces whose heights are spread evenly.
+
+@lane_function
+def film_thickness(gap, clearance, floor):
+    """Least film thickness over the clearance, for a `gap` |e| - c of the centres.
+
+    It is the depth, 1 less the eccentricity over the clearance, from twice the `floor` on, and the floor where surfaces touch,
+    a parabola between: so does the mean gap between surfaces whose heights are spread evenly.
     """
+    depth = -gap / clearance
     inside = 0.5 * (abs(depth) + depth)
     beyond = 0.5 * (abs(inside - 2.0 * floor) + inside - 2.0 * floor)
     near = inside - beyond
@@ -73,22 +88,20 @@ def film_thickness(depth, floor):
 
 @lane_function
 def half_circle(a, s2):
-    """What integrals over the half circle are made of: a^2 + s^2, 1/s^2, 1/s^4, psi/s^5 and sin(psi/2)."""
+    """What integrals over the half circle are made of: 1/(a^2 + s^2), 1/s^2, 1/s^4 and psi/s^5."""
     s = math.sqrt(s2)
-    r2 = s2 + a * a
-    psi, sine = half_circle_angle(a, s, math.sqrt(r2))
     q = 1.0 / s2
     q2 = q * q
-    return r2, q, q2, psi * (q2 / s), sine
+    return 1.0 / (s2 + a * a), q, q2, half_circle_angle(a, s) * (q2 * q * s)
 
 
 @lane_function
 def short_impedance(a, b, s2):
-    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle, the short film's force along w and across; sin(psi/2)."""
-    r2, _, q2, turned, sine = half_circle(a, s2)
+    """Integrals of cos^2/D^3 and cos sin/D^3 over the half circle: the short film's force along w and across."""
+    inverse, _, q2, turned = half_circle(a, s2)
     along = 3.0 * a * q2 + turned * (s2 + 3.0 * a * a)
-    across = b * (2.0 + a * a / r2) * q2 + 3.0 * a * b * turned
-    return along, across, sine
+    across = b * (2.0 + a * a * inverse) * q2 + 3.0 * a * b * turned
+    return along, across
 
 
 @lane_function
@@ -98,14 +111,14 @@ def long_impedance(a, b, s2, along, across):
 
     From R dp/dtheta = 12 mu R^3/h^3 (w.t + C), whose C makes the pressure periodic, by parts.
     """
-    r2, q, q2, turned, _ = half_circle(a, s2)
+    inverse, q, q2, turned = half_circle(a, s2)
     # of Phi: its first derivatives, and half of the second
     first_a = 2.0 * (q + a * turned * s2)
-    over = a / r2
+    over = a * inverse
     first_b = 2.0 * b * (over * q + turned * s2)
     aa = 3.0 * a * q2 + turned * (s2 + 3.0 * a * a)
     ab = b * (2.0 + a * over) * q2 + 3.0 * a * b * turned
-    bb = over * q + turned * s2 + b * b * (over * (3.0 * q2 + 2.0 * q / r2) + 3.0 * turned)
+    bb = over * q + turned * s2 + b * b * (over * (3.0 * q2 + 2.0 * q * inverse) + 3.0 * turned)
     cosine = first_a + a * aa + b * ab  # integrals of cos/D^3, sin/D^3
     sine = first_b + a * ab + b * bb
     constant = -3.0 * (a * across - b * along) / (3.0 - s2)
@@ -127,7 +140,7 @@ def short_force(flag, scale, eccentricity, w, s2):
     if flag is not None:
         wx, wy = w
         a, b = along_and_across(eccentricity, w)
-        along, across, _ = short_impedance(a, b, s2)
+        along, across = short_impedance(a, b, s2)
         return -scale * (along * wx - across * wy), -scale * (along * wy + across * wx)
     else:
         return 0.0, 0.0
@@ -154,7 +167,8 @@ def long_force(flag, scale, eccentricity, w, s2):
 
 
 @lane_function
-def finite_scales(s2, sine):
+def finite_scales(a, s2):
     """s and sin(psi/2) as the polynomials of finite bearings take them, from -1 to 1; s no less than is fitted."""
-    s = max(math.sqrt(s2), LEAST_S)
-    return (2.0 * s - (1.0 + LEAST_S)) / (1.0 - LEAST_S), 2.0 * sine - 1.0
+    s = math.sqrt(s2)
+    sine = half_angle_sine(a, s, math.sqrt(s2 + a * a))
+    return (2.0 * max(s, LEAST_S) - (1.0 + LEAST_S)) / (1.0 - LEAST_S), 2.0 * sine - 1.0

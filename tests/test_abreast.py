@@ -1,0 +1,107 @@
+"""Implicit steps of ensembles, eight samples abreast: each gets what it would get alone, and what a single response gets."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.implicit import rows
+from hpcclear.dynamics.implicit.columns import new_columns
+from hpcclear.dynamics.implicit.inverses import invert_complex, invert_real
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.views import Outcome
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.sampling import latin_hypercube
+
+JOB = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
+FILM = "film={model='short', viscosity='10 mPa*s', length='20 mm'}"
+SCENES = {
+    "friction": [
+        "effects.contact={law='lankarani-nikravesh', restitution=0.9}",
+        "effects.friction={law='coulomb', coefficient=0.3, ramp_speed=1e-4}",
+    ],
+    "ramp": [
+        "effects.contact={law='hunt-crossley', damping=0.5}",
+        "effects.friction={law='coulomb', coefficient=0.3, ramp_speed=1e-4}",
+    ],
+    "oil": [f"joints.crank_rod.{FILM}", f"joints.rod_slider.{FILM}"],
+    "always": ["numerics.method='radau'"],
+}
+
+
+def scene_of(name: str) -> Scene:
+    length = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
+    return load_scene(JOB, [*SCENES[name], *length])
+
+
+def run(scene: Scene, samples: slice, width: int, single: bool = False) -> Outcome:
+    """Outcomes of some of twelve samples."""
+    par = parameters(scene, latin_hypercube(scene, 12))[samples]
+    return Lanes(problem_of(scene, single=single), width).run(par, start_states(scene, par))
+
+
+@pytest.mark.parametrize("name", ["friction", "oil", "always"])
+def test_no_sample_depends_on_its_neighbours(name: str):
+    """Three columns of eight, and eleven samples that take three in turn."""
+    scene = scene_of(name)
+    together = run(scene, slice(0, 11), 16)
+    assert (together.status == Status.OK).all()
+    assert (together.stiff_steps > 0).all()
+    for few, width in ((slice(4, 7), 8), (slice(0, 11), 3)):
+        np.testing.assert_array_equal(run(scene, few, width).rows, together.rows[few])
+
+
+@pytest.mark.parametrize(("name", "near"), [("ramp", 1e-4), ("oil", 5e-5), ("always", 1e-5)])
+def test_an_ensemble_agrees_with_single_responses(name: str, near: float):
+    """Both take the same method, but not the same steps: they differ by its error at rtol 1e-6 or less."""
+    scene = scene_of(name)
+    abreast, alone = run(scene, slice(0, 4), 16), run(scene, slice(0, 4), 1, single=True)
+    np.testing.assert_allclose(abreast.objective, alone.objective, rtol=near)
+    assert (abreast.objective != alone.objective).any()  # two codes
+    np.testing.assert_allclose(abreast.stiff_steps, alone.stiff_steps, rtol=0.5)
+
+
+def matrices(seed: int, n: int) -> Array:
+    """Eight matrices whose rows have to be exchanged, each in its own way: noughts on the diagonal among them."""
+    found = np.random.default_rng(seed).normal(size=(rows.COLUMNS, n, n))
+    for k, matrix in enumerate(found):
+        matrix[k % n, k % n] = 0.0
+    return found if n > 1 else found + 2.0
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 9])
+def test_inverses_of_eight_matrices(n: int):
+    m = new_columns(rows.COLUMNS)[0]
+    real, imaginary = matrices(n, n), matrices(n + 50, n)
+    held = m.reshape(-1, rows.COLUMNS)
+
+    def place(first: int) -> Array:
+        """The matrices from a row on, shape (n, n, 8)."""
+        return held[first : first + rows.N**2].reshape(rows.N, rows.N, rows.COLUMNS)[:n, :n]
+
+    place(rows.REAL)[:] = np.moveaxis(real, 0, 2)
+    place(rows.COMPLEX_RE)[:] = np.moveaxis(real, 0, 2)
+    place(rows.COMPLEX_IM)[:] = np.moveaxis(imaginary, 0, 2)
+    invert_real(n, m, rows.REAL)
+    invert_complex(n, m, rows.COMPLEX_RE, rows.COMPLEX_IM)
+    both = np.moveaxis(place(rows.COMPLEX_RE) + 1j * place(rows.COMPLEX_IM), 2, 0)
+    unit = np.broadcast_to(np.eye(n), real.shape)
+    np.testing.assert_allclose(np.moveaxis(place(rows.REAL), 2, 0) @ real, unit, atol=1e-9)
+    np.testing.assert_allclose(both @ (real + 1j * imaginary), unit, atol=1e-9)
+
+
+def test_one_singular_matrix_spoils_no_other():
+    m = new_columns(rows.COLUMNS)[0]
+    held = m.reshape(-1, rows.COLUMNS)
+    for k in range(2):
+        held[rows.REAL + k * rows.N + k] = 2.0
+    held[rows.REAL + rows.N + 1, 5] = 0.0
+    invert_real(2, m, rows.REAL)
+    found = held[rows.REAL + rows.N + 1]
+    assert not np.isfinite(found[5])
+    assert (np.delete(found, 5) == 0.5).all()
