@@ -17,6 +17,8 @@ from numba.core.datamodel import models
 from numba.core.extending import intrinsic, lower_builtin, register_model
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 
+from hpcclear.base.jit import FASTMATH
+
 EIGHT = 8
 _ALIGNED = 8  # bytes that a row's address is known to be a multiple of
 
@@ -31,7 +33,7 @@ class Eight(types.Type):  # type: ignore[misc]
 eight = Eight()
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, EIGHT)
-_FLAGS = ("contract", "nsz", "arcp")  # as `jit.FASTMATH`
+_FLAGS = tuple(sorted(FASTMATH))
 
 
 def _emitted(function: Callable[..., Any]) -> Any:

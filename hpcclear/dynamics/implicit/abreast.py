@@ -62,15 +62,12 @@ from hpcclear.dynamics.implicit.newton import (
     start_of_step,
 )
 from hpcclear.dynamics.implicit.rows import COLUMNS, STAGES, N
-from hpcclear.dynamics.implicit.stiff import SIGNATURE
+from hpcclear.dynamics.implicit.stiff import SIGNATURE, unpacked
 from hpcclear.dynamics.stepping.settings import (
     COORDINATES,
-    MEASURES,
     MOTION_OF_EIGHT,
-    NUMBERS,
     SETTINGS,
     WIDTH,
-    rules_in,
 )
 
 
@@ -323,15 +320,8 @@ def is_held(m):
 @scalar_function
 def steps_abreast(numbers, work, stages, par, settings, tables, measures, memory):
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
-    of = carray(numbers, NUMBERS)
+    of, effects, block = unpacked(numbers, work, stages, par, measures)
     W = of[WIDTH]
-    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    block = at.Block(
-        carray(work, at.WORK * W),
-        carray(stages, at.MAX_COORDINATES * W),
-        carray(par, at.PARAMETERS * W),
-        None,
-    )
     moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], 0, carray(tables, at.TABLES))
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, rows.MEMORY))
     settle_columns(block.work, W, eights)

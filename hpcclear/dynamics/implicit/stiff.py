@@ -268,18 +268,25 @@ def leave(effects, n, lane, W, work, m):
     leave_rates(effects, work, lane, W, m, LANES, END)
 
 
-@scalar_function
-def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measures, memory):
-    """`implicit_step` of every stiff lane, with arrays at addresses."""
+@lane_function
+def unpacked(numbers, work, stages, par, measures):
+    """Numbers, effects and lanes from their addresses."""
     of = carray(numbers, NUMBERS)
     W = of[WIDTH]
-    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    block = at.Block(
+    lanes = at.Block(
         carray(work, at.WORK * W),
         carray(stages, at.MAX_COORDINATES * W),
         carray(par, at.PARAMETERS * W),
         None,
     )
+    return of, at.Stepped(rules_in(of), carray(measures, of[MEASURES])), lanes
+
+
+@scalar_function
+def implicit_steps(blocks, numbers, work, stages, par, settings, tables, measures, memory):
+    """`implicit_step` of every stiff lane, with arrays at addresses."""
+    of, effects, block = unpacked(numbers, work, stages, par, measures)
+    W = of[WIDTH]
     moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], blocks, carray(tables, at.TABLES))
     lanes = carray(memory, (W, mem.MEMORY))
     for lane in range(W):
