@@ -11,6 +11,8 @@ from hpcclear.dynamics.implicit import rows
 from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.inverses import invert_complex, invert_real
 from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import RATES, START, START_CONTACTS
+from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
@@ -54,6 +56,27 @@ def test_no_sample_depends_on_its_neighbours(name: str):
     assert (together.stiff_steps > 0).all()
     for few, width in ((slice(4, 7), 8), (slice(0, 11), 3)):
         np.testing.assert_array_equal(run(scene, few, width).rows, together.rows[few])
+
+
+@pytest.mark.parametrize("model", ["short", "long", "finite"])
+def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
+    """To the last bit, at places from the middle to beyond the clearance."""
+    joints = [entry.replace("short", model) for entry in SCENES["oil"]]
+    scene = load_scene(JOB, joints)
+    problem, par = problem_of(scene), parameters(scene)[0]
+    n, count = problem.coordinates, 4096
+    start = start_states(scene, parameters(scene)).state(n)
+    scale = np.r_[np.full(n, 4e-4), np.full(n, 1.0)]
+    states = start + scale * np.random.default_rng(5).uniform(-1.0, 1.0, (count, 2 * n))
+    contacts = np.zeros((count, START - START_CONTACTS))
+    found = []
+    for width in (1, 16):
+        out = np.zeros((count, n + RATES))
+        address = problem.motion(problem.effects, width).address
+        observe(address, par, problem.tables, states, contacts, np.zeros(count), out, width)
+        found.append(out)
+    assert np.isfinite(found[0][:, :n]).all()
+    np.testing.assert_array_equal(*found)
 
 
 @pytest.mark.parametrize(("name", "near"), [("ramp", 1e-4), ("oil", 5e-5), ("always", 1e-5)])

@@ -242,8 +242,7 @@ def correct(n, m):
         by_v = fetch(m, rows.INVERSE_SCALE + N + r)
         total = total + (by_v * by_v + by_q * by_q) * (x * x + y * y + z * z)
         row = rows.TRANSFORMED + r
-        w0, w1, w2 = fetch(m, row), fetch(m, row + N), fetch(m, row + 2 * N)
-        w0, w1, w2 = above(asked, w0 + x, w0), above(asked, w1 + y, w1), above(asked, w2 + z, w2)
+        w0, w1, w2 = fetch(m, row) + x, fetch(m, row + N) + y, fetch(m, row + 2 * N) + z
         put(m, row, w0)
         put(m, row + N, w1)
         put(m, row + 2 * N, w2)
