@@ -25,13 +25,12 @@ from matplotlib.axes import Axes
 from numba import carray, cfunc, njit
 from numbalsoda import lsoda, lsoda_sig
 from plain_loop import motion
-from scenes import JOB, Setup, setup
+from scenes import JOB, Setup, single
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.results.dataset import provenance
@@ -108,8 +107,7 @@ def prepare(name: str, revolutions: int, rtols: Array) -> Case:
     """Start states from a tight run, the exact ends, and the set-ups of every method and tolerance."""
 
     def at_tolerance(method: str, rtol: float) -> Setup:
-        chosen = scene_of(name, method, rtol)
-        return setup(chosen, parameters(chosen))
+        return single(scene_of(name, method, rtol))
 
     tight = at_tolerance("tsitouras", 1e-11)
     lanes = Lanes(tight.problem, 1)

@@ -6,6 +6,7 @@ import types
 import numpy as np
 from dense_linkage import Contact, Jet, admissible, assembled, turned
 
+from hpcclear.base import bits
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import elements, motion
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
@@ -21,6 +22,13 @@ CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, 
 FREE = 500  # rows of what the joints write
 
 
+BITS = {
+    bits.bits_of: lambda x: np.float64(x).view(np.int64),
+    bits.double_of: lambda n: float(np.int64(n).view(np.float64)),
+}
+"""What compiled code has of a processor's own, as ordinary Python."""
+
+
 def plain(function, made=None):
     """A compiled function as ordinary Python, and all that it calls."""
     made = {} if made is None else made
@@ -29,7 +37,8 @@ def plain(function, made=None):
         names = {}
         made[code] = types.FunctionType(code.__code__, names)
         for name, value in code.__globals__.items():
-            names[name] = plain(value, made) if hasattr(value, "py_func") else value
+            known = BITS.get(value) if callable(value) else None
+            names[name] = known or (plain(value, made) if hasattr(value, "py_func") else value)
     return made[code]
 
 

@@ -10,7 +10,9 @@ from hpcclear.base.jit import lane_function
 
 
 @intrinsic
-def _bits_of(typingctx, x):
+def bits_of(typingctx, x):
+    """The bits of a double as a whole number."""
+
     def codegen(context, builder, signature, args):
         return builder.bitcast(args[0], ir.IntType(64))
 
@@ -18,7 +20,9 @@ def _bits_of(typingctx, x):
 
 
 @intrinsic
-def _double_of(typingctx, n):
+def double_of(typingctx, n):
+    """The double that a whole number is the bits of."""
+
     def codegen(context, builder, signature, args):
         return builder.bitcast(args[0], ir.DoubleType())
 
@@ -28,7 +32,7 @@ def _double_of(typingctx, n):
 @lane_function
 def rough_log2(x):
     """log2 of x >= 0 within 0.09; about -1023 for 0, above 1024 for NaN and infinity."""
-    return _bits_of(x) * 2.220446049250313e-16 - 1023.0  # type: ignore[call-arg]
+    return bits_of(x) * 2.220446049250313e-16 - 1023.0  # type: ignore[call-arg]
 
 
 @lane_function
@@ -38,7 +42,7 @@ def rough_exp2(y):
     s = y - int(y)
     # the chord of 2**s overshoots it: a parabola takes most of the difference away
     bits = int((y - 0.3371894346 * s * (1.0 - s)) * 4503599627370496.0)
-    return _double_of(bits)  # type: ignore[call-arg]
+    return double_of(bits)  # type: ignore[call-arg]
 
 
 @lane_function
@@ -67,7 +71,7 @@ def falling(x, most=700.0):
     p = p * r + 0.5
     p = p * r + 1.0
     p = p * r + 1.0
-    return p * _double_of((_bits_of(shifted) + 1023) << 52)  # type: ignore[call-arg]
+    return p * double_of((bits_of(shifted) + 1023) << 52)  # type: ignore[call-arg]
 
 
 def _view(context, builder, kind, value, offset):

@@ -4,11 +4,19 @@ import math
 
 from numba import njit
 
-from hpcclear.base import jit  # noqa: F401  (sets the cache folder before the first decorator)
+from hpcclear.base.bits import bits_of, double_of
+from hpcclear.base.jit import lane_function
 
 # pi/2 in two parts: the first has zeros in its last bits, so that k * _HALF_PI_HIGH is exact for moderate k
 _HALF_PI_HIGH = 1.5707963267341256
 _HALF_PI_LOW = 6.077100506506192e-11
+_ROUNDING = 6755399441055744.0  # 1.5 * 2**52: added, it rounds to a whole number and leaves that in the lowest bits
+
+
+@lane_function
+def with_sign(number, turn):
+    """A number, with the other sign where the second lowest bit of a whole number is set."""
+    return double_of(bits_of(number) ^ ((turn & 2) << 62))  # type: ignore[call-arg]
 
 
 # Neither "reassoc" nor "arcp" here: the two-part reduction relies on the order of the operations.
@@ -18,7 +26,9 @@ def sincos(angle):
 
     Reduction to [-pi/4, pi/4], then the minimax polynomials of Sun's fdlibm (k_sin.c, k_cos.c).
     """
-    quarter = math.floor(angle * (2.0 / math.pi) + 0.5)
+    shifted = angle * (2.0 / math.pi) + _ROUNDING
+    quarter = shifted - _ROUNDING
+    turn = bits_of(shifted)  # type: ignore[call-arg, var-annotated]  # its lowest two bits: which quarter
     r = (angle - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_LOW
     z = r * r
     p = 1.58969099521155010221e-10
@@ -35,11 +45,7 @@ def sincos(angle):
     p = p * z - 1.38888888888741095749e-03
     p = p * z + 4.16666666666666019037e-02
     cosine = 1.0 - (0.5 * z - z * z * p)
-    turn = quarter - 4.0 * math.floor(quarter * 0.25)  # 0, 1, 2, 3
-    odd = turn - 2.0 * math.floor(turn * 0.5)
-    half = math.floor(turn * 0.5)  # 0 or 1: second half turn
-    s = sine if odd == 0.0 else cosine
-    c = cosine if odd == 0.0 else sine
-    sign_s = 1.0 - 2.0 * half
-    sign_c = sign_s * (1.0 - 2.0 * odd)
-    return sign_s * s, sign_c * c
+    swapped = turn & 1 == 1
+    s = cosine if swapped else sine
+    c = sine if swapped else cosine
+    return with_sign(s, turn), with_sign(c, turn + 1)
