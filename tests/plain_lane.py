@@ -22,9 +22,11 @@ CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, 
 FREE = 500  # rows of what the joints write
 
 
-BITS = {
+PLAIN = {
     bits.bits_of: lambda x: np.float64(x).view(np.int64),
     bits.double_of: lambda n: float(np.int64(n).view(np.float64)),
+    bits.no_less: lambda x, least: least if least > x else x,
+    bits.no_more: lambda x, most: most if most < x else x,
 }
 """What compiled code has of a processor's own, as ordinary Python."""
 
@@ -37,7 +39,7 @@ def plain(function, made=None):
         names = {}
         made[code] = types.FunctionType(code.__code__, names)
         for name, value in code.__globals__.items():
-            known = BITS.get(value) if callable(value) else None
+            known = PLAIN.get(value) if callable(value) else None
             names[name] = known or (plain(value, made) if hasattr(value, "py_func") else value)
     return made[code]
 

@@ -8,6 +8,7 @@ import pint
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_lane import PLAIN
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -116,12 +117,14 @@ def test_hertz_is_the_cited_form():
 @pytest.fixture
 def with_units(monkeypatch):
     """The laws' own source run on quantities: compiled parts replaced by the Python they are made of."""
-    for module, names in (
-        (contact, ("elastic_force", "damping_factor", "normal_force")),
-        (friction, ("saturated", "friction_ratio")),
+    for module, names, limits in (
+        (contact, ("elastic_force", "damping_factor", "normal_force"), ("no_less",)),
+        (friction, ("saturated", "share_of", "friction_ratio"), ("no_less", "no_more")),
     ):
         for name in names:
             monkeypatch.setattr(module, name, getattr(module, name).py_func)
+        for name in limits:
+            monkeypatch.setattr(module, name, PLAIN[getattr(module, name)])
         roots = SimpleNamespace(
             sqrt=lambda q: q**0.5,
             copysign=lambda x, y: x * np.sign(Q(y).magnitude),

@@ -74,7 +74,9 @@ def test_the_angle_of_the_half_circle():
         for r in (0.1, 1.0):
             a, s = -r * math.cos(psi), r * math.sin(psi)
             sine = film.half_angle_sine(a, s, r)
-            assert film.half_circle_angle(a, s) == pytest.approx(psi, rel=1e-12)
+            angle, inverse = film.half_circle_angle(a, s, 3.0)
+            assert angle == pytest.approx(psi, rel=1e-12)
+            assert inverse == pytest.approx(1.0 / 3.0, rel=1e-15)
             assert sine == pytest.approx(math.sin(0.5 * psi), rel=1e-12)
 
 

@@ -1,5 +1,5 @@
-"""From the bits of a double, vectorisable: a cheap base-2 logarithm and exponential, enough for a step-size factor, and a
-falling exponential that is good to the last digits."""
+"""What is vectorised though no operator says it: limits without a branch; from the bits of a double a cheap base-2 logarithm
+and exponential, enough for a step-size factor, and a falling exponential that is good to the last digits."""
 
 from llvmlite import ir
 from numba import types
@@ -27,6 +27,27 @@ def double_of(typingctx, n):
         return builder.bitcast(args[0], ir.DoubleType())
 
     return types.float64(types.int64), codegen
+
+
+def _chosen(predicate):
+    """Code that takes a limit where it compares so with a number, and else the number."""
+
+    def codegen(context, builder, signature, args):
+        return builder.select(builder.fcmp_ordered(predicate, args[1], args[0]), args[1], args[0])
+
+    return codegen
+
+
+@intrinsic
+def no_less(typingctx, x, least):
+    """x, or `least` where that is more: one instruction without a branch. NaN stays NaN."""
+    return types.float64(types.float64, types.float64), _chosen(">")
+
+
+@intrinsic
+def no_more(typingctx, x, most):
+    """x, or `most` where that is less. NaN stays NaN."""
+    return types.float64(types.float64, types.float64), _chosen("<")
 
 
 @lane_function

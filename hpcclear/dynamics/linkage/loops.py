@@ -18,7 +18,6 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.dynamics.physics.friction import saturated
 
 
 def sincos(angle: Any) -> tuple[Any, Any]:
@@ -31,12 +30,17 @@ def sign_of(value: Any) -> Any:
     return np.where(value >= 0.0, 1.0, -1.0)
 
 
+def saturated(value: Any) -> Any:
+    """`friction.saturated` for arrays, any shape."""
+    return np.clip(value, -1.0, 1.0)
+
+
 WORDS: dict[str, Callable[..., Any]] = {
     "sincos": sincos,
     "sign_of": sign_of,
     "harmonic": elements.harmonic.py_func,
     "spring_force": elements.spring_force.py_func,
-    "saturated": saturated.py_func,
+    "saturated": saturated,
 }
 """What texts call, for arrays."""
 

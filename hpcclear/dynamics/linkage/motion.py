@@ -12,6 +12,7 @@ With both joints ideal a torque drive leaves one coordinate, the crank angle.
 
 import math
 
+from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bristles import ratio_of
@@ -24,7 +25,7 @@ from hpcclear.dynamics.linkage.roundness import (
 )
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.contact import elastic_force, normal_force
-from hpcclear.dynamics.physics.friction import saturated
+from hpcclear.dynamics.physics.friction import saturated, share_of
 
 _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
 
@@ -139,7 +140,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
-    depth = 0.5 * (gap + abs(gap))
+    depth = no_less(gap, 0.0)  # type: ignore[call-arg]
     stiffness = par[(block + at.CONTACT_STIFFNESS) * W + i]
     normal = normal_force(
         effects.fixed,
@@ -194,7 +195,7 @@ def force_that_wears(threshold, par, joint, normal, i, W):
     if threshold is not None:
         row = at.THRESHOLDS + 2 * joint.place
         share = par[row * W + i] * normal + par[(row + 1) * W + i]
-        return normal * (0.5 * (1.0 + abs(share) - abs(share - 1.0)))
+        return normal * share_of(share)
     else:
         return normal
 

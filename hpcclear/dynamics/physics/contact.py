@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.bits import no_less
 from hpcclear.base.jit import lane_function
 
 Number = TypeVar("Number", float, Array)
@@ -112,5 +113,5 @@ def normal_force(fixed, latched, stiffness, damping, penetration, rate, inverse_
     """Normal force in N for penetration d >= 0 in m and rate d' in m/s (paper eq. 7); never adhesive."""
     factor = 1.0 + damping_factor(fixed, latched, damping, rate, inverse_impact_speed)
     if fixed is not None or latched is not None:
-        factor = 0.5 * (factor + abs(factor))  # max(factor, 0) without a branch
+        factor = no_less(factor, 0.0)  # type: ignore[call-arg]
     return elastic_force(stiffness, penetration) * factor

@@ -19,6 +19,7 @@ by differentiation, as d psi/da = 1/s and d psi/db = a b/(s (1 - b^2)). No term 
 
 import math
 
+from hpcclear.base.bits import no_less
 from hpcclear.base.jit import lane_function
 
 LEAST_S = 0.19899748742132398
@@ -49,19 +50,20 @@ def small_arctan(t):
 
 
 @lane_function
-def half_circle_angle(a, s):
-    """psi from 0 to pi whose tangent is s/-a, for s > 0.
+def half_circle_angle(a, s, r2):
+    """psi from 0 to pi whose tangent is s/-a, for s > 0; and 1/`r2`, from the same quotient.
 
-    From one quotient, of the smaller by the larger, or near their balance of their difference by their sum; chosen, in place of
-    branches: roots and quotients are what a film's force costs.
+    That is of the smaller by the larger, or near their balance of their difference by their sum; chosen, in place of branches:
+    roots and quotients are what a film's force costs.
     """
     size = abs(a)
     flat, steep = s <= EIGHTH * size, size <= EIGHTH * s
     over = size if flat else (-s if steep else s + size)
     under = s if flat else (size if steep else s - size)
     base = 0.0 if flat else (HALF_TURN / 2.0 if steep else HALF_TURN / 4.0)
-    angle = base + small_arctan(under / over)
-    return angle if a <= 0.0 else HALF_TURN - angle
+    both = 1.0 / (over * r2)
+    angle = base + small_arctan(under * (both * r2))
+    return (angle if a <= 0.0 else HALF_TURN - angle), both * over
 
 
 @lane_function
@@ -79,11 +81,12 @@ def film_thickness(gap, clearance, floor):
     It is the depth, 1 less the eccentricity over the clearance, from twice the `floor` on, and the floor where surfaces touch,
     a parabola between: so does the mean gap between surfaces whose heights are spread evenly.
     """
-    depth = -gap / clearance
-    inside = 0.5 * (abs(depth) + depth)
-    beyond = 0.5 * (abs(inside - 2.0 * floor) + inside - 2.0 * floor)
+    inverse = 1.0 / (clearance * floor)  # one for both: quotients are what a film's force costs
+    depth = -gap * (inverse * floor)
+    inside = no_less(depth, 0.0)  # type: ignore[call-arg]
+    beyond = no_less(inside - 2.0 * floor, 0.0)  # type: ignore[call-arg]
     near = inside - beyond
-    return floor + near * near / (4.0 * floor) + beyond
+    return floor + near * near * (0.25 * inverse * clearance) + beyond
 
 
 @lane_function
@@ -92,7 +95,8 @@ def half_circle(a, s2):
     s = math.sqrt(s2)
     q = 1.0 / s2
     q2 = q * q
-    return 1.0 / (s2 + a * a), q, q2, half_circle_angle(a, s) * (q2 * q * s)
+    angle, inverse = half_circle_angle(a, s, s2 + a * a)
+    return inverse, q, q2, angle * (q2 * q * s)
 
 
 @lane_function

@@ -2,7 +2,7 @@
 
 import math
 
-from hpcclear.base.bits import falling
+from hpcclear.base.bits import falling, no_less, no_more
 from hpcclear.base.jit import lane_function
 
 _TINY = 1e-300  # keeps bristles that hold nothing from being divided by it
@@ -10,8 +10,14 @@ _TINY = 1e-300  # keeps bristles that hold nothing from being divided by it
 
 @lane_function
 def saturated(x):
-    """Clip to [-1, 1] without a branch; NaN stays NaN."""
-    return 0.5 * (abs(x + 1.0) - abs(x - 1.0))
+    """Clip to [-1, 1]; NaN stays NaN."""
+    return no_less(no_more(x, 1.0), -1.0)  # type: ignore[call-arg]
+
+
+@lane_function
+def share_of(x):
+    """Clip to [0, 1]; NaN stays NaN."""
+    return no_less(no_more(x, 1.0), 0.0)  # type: ignore[call-arg]
 
 
 @lane_function
@@ -26,7 +32,7 @@ def friction_ratio(coulomb, ambrosio, coefficient, dead_speed, inverse_ramp, sli
         return coefficient * saturated(sliding_speed * inverse_ramp)
     elif ambrosio is not None:
         ramp = (abs(sliding_speed) - dead_speed) * inverse_ramp
-        return math.copysign(coefficient * 0.5 * (1.0 + abs(ramp) - abs(ramp - 1.0)), sliding_speed)
+        return math.copysign(coefficient * share_of(ramp), sliding_speed)
     else:
         return 0.0
 
