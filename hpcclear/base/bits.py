@@ -4,12 +4,11 @@ and exponential, enough for a step-size factor, and a falling exponential that i
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.extending import intrinsic
 
-from hpcclear.base.jit import lane_function
+from hpcclear.base.jit import emitted, lane_function
 
 
-@intrinsic
+@emitted
 def bits_of(typingctx, x):
     """The bits of a double as a whole number."""
 
@@ -19,7 +18,7 @@ def bits_of(typingctx, x):
     return types.int64(types.float64), codegen
 
 
-@intrinsic
+@emitted
 def double_of(typingctx, n):
     """The double that a whole number is the bits of."""
 
@@ -38,13 +37,13 @@ def _chosen(predicate):
     return codegen
 
 
-@intrinsic
+@emitted
 def no_less(typingctx, x, least):
     """x, or `least` where that is more: one instruction without a branch. NaN stays NaN."""
     return types.float64(types.float64, types.float64), _chosen(">")
 
 
-@intrinsic
+@emitted
 def no_more(typingctx, x, most):
     """x, or `most` where that is less. NaN stays NaN."""
     return types.float64(types.float64, types.float64), _chosen("<")
@@ -53,7 +52,7 @@ def no_more(typingctx, x, most):
 @lane_function
 def rough_log2(x):
     """log2 of x >= 0 within 0.09; about -1023 for 0, above 1024 for NaN and infinity."""
-    return bits_of(x) * 2.220446049250313e-16 - 1023.0  # type: ignore[call-arg]
+    return bits_of(x) * 2.220446049250313e-16 - 1023.0
 
 
 @lane_function
@@ -63,7 +62,7 @@ def rough_exp2(y):
     s = y - int(y)
     # the chord of 2**s overshoots it: a parabola takes most of the difference away
     bits = int((y - 0.3371894346 * s * (1.0 - s)) * 4503599627370496.0)
-    return double_of(bits)  # type: ignore[call-arg]
+    return double_of(bits)
 
 
 @lane_function
@@ -92,7 +91,7 @@ def falling(x, most=700.0):
     p = p * r + 0.5
     p = p * r + 1.0
     p = p * r + 1.0
-    return p * double_of((bits_of(shifted) + 1023) << 52)  # type: ignore[call-arg]
+    return p * double_of((bits_of(shifted) + 1023) << 52)
 
 
 def _view(context, builder, kind, value, offset):
@@ -110,7 +109,7 @@ def _view(context, builder, kind, value, offset):
     return part._getvalue()
 
 
-@intrinsic(prefer_literal=True)
+@emitted(prefer_literal=True)
 def beyond(typingctx, array, offset):
     """View of a flat array from a constant offset on, at a distance the compiler knows (a slice's would be clamped first).
 
@@ -123,7 +122,7 @@ def beyond(typingctx, array, offset):
     return array(array, offset), codegen
 
 
-@intrinsic
+@emitted
 def borrowed(typingctx, array):
     """The same array without its count of references; None stays None.
 
@@ -139,7 +138,7 @@ def borrowed(typingctx, array):
     return array(array), codegen
 
 
-@intrinsic
+@emitted
 def call_at(typingctx, address, arrays):
     """Call the C function at an address with the places of a tuple's arrays; it returns nothing.
 

@@ -7,17 +7,15 @@ splits it.
 """
 
 import operator
-from collections.abc import Callable
-from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.core.extending import intrinsic, lower_builtin, register_model
+from numba.core.extending import lower_builtin, register_model
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 
-from hpcclear.base.jit import FASTMATH
+from hpcclear.base.jit import FASTMATH, emitted
 
 EIGHT = 8
 _ALIGNED = 8  # bytes that a row's address is known to be a multiple of
@@ -34,11 +32,6 @@ eight = Eight()
 _DOUBLE = ir.DoubleType()
 _VECTOR = ir.VectorType(_DOUBLE, EIGHT)
 _FLAGS = tuple(sorted(FASTMATH))
-
-
-def _emitted(function: Callable[..., Any]) -> Any:
-    """What compiled code calls by the name of a function that emits it."""
-    return intrinsic(function)
 
 
 @register_model(Eight)
@@ -103,7 +96,7 @@ for _function, _name in _OPERATIONS:
     _define(_function, _name)
 
 
-@_emitted
+@emitted
 def fetch(typingctx, array, row):
     """Row of a flat array of doubles: what stands from 8 row on."""
 
@@ -113,7 +106,7 @@ def fetch(typingctx, array, row):
     return eight(array, types.intp), codegen
 
 
-@_emitted
+@emitted
 def put(typingctx, array, row, vector):
     """Put a vector into a row of a flat array of doubles."""
 
@@ -125,7 +118,7 @@ def put(typingctx, array, row, vector):
     return types.void(array, types.intp, eight), codegen
 
 
-@_emitted
+@emitted
 def spread(typingctx, number):
     """A vector of eight times the same number."""
 
@@ -135,7 +128,7 @@ def spread(typingctx, number):
     return eight(types.float64), codegen
 
 
-@_emitted
+@emitted
 def nine_rows(typingctx, array, row):
     """Nine rows of a flat array, one after the other: kept in registers as far as there are any."""
     kind = types.UniTuple(eight, EIGHT + 1)
@@ -151,7 +144,7 @@ def nine_rows(typingctx, array, row):
     return kind(array, types.intp), codegen
 
 
-@_emitted
+@emitted
 def combined(typingctx, rows, first, array, row):
     """Nine rows times nine numbers, summed: `first`, then those of a row of a flat array."""
 
@@ -172,7 +165,7 @@ def combined(typingctx, rows, first, array, row):
     return eight(rows, types.float64, array, types.intp), codegen
 
 
-@_emitted
+@emitted
 def total_of(typingctx, vector):
     """Sum of a vector's numbers, by halves."""
 
@@ -192,7 +185,7 @@ def total_of(typingctx, vector):
     return types.float64(eight), codegen
 
 
-@_emitted
+@emitted
 def largest_of(typingctx, vector):
     """The largest of a vector's numbers; which of them where one is none is not said."""
 
@@ -206,7 +199,7 @@ def largest_of(typingctx, vector):
     return types.float64(eight), codegen
 
 
-@_emitted
+@emitted
 def either(typingctx, condition, vector, other):
     """The first of two vectors where a condition holds, else the second."""
 
@@ -216,7 +209,7 @@ def either(typingctx, condition, vector, other):
     return eight(types.boolean, eight, eight), codegen
 
 
-@_emitted
+@emitted
 def above(typingctx, vector, yes, no):
     """Of two vectors, number by number, the first where a third is above 0, else the second."""
 
@@ -227,7 +220,7 @@ def above(typingctx, vector, yes, no):
     return eight(eight, eight, eight), codegen
 
 
-@_emitted
+@emitted
 def size(typingctx, vector):
     """A vector's numbers without their signs."""
 
@@ -240,7 +233,7 @@ def size(typingctx, vector):
     return eight(eight), codegen
 
 
-@_emitted
+@emitted
 def column(typingctx, array, row, place):
     """What stands at a place of eight rows of a flat array, one after the other."""
 

@@ -22,11 +22,20 @@ import llvmlite.binding
 import numba
 import numpy as np
 from numba import config, njit
+from numba.core.extending import intrinsic
 
 from hpcclear.base.width import asked_width, features
 
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
+
+
+def emitted(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """What compiled code calls by the name of a function that emits it, of any arguments for a checker of types.
+
+    `options`: Numba's, of an intrinsic.
+    """
+    return intrinsic(function) if function else intrinsic(**options)
 
 
 def _compiled_sources(root: Path) -> list[Path]:

@@ -323,7 +323,7 @@ def change_sample(special, asked, block, queue, method, m):
 def advance(special, rules, block, queue, method, record, m, budget):
     """Take at most `budget` steps. Returns whether the lane holds a sample."""
     block, queue, method = borrowed_all(block, queue, method, 1)
-    m = borrowed(m)  # type: ignore[call-arg]
+    m = borrowed(m)
     effects = at.Stepped(rules, method.measures)
     settings, tables, counters = method.settings, method.tables, queue.counters
     work, stages, book, numbers = block.work, block.stages, block.book, method.numbers

@@ -66,7 +66,7 @@ def ask_explicit(address, block, method):
     arrays = (
         method.numbers, block.work, method.settings, method.weights, method.tables, method.measures
     )  # fmt: skip
-    call_at(address, arrays)  # type: ignore[call-arg]
+    call_at(address, arrays)
 
 
 @lane_function

@@ -144,8 +144,8 @@ def explicit_steps(stiff, W, numbers, lanes, settings, weights, tables, measures
     entries = carray(settings, SETTINGS)
     step = Step(
         work,
-        beyond(work, at.STAGES * W),  # type: ignore[call-arg]
-        beyond(work, at.WORK * W),  # type: ignore[call-arg]
+        beyond(work, at.STAGES * W),
+        beyond(work, at.WORK * W),
         carray(weights, tab.PACKED),
         of[COORDINATES],
         entries[RTOL],

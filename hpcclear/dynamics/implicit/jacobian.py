@@ -60,7 +60,7 @@ def difference_jacobian(motion, n, blocks, m, tables):
     first = 0
     while first < 2 * n:
         displace_all(n, m, first)
-        bank = beyond(m, SECOND_OFFSET)  # type: ignore[call-arg, var-annotated]
+        bank = beyond(m, SECOND_OFFSET)
         evaluate_bank(motion, bank, tables)
         for i in range(min(LANES, 2 * n - first)):
             inverse = 1.0 / m[mem.INCREMENT * LANES + first + i]

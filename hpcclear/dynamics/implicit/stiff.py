@@ -318,4 +318,4 @@ def ask_implicit(address, numbers, block, method, memory):
         arrays = (
             numbers, block.work, block.stages, block.par, method.settings, method.tables, method.measures, memory
         )  # fmt: skip
-        call_at(address, arrays)  # type: ignore[call-arg]
+        call_at(address, arrays)

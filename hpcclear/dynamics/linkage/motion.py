@@ -140,7 +140,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
-    depth = no_less(gap, 0.0)  # type: ignore[call-arg]
+    depth = no_less(gap, 0.0)
     stiffness = par[(block + at.CONTACT_STIFFNESS) * W + i]
     normal = normal_force(
         effects.fixed,

@@ -79,7 +79,7 @@ def accelerations(effects, work, par, tables, W):
 def motion(effects, lanes, tables, W):
     """`accelerations` of the lanes at an address."""
     work = carray(lanes, at.BANK * W)
-    par = beyond(work, at.WORK * W)  # type: ignore[call-arg, var-annotated]
+    par = beyond(work, at.WORK * W)
     accelerations(effects, work, par, carray(tables, at.TABLES), W)
 
 
@@ -146,4 +146,4 @@ def written_by(effects: at.Effects) -> ModuleType:
 @lane_function
 def run_motion(address, work, tables):
     """Accelerations and rates of all lanes at the stage held in `work`, by the motion at an address."""
-    call_at(address, (work, tables))  # type: ignore[call-arg]
+    call_at(address, (work, tables))

@@ -16,7 +16,7 @@ _ROUNDING = 6755399441055744.0  # 1.5 * 2**52: added, it rounds to a whole numbe
 @lane_function
 def with_sign(number, turn):
     """A number, with the other sign where the second lowest bit of a whole number is set."""
-    return double_of(bits_of(number) ^ ((turn & 2) << 62))  # type: ignore[call-arg]
+    return double_of(bits_of(number) ^ ((turn & 2) << 62))
 
 
 # Neither "reassoc" nor "arcp" here: the two-part reduction relies on the order of the operations.
@@ -28,7 +28,7 @@ def sincos(angle):
     """
     shifted = angle * (2.0 / math.pi) + _ROUNDING
     quarter = shifted - _ROUNDING
-    turn = bits_of(shifted)  # type: ignore[call-arg, var-annotated]  # its lowest two bits: which quarter
+    turn = bits_of(shifted)  # its lowest two bits: which quarter
     r = (angle - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_LOW
     z = r * r
     p = 1.58969099521155010221e-10

@@ -113,5 +113,5 @@ def normal_force(fixed, latched, stiffness, damping, penetration, rate, inverse_
     """Normal force in N for penetration d >= 0 in m and rate d' in m/s (paper eq. 7); never adhesive."""
     factor = 1.0 + damping_factor(fixed, latched, damping, rate, inverse_impact_speed)
     if fixed is not None or latched is not None:
-        factor = no_less(factor, 0.0)  # type: ignore[call-arg]
+        factor = no_less(factor, 0.0)
     return elastic_force(stiffness, penetration) * factor

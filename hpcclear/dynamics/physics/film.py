@@ -83,8 +83,8 @@ def film_thickness(gap, clearance, floor):
     """
     inverse = 1.0 / (clearance * floor)  # one for both: quotients are what a film's force costs
     depth = -gap * (inverse * floor)
-    inside = no_less(depth, 0.0)  # type: ignore[call-arg]
-    beyond = no_less(inside - 2.0 * floor, 0.0)  # type: ignore[call-arg]
+    inside = no_less(depth, 0.0)
+    beyond = no_less(inside - 2.0 * floor, 0.0)
     near = inside - beyond
     return floor + near * near * (0.25 * inverse * clearance) + beyond
 

@@ -11,13 +11,13 @@ _TINY = 1e-300  # keeps bristles that hold nothing from being divided by it
 @lane_function
 def saturated(x):
     """Clip to [-1, 1]; NaN stays NaN."""
-    return no_less(no_more(x, 1.0), -1.0)  # type: ignore[call-arg]
+    return no_less(no_more(x, 1.0), -1.0)
 
 
 @lane_function
 def share_of(x):
     """Clip to [0, 1]; NaN stays NaN."""
-    return no_less(no_more(x, 1.0), 0.0)  # type: ignore[call-arg]
+    return no_less(no_more(x, 1.0), 0.0)
 
 
 @lane_function

@@ -18,7 +18,7 @@ def borrowed_all(block, queue, method, W):
     lent: Any = borrowed
     work = lent(block.work)
     return (
-        at.Block(work, beyond(work, at.STAGES * W), beyond(work, at.WORK * W), lent(block.book)),  # type: ignore[call-arg]
+        at.Block(work, beyond(work, at.STAGES * W), beyond(work, at.WORK * W), lent(block.book)),
         at.Queue(
             lent(queue.par), lent(queue.start), lent(queue.out),
             lent(queue.finished), lent(queue.counters),

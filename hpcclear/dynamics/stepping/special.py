@@ -130,5 +130,5 @@ def ask(address, asked, lane, numbers, block, queue, settings):
         numbers, block.work, block.stages, block.par, block.book, settings,
         queue.par, queue.start, queue.out, queue.finished, queue.counters,
     )  # fmt: skip
-    call_at(address, arrays)  # type: ignore[call-arg]
+    call_at(address, arrays)
     return numbers[FOUND]
