@@ -139,8 +139,16 @@ def test_the_number_of_lanes_does_not_change_one_bit():
 
 def test_lanes_fit_the_processor_or_the_environment(monkeypatch):
     monkeypatch.delenv("HPCCLEAR_LANES", raising=False)
-    for doubles, lanes in ((8, 32), (4, 16), (2, 16)):
+    for doubles, kib, lanes in (
+        (8, 48, 32),
+        (8, 64, 32),
+        (8, 32, 16),
+        (8, 8, 16),
+        (4, 48, 16),
+        (2, 32, 16),
+    ):
         monkeypatch.setattr(evaluator, "doubles_in_a_vector", lambda doubles=doubles: doubles)
+        monkeypatch.setattr(evaluator, "first_level_cache", lambda kib=kib: kib * 1024)
         assert evaluator.default_lanes() == lanes
     monkeypatch.setenv("HPCCLEAR_LANES", "24")
     assert evaluator.default_lanes() == 24

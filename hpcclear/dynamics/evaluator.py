@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans, Integers, Records
+from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
@@ -21,8 +22,12 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
 VECTORS = 4
-"""Vectors that the lanes of an ensemble fill: enough for the processor to work on one while another waits for a root or a
-quotient, few enough for the first-level cache. Measured on AVX-512: 16 to 48 lanes are within 3 %, 8 are left scalar."""
+"""Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or
+a quotient, few enough for a first-level cache of 48 KiB. There 16 to 48 lanes are within 3 to 10 %, 8 are left scalar."""
+
+CACHE_OF_A_VECTOR = 12 * 1024
+"""Bytes of the first-level cache for each of them: in 32 KiB 16 lanes take 0.84 of the time of 32, whose states, stages and
+parameters do not fit."""
 
 LEAST_LANES = 16
 """Shorter loops the compiler does not vectorise where it must ask at run time whether arrays overlap."""
@@ -38,7 +43,8 @@ def default_lanes() -> int:
     """
     asked = os.environ.get("HPCCLEAR_LANES", "")
     if not asked:
-        return max(LEAST_LANES, VECTORS * doubles_in_a_vector())
+        vectors = min(VECTORS, first_level_cache() // CACHE_OF_A_VECTOR)
+        return max(LEAST_LANES, vectors * doubles_in_a_vector())
     if not (asked.isdecimal() and 1 <= int(asked) <= 1024):
         raise InputError(
             "HPCCLEAR_LANES",
