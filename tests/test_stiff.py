@@ -43,8 +43,8 @@ def scene_of(name: str, method: str, rtol: float) -> Scene:
 
 
 def one_turn(scene: Scene, start: Start) -> Outcome:
-    """Outcome of one revolution from one start."""
-    return Lanes(problem_of(scene), 1).run(parameters(scene), start)
+    """Outcome of one revolution from one start, as of a single response."""
+    return Lanes(problem_of(scene, single=True), 1).run(parameters(scene), start)
 
 
 def settled(name: str) -> Start:
