@@ -133,10 +133,11 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     active = work[joint.active * W + i]
     inverse_impact = work[joint.inverse_impact * W + i]
     square = ex * ex + ey * ey + _TINY
-    inverse = 1.0 / math.sqrt(square)
+    distance = math.sqrt(square)
+    inverse = 1.0 / distance
     nx = ex * inverse
     ny = ey * inverse
-    round_gap = square * inverse - par[(block + at.CLEARANCE) * W + i]
+    round_gap = distance - par[(block + at.CLEARANCE) * W + i]
     here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
