@@ -103,7 +103,8 @@ def test_a_linkage_starts_from_rest_like_the_slider_crank():
         ),
         strict=True,
     )
-    assert f[0] == pytest.approx(f[1], rel=1e-6)
+    # a millionth of a millionth more flywheel moves either f by up to 1.1e-5: what differs in the last digit does as much
+    assert f[0] == pytest.approx(f[1], rel=3e-5)
     assert speeds[0] == pytest.approx(speeds[1], rel=1e-6)
 
 

@@ -15,7 +15,8 @@ _ROUNDING = 6755399441055744.0  # 1.5 * 2**52: added, it rounds to a whole numbe
 
 @lane_function
 def with_sign(number, turn):
-    """A number, with the other sign where the second lowest bit of a whole number is set."""
+    """A number, with the other sign where the second lowest bit of a whole number is set: of the quarters that Sun's fdlibm
+    (e_rem_pio2.c) counts, the lowest two bits say which of sine and cosine it is, and its sign."""
     return double_of(bits_of(number) ^ ((turn & 2) << 62))
 
 
