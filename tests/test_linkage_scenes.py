@@ -208,8 +208,8 @@ def test_every_drive_closes_the_energy(drive):
     assert turns == pytest.approx(4.0 if drive == "two turns" else 2.0, abs=0.1)
     found = evaluate(scene, {"mechanism.joints.o2.clearance": np.linspace(1e-4, 3e-4, 41)})
     assert (found["status"] == 0).all()
-    # One of several thousand samples of the torque drive leaves up to 1.3e-5 (kicked by 1e-9 it leaves 3e-7 as the others
-    # do): a single one may be that.
+    # Four of ten thousand samples of the torque drive leave more than 1e-6, up to 8e-5 (kicked by 1e-9 they leave 3e-7 as the
+    # others do): a single one may be that.
     assert float(found["energy_error"].max()) < 3e-5
     assert float(found["energy_error"].quantile(0.9)) < 5e-6
 
