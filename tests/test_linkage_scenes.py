@@ -208,10 +208,28 @@ def test_every_drive_closes_the_energy(drive):
     assert turns == pytest.approx(4.0 if drive == "two turns" else 2.0, abs=0.1)
     found = evaluate(scene, {"mechanism.joints.o2.clearance": np.linspace(1e-4, 3e-4, 41)})
     assert (found["status"] == 0).all()
-    # Four of ten thousand samples of the torque drive leave more than 1e-6, up to 8e-5 (kicked by 1e-9 they leave 3e-7 as the
-    # others do): a single one may be that.
-    assert float(found["energy_error"].max()) < 3e-5
-    assert float(found["energy_error"].quantile(0.9)) < 5e-6
+    assert (
+        float(found["energy_error"].max()) < 5e-6
+    )  # 2.6e-6 at most of 4001 samples of every drive
+
+
+def test_no_first_step_of_a_contact_is_its_last():
+    """Of 60 001 clearances those of which a contact was passed in one step, as its estimated error happened to be small there.
+
+    They left 5 to 42 millionths of their energy. With each contact's beginning followed, no drive leaves more than 3.
+    """
+    content = {key: value for key, value in ROCKER.items() if key != "study"}
+    mechanism = {**content["mechanism"], "drives": {"motor": DRIVES["torque"]}}
+    scene = load_scene(
+        {**content, "mechanism": mechanism},
+        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=2", "numerics.energy=true"),
+    )  # fmt: skip
+    found = evaluate(
+        scene,
+        {"mechanism.joints.o2.clearance": [0.000151158, 0.000145252, 0.00013234, 0.00015801266666666669]},
+    )  # fmt: skip
+    assert (found["status"] == 0).all()
+    assert float(found["energy_error"].max()) < 1.5e-6
 
 
 def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():

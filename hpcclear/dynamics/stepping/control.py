@@ -16,6 +16,10 @@ _LOG_SHRINK = -2.321928  # a step shrinks to a fifth at most
 _LOG_GROW = 3.321928  # and grows tenfold
 
 
+FIRST_PART = 0.1
+"""Depth at the start of a step over that at its end below which it is a contact's first step."""
+
+
 @njit(forceinline=True, error_model="numpy", fastmath=FASTMATH | {"reassoc"})
 def count_up(count, flag):
     """count + flag, a sum of zeros and ones: exact in any order, so the compiler may reorder it."""
@@ -87,17 +91,19 @@ def coordinate(number):
 
 @lane_function
 def gap_flag(latched, work, p, i, W, tolerance):
-    """1 where joint p's gap needs the scalar code: an impact inside the step, or a change of sign."""
+    """1 where joint p's gap needs the scalar code: an impact inside the step, a change of sign, or a contact's turning point
+    in its first step (see `stops.too_far_in`)."""
     d0 = work[(at.RATE_OLD + at.GAP + p) * W + i]
     d1 = work[(at.RATE_NOW + at.GAP + p) * W + i]
-    flag = 1.0 if d0 * d1 < 0.0 else 0.0
+    sign = 1.0 if d0 * d1 < 0.0 else 0.0
     h = work[at.STEP * W + i]
     m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
     m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
     flight = latched * (1.0 - work[(at.ACTIVE + p) * W + i])
     hit = 1.0 if d1 > -tolerance else 0.0
     bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
-    return max(flag, flight * max(hit, bump))
+    turned = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (FIRST_PART * d1 > d0) else 0.0
+    return max(max(sign, turned), flight * max(hit, bump))
 
 
 @lane_function
