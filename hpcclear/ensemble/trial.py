@@ -42,8 +42,8 @@ EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
 """Of an explicit step, and of an implicit one on average."""
 
 IMPLICIT = 2.5
-"""What an evaluation counts as where a sample took implicit steps, which solve for what they evaluate, eight samples abreast: by
-processor times 3.6 for a film, 2.1 for bristles, 2.4 in the median of 40 variants of random scenes (1 to 10)."""
+"""What an evaluation counts as where a sample took implicit steps, which solve for what they evaluate, eight samples abreast:
+by processor times 3.6 for a film, 2.1 for bristles, 2.4 in the median of 40 variants of random scenes (1 to 10)."""
 
 Simulate = Callable[[Scene, Points], Records]
 
