@@ -43,7 +43,7 @@ EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
 
 IMPLICIT = 2.5
 """What an evaluation counts as where a sample took implicit steps, which solve for what they evaluate, eight samples abreast:
-by processor times 3.6 for a film, 2.1 for bristles, 2.4 in the median of 40 variants of random scenes (1 to 10)."""
+by processor times 3.6 for a film, 2.1 for bristles, 2.2 in the median of 28 variants of random scenes (0.5 to 8)."""
 
 Simulate = Callable[[Scene, Points], Records]
 
