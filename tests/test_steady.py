@@ -1,5 +1,7 @@
 """What revolutions of copies say: periods, limits, spin-up, drift. On series that are known."""
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import ensemble, judging
 from hpcclear.dynamics.steady.copies import scales
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
+from hpcclear.dynamics.steady.look import look
 from hpcclear.dynamics.steady.procedure import loosest
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import load_scene
@@ -48,6 +51,54 @@ def test_an_approach_is_foreseen(ratio: float, revolutions: int):
     off = np.hypot(*seen.gaps[0]) - 1.0
     assert 0.0 < off <= 1.01 * seen.settling
     assert seen.settling <= 10.0 * off  # and is not told far too large
+
+
+APPROACHES = {
+    "swinging": lambda k: 2.0e-4 * 0.8**k * np.cos(0.9 * k + 2.4),
+    "slowing down": lambda k: 1.6e-3 * 0.35**k + 1.6e-4 * 0.87**k,
+    "at rest for a while": lambda k: 4e-5 * np.exp(-k / 6.0) * np.cos(0.5 * k) * np.sin(0.25 * k),
+}
+
+
+def looked_at(f: Callable[[int], float], target: float, tolerance: float, latched: bool) -> Mean:
+    """What a look says of a motion whose f, 1 in the end, is told revolution by revolution; `tolerance` times rtol is added."""
+    asking = look(Effort(a_sample(latched), 10**4), target)
+    stretch = next(asking)
+    for k in itertools.count():
+        outcome = Outcome(np.zeros((len(stretch.start), Outcome.size)))
+        off = tolerance * stretch.rtol / np.sqrt(Parameters(stretch.par).strictness)
+        outcome.mean_gap[:, 0] = 1.0 + f(k) + off
+        try:
+            stretch = asking.send(outcome)
+        except StopIteration as end:
+            return end.value[0]
+
+
+@pytest.mark.parametrize("approach", APPROACHES)
+@pytest.mark.parametrize("target", [1e-2, 1e-3, 1e-4])
+def test_limits_hold_a_mean_that_is_approached_otherwise_than_geometrically(
+    approach: str, target: float
+):
+    found = looked_at(lambda k: 3e-2 * (k == 0) + APPROACHES[approach](k), target, 0.0, False)
+    off = abs(float(objective(found.gaps)) - 1.0)
+    assert found.met
+    assert off < found.limit <= target * float(objective(found.gaps))
+
+
+@pytest.mark.parametrize("times", [0.0, 4.0])
+def test_limits_know_of_tolerances_that_agree_by_chance(times: float):
+    """Errors of a revolution are up to ten tolerances, whatever the difference of two of them."""
+    found = looked_at(lambda k: 3e-2 * (k == 0), 1e-3, times, False)
+    assert found.limit >= 10.0 * found.tightest
+
+
+def test_limits_know_that_a_latched_motion_may_have_other_orbits():
+    still, kept = (looked_at(lambda k: 0.0, target, 0.0, True) for target in (1e-2, 1e-3))
+    assert still.limit == pytest.approx(6e-3, rel=1e-3)
+    assert kept.limit < 1e-4  # at a stricter tolerance orbits are told apart
+    assert looked_at(lambda k: 0.0, 5e-3, 0.0, True).limit == pytest.approx(
+        5e-3
+    )  # not beyond the target
 
 
 def test_copies_that_come_together_are_told_from_those_that_stay_apart():

@@ -41,6 +41,8 @@ class Windows:
     """How far the average may still move if it goes on as it did."""
     moved: float
     """How far it moved over the latest quarter of the revolutions."""
+    restless: float
+    """How far it moved over that or over the quarter before, the larger of the two."""
     apart: float
     """How far the copies' averages are apart, over the latest quarter."""
     joining: bool
@@ -73,6 +75,7 @@ def windows(gaps: Array, tolerance: float) -> Windows:
         late,
         settling,
         float(steps[2]),
+        float(steps[1:].max()),
         float(apart),
         bool(apart < 0.3 * before),
     )

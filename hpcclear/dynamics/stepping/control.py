@@ -4,6 +4,8 @@ Proportional-integral control after Gustafsson 1991 (doi:10.1145/210232.210242) 
 and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair at hand.
 """
 
+import math
+
 from numba import njit
 
 from hpcclear.base.bits import rough_exp2, rough_log2
@@ -11,10 +13,12 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
-_LOG_SAFETY = -0.152003  # log2(0.9)
-_LOG_SHRINK = -2.321928  # a step shrinks to a fifth at most
-_LOG_GROW = 3.321928  # and grows tenfold
+SHRINK = 0.2
+"""What a rejected step shrinks to at most."""
 
+_LOG_SAFETY = -0.152003  # log2(0.9)
+_LOG_SHRINK = math.log2(SHRINK)
+_LOG_GROW = 3.321928  # and grows tenfold
 
 FIRST_PART = 0.1
 """Depth at the start of a step over that at its end below which it is a contact's first step."""
@@ -102,7 +106,7 @@ def gap_flag(latched, work, p, i, W, tolerance):
     flight = latched * (1.0 - work[(at.ACTIVE + p) * W + i])
     hit = 1.0 if d1 > -tolerance else 0.0
     bump = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (min(d0 + m0, d1 - m1) > 0.0) else 0.0
-    turned = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (FIRST_PART * d1 > d0) else 0.0
+    turned = 1.0 if (m0 > 0.0) & (m1 < 0.0) & (d1 > 0.0) & (FIRST_PART * d1 > d0) else 0.0
     return max(max(sign, turned), flight * max(hit, bump))
 
 

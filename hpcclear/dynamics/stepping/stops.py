@@ -3,7 +3,7 @@
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.control import FIRST_PART
+from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 from hpcclear.dynamics.stepping.events import (
     KINK_REACH,
     absolute_integral,
@@ -22,9 +22,6 @@ from hpcclear.dynamics.stepping.settings import (
 
 OK = int(Status.OK)
 STALLED = int(Status.STALLED)
-
-SHORTER = 0.2
-"""Part of a step that is tried where it went too far into a contact: what a rejected one shrinks to at most."""
 
 LONG_AT_REST = 1e3
 """Periods after which a body that starts from rest and does not turn has stalled."""
@@ -142,7 +139,7 @@ def stop_at_kinks(rules, lane, W, work, settings):
         for p in range(rules.begin, rules.end):
             fraction = min(fraction, before_kink(lane, W, work, settings, p))
             if too_far_in(lane, W, work, p):
-                fraction = min(fraction, SHORTER)
+                fraction = min(fraction, SHRINK)
         if fraction < 1.0:
             work[at.ACCEPT * W + lane] = 0.0
             work[at.NEXT_STEP * W + lane] = fraction * work[at.STEP * W + lane]
