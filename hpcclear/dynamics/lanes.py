@@ -120,7 +120,7 @@ class Lanes:
         apart += [OBSERVING] if self.record is not None else []
         beside = f"{IMPLICIT}:{blocks_of(n)}" if problem.single else ABREAST
         with compiled_beside([beside] if stiff else apart):  # either is half of it
-            explicit = explicit_code(self.width, stiff).address if blocks else 0
+            explicit = explicit_code(self.width).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
             if stiff:  # implicit steps take as long as all of this together
                 special_code()

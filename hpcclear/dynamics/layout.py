@@ -294,9 +294,12 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
     STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
     STIFF_STEPS,  # implicit steps tried for this sample
     CALM,  # implicit steps in a row that the explicit method could have taken
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 24)
+    STRICTER,  # squared: how many times tighter than the run's the tolerances of this lane's explicit steps are
+    STRICTER_WITHIN,  # that within the range of stability
+    STRICTER_AT_EDGE,  # and at the edge of it
+) = range(INTEGRAL + RATES, INTEGRAL + RATES + 27)
 MAX_CURVES = 8
-CURVES = CALM + 1  # values of tabulated curves at the stage
+CURVES = STRICTER_AT_EDGE + 1  # values of tabulated curves at the stage
 TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
 # of each joint
 ACTIVE = CURVES + MAX_CURVES  # contact latched (1) or flight (0)

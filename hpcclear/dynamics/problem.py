@@ -24,6 +24,7 @@ from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
 from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
+from hpcclear.dynamics.stepping.settings import STRICT
 from hpcclear.dynamics.views import Outcome, Parameters, Settings
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import speed_entry
@@ -134,6 +135,9 @@ class Problem:
         s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
+        e = self.effects
+        rubs = any(one is not None for one in (e.coulomb, e.ambrosio, e.guide))
+        s.senses = 1.0 if self.implicit != "never" or (rubs and self.rtol > STRICT) else 0.0
         s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
         s.at_rest = THROWN_BACK if self.from_rest else 0.0
         last = at.waves_of(self.effects)[-1:]

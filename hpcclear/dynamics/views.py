@@ -179,6 +179,7 @@ class Settings(View):
     cycle = Column(settings.CYCLE)  # rad
     parameter_rows = Column(settings.PARAMETER_ROWS)
     profiled = Column(settings.PROFILED)
+    senses = Column(settings.SENSES)
     at_rest = Column(settings.AT_REST)  # rad
     chosen = _of_joints(settings.CHOSEN)
     atol = Column(slice(settings.ATOL, settings.SETTINGS))  # all places

@@ -114,7 +114,7 @@ def step_error(effects, step, W):
             work[at.ERROR * W + i] += gap_error(step, p, i, W)
     coordinate_errors(step, W)
     for i in range(W):
-        work[at.ERROR * W + i] *= (0.5 / n) * step.par[at.STRICTNESS * W + i]
+        work[at.ERROR * W + i] *= (0.5 / n) * work[at.STRICTER * W + i]
 
 
 @lane_function

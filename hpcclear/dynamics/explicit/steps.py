@@ -21,6 +21,7 @@ from hpcclear.dynamics.stepping.settings import (
     MOTION,
     NUMBERS,
     RTOL,
+    SENSES,
     SETTINGS,
     WIDTH,
     rules_in,
@@ -115,7 +116,7 @@ def any_fresh(work, W):
 
 
 @lane_function
-def take_explicit_steps(effects, motion, step, tables, stiff, W):
+def take_explicit_steps(effects, motion, step, tables, senses, W):
     """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
     work, weights = step.work, step.weights
     for s in range(0 if any_fresh(work, W) else 1, tab.STAGES):
@@ -130,14 +131,15 @@ def take_explicit_steps(effects, motion, step, tables, stiff, W):
         else:
             weigh_stage(effects, step, s, W)
     step_error(effects, step, W)
-    sense_stiffness(stiff, step, W)
+    if senses != 0.0:
+        sense_stiffness(step, W)
     for i in range(W):
         evaluations = (tab.STAGES - 1.0) * (1.0 - work[at.STIFF * W + i])
         work[at.EVALUATIONS * W + i] += evaluations
 
 
 @lane_function
-def explicit_steps(stiff, W, numbers, lanes, settings, weights, tables, measures):
+def explicit_steps(W, numbers, lanes, settings, weights, tables, measures):
     """`take_explicit_steps` for arrays at addresses."""
     of = carray(numbers, NUMBERS)
     work = carray(lanes, (at.STAGES + tab.STAGES * at.MAX_COORDINATES) * W)
@@ -153,7 +155,7 @@ def explicit_steps(stiff, W, numbers, lanes, settings, weights, tables, measures
         of[WIDTH] & 127,
     )
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    take_explicit_steps(effects, of[MOTION], step, carray(tables, at.TABLES), stiff, W)
+    take_explicit_steps(effects, of[MOTION], step, carray(tables, at.TABLES), entries[SENSES], W)
 
 
 _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
@@ -161,7 +163,7 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 4, _COUNTS)
 
 
 @cache
-def explicit_code(W: int, stiff: bool) -> Any:
-    """The compiled steps of W lanes, which look out for stiffness if `stiff`; their ``address`` is what steppers take."""
-    text = one_text(explicit_steps, f"explicit_{W}", W=W, stiff=1 if stiff else None)
+def explicit_code(W: int) -> Any:
+    """The compiled steps of W lanes; their ``address`` is what steppers take."""
+    text = one_text(explicit_steps, f"explicit_{W}", W=W)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)

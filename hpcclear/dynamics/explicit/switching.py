@@ -14,6 +14,7 @@ CALM_STEPS = 6.0  # so many in a row send a lane back
 EDGE = 1.0  # h lambda above which an explicit step counts as held up by stiffness
 CHATTER = 4.0  # or that times the change over the step between its last two stages: as good a sign
 EDGE_LIMIT = 40.0  # such a score sends a lane to the implicit method
+EDGE_STRICT = 3.0  # such a score makes its tolerance stricter until it is 0 again
 REJECTION_LIMIT = 5.0  # or this one: friction that chatters shows little else
 REJECTION_MEMORY = 0.9
 
@@ -62,21 +63,27 @@ def edge_excess(step, k, i, W):
 
 
 @lane_function
-def sense_stiffness(stiff, step, W):
+def sense_stiffness(step, W):
     """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
-    decaying count of rejections."""
-    if stiff is not None:
-        work = step.work
+    decaying count of rejections. What stays at the edge gets the stricter tolerance, which costs nothing there."""
+    work = step.work
+    for i in range(W):
+        work[at.EDGE_EXCESS * W + i] = -1e-300
+    for number in range(step.n):
+        k = coordinate(number)
         for i in range(W):
-            work[at.EDGE_EXCESS * W + i] = -1e-300
-        for number in range(step.n):
-            k = coordinate(number)
-            for i in range(W):
-                work[at.EDGE_EXCESS * W + i] += edge_excess(step, k, i, W)
-        for i in range(W):
-            at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
-            score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5
-            work[at.EDGE_SCORE * W + i] = max(score, 0.0)
-            rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
-            score = REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
-            work[at.REJECTION_SCORE * W + i] = score
+            work[at.EDGE_EXCESS * W + i] += edge_excess(step, k, i, W)
+    for i in range(W):
+        at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
+        score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5
+        score = min(max(score, 0.0), EDGE_LIMIT)
+        work[at.EDGE_SCORE * W + i] = score
+        rejected = 1.0 if work[at.ERROR * W + i] > 1.0 else 0.0
+        count = REJECTION_MEMORY * work[at.REJECTION_SCORE * W + i] + rejected
+        work[at.REJECTION_SCORE * W + i] = count
+        usual = work[at.STRICTER_WITHIN * W + i]
+        before = work[at.STRICTER * W + i]
+        new = work[at.STRICTER_AT_EDGE * W + i] if score >= EDGE_STRICT else before
+        new = usual if score == 0.0 else new
+        # of lanes that implicit steps move, stages mean nothing
+        work[at.STRICTER * W + i] = before if work[at.STIFF * W + i] == 1.0 else new

@@ -218,7 +218,7 @@ def propose(lane, W, work, m, i, iterations):
             proposal = max(proposal, work[at.NEXT_STEP * W + lane])
         if m[mem.RATE + i] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
             proposal = h
-        calm = h * m[mem.NORM + i] < CALM_STIFFNESS and proposal <= KEPT_TO * h
+        calm = h * m[mem.NORM + i] < CALM_STIFFNESS and proposal < 2.0 * h
         work[at.CALM * W + lane] = work[at.CALM * W + lane] + 1.0 if calm else 0.0
     work[at.NEXT_STEP * W + lane] = proposal
 

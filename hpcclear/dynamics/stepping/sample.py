@@ -10,13 +10,16 @@ from hpcclear.dynamics.stepping.settings import (
     AVERAGED_CAP,
     CHOSEN,
     FINISHED,
+    IMPLICIT,
     MAX_STEPS,
     NEXT_SLOT,
     OBJECTIVE_TOLERANCE,
     PARAMETER_ROWS,
     PROFILED,
+    RTOL,
     SLOTS,
     SMALLEST_STEP,
+    STRICT,
     TRANSIENT,
 )
 
@@ -34,6 +37,39 @@ SQUARE = at.place(at.FOLLOWED_SQUARE)
 ACROSS = at.place(at.FOLLOWED_ACROSS)
 
 
+OF_INERTIA, OF_RAMP = 0.02, 0.5
+"""Error of an explicit step, of a velocity, at most: of a film's force over the forces of inertia; and, at the edge of
+stability, over friction's ramp."""
+
+
+@lane_event
+def make_stricter(lane, W, work, par, settings):
+    """How many times tighter than the run's the tolerances of this sample's explicit steps are, squared.
+
+    At the edge of stability steps are as short as a film or friction's ramp wants them, whatever the tolerance, and errors grow
+    until they meet it. Beyond the ramp the direction of friction is chance: at rtol 1e-3 forces and accelerations were off
+    by 10 to 1000 %, for as many evaluations. Where lanes may take implicit steps they do so at the edge, but a film's forces
+    are peaks by then. No tolerance gets below `STRICT`.
+    """
+    film = 0.0
+    ramp = par[at.GUIDE_INVERSE_RAMP * W + lane]  # of 1 m/s where no guide has friction
+    for k in range(JOINTS):
+        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        film = max(film, par[(block + at.FILM_STEEPNESS) * W + lane])
+        if par[(block + at.FRICTION) * W + lane] > 0.0:
+            ramp = max(ramp, par[(block + at.INVERSE_RAMP) * W + lane])
+    if settings[IMPLICIT] > 0.0:
+        ramp = 0.0
+    rtol = settings[RTOL]
+    speed = 1.0 + par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]
+    by_film = rtol * min(speed * film / OF_INERTIA, 1.0 / STRICT)
+    by_ramp = rtol * min(speed * ramp / OF_RAMP, 1.0 / STRICT)
+    within = max(par[at.STRICTNESS * W + lane], by_film * by_film)
+    work[at.STRICTER * W + lane] = within
+    work[at.STRICTER_WITHIN * W + lane] = within
+    work[at.STRICTER_AT_EDGE * W + lane] = max(within, by_ramp * by_ramp)
+
+
 @lane_event
 def load(lane, W, n, block, queue, settings):
     """Give a lane the next sample of the queue, or let it rest."""
@@ -45,11 +81,14 @@ def load(lane, W, n, block, queue, settings):
         work[k * W + lane] = 0.0
     for k in range(at.BOOK):
         book[k * W + lane] = 0.0
+    for k in range(at.STRICTER, at.STRICTER_AT_EDGE + 1):
+        work[k * W + lane] = 1.0
     if slot >= queue.counters[SLOTS]:
         return  # the step stays 0: a resting lane repeats its last state
     queue.counters[NEXT_SLOT] = slot + 1
     for k in range(int(settings[PARAMETER_ROWS])):
         block.par[k * W + lane] = queue.par[slot, k]
+    make_stricter(lane, W, work, block.par, settings)
     for k in range(n):
         work[(at.Q + k) * W + lane] = queue.start[slot, k]
         work[(at.V + k) * W + lane] = queue.start[slot, at.MAX_COORDINATES + k]

@@ -24,10 +24,14 @@ from hpcclear.dynamics import layout as at
     PARAMETER_ROWS,  # how many parameters a sample has
     PROFILED,  # how many rates of profiles of wear there are to integrate
     AT_REST,  # rad, within which a crank that starts from rest may turn back
+    SENSES,  # 1 where explicit steps look out for the edge of stability
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
-) = range(18)
+) = range(19)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
+
+STRICT = 1e-6
+"""Relative tolerance of explicit steps that is never made stricter at the edge of stability."""
 
 # ---- counters shared by all lanes
 (NEXT_SLOT, SLOTS, FINISHED, RECORDED) = range(4)
