@@ -106,25 +106,31 @@ def test_a_film_is_as_good_and_no_dearer_at_a_loose_tolerance(rtol: float):
     assert loose["rhs_evaluations"].mean() < 1.1 * usual["rhs_evaluations"].mean()
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
-def test_forces_under_friction_that_sticks_stand_at_a_loose_tolerance(rtol: float):
-    """At the edge of stability errors grew to the tolerance, wider than the ramp: peaks were 2 and 23 % off.
+AT_EDGE = {
+    "friction that sticks": {
+        "effects.friction": {"law": "coulomb", "coefficient": 0.02, "ramp_speed": 4e-4}
+    },
+    "contact that stays": {"effects.friction": {"law": "none"}, "effects.contact.damping": 5.0},
+}
 
-    It costs nothing: there steps are as short as the ramp wants them, whatever the tolerance.
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+@pytest.mark.parametrize("name", AT_EDGE)
+def test_forces_stand_at_a_loose_tolerance(name: str, rtol: float):
+    """At the edge of stability errors grew to the tolerance: peaks were 2 to 60 % off, the moment up to three times too high.
+
+    Better ones cost nothing: there steps are as short as ramp and contact want them, whatever the tolerance.
     """
-    changes = {
-        "effects.friction": {"law": "coulomb", "coefficient": 0.02, "ramp_speed": 4e-4},
-        "drive.speed": "1500 rpm",
-        "numerics.responses": True,
-        "numerics.transient_revolutions": 1,
-    }
+    changes = AT_EDGE[name] | {
+        "drive.speed": "1500 rpm", "numerics.responses": True, "numerics.transient_revolutions": 1,
+    }  # fmt: skip
     play = np.linspace(4e-6, 6e-6, 8)
     exact, loose = (ensemble("hunt_crossley", changes, one, play) for one in (1e-7, rtol))
     assert largest(loose) == pytest.approx(largest(exact), rel=5e-3)
-    assert loose["slider_acceleration_deviation"].to_numpy() == pytest.approx(
-        exact["slider_acceleration_deviation"].to_numpy(), rel=2e-3
-    )
-    assert loose["objective"].to_numpy() == pytest.approx(exact["objective"].to_numpy(), rel=3e-4)
+    bounds = {"slider_acceleration_deviation": 2e-3, "peak_crank_moment": 2e-2, "objective": 1e-3}
+    for response, bound in bounds.items():
+        values = loose[response].to_numpy()
+        assert values == pytest.approx(exact[response].to_numpy(), rel=bound), response
     assert loose["rhs_evaluations"].mean() < 0.5 * exact["rhs_evaluations"].mean()
 
 

@@ -136,9 +136,10 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
-) = range(28)
+    EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
+) = range(29)
 JOINT_ROWS = 14
-JOINT_BLOCKS = 28  # of all joints, one behind the other
+JOINT_BLOCKS = 29  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,

@@ -24,6 +24,9 @@ SAME_LENGTH = 0.01
 RAMP = 0.1
 """Of a threshold of wear, relative: beyond it by so much, all of the force wears."""
 
+OF_RAMP, OF_FORCE = 0.5, 0.003
+"""Of friction's ramp, and of the forces of inertia: what errors of explicit steps at the edge of stability may come to."""
+
 
 class Numbers:
     """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
@@ -58,6 +61,7 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
+    p[:, at.EDGE] = _needed_at_edge(scene, get, p)
     p = _with_waves(scene, get, p) if _has_further(scene) else p
     return _with_finite_films(scene, get, p) if finite_rows(scene) else p
 
@@ -183,6 +187,30 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
     inertia = sum(get(path) for path in masses) * p[:, at.CRANK_LENGTH] * p[:, at.SPEED] ** 2
     own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SHORT : at.FILM_SHEAR].sum(axis=1) / inertia
+
+
+def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
+    """One over the relative tolerance of velocities, shape (samples,), with which explicit steps at the edge of stability keep
+    friction and contact forces.
+
+    There errors grow until they meet the tolerance. Half of friction's ramp at most: beyond it the direction of friction is
+    chance. And what swings in a contact under the forces of inertia, at the frequency w of small motions in Hertz' force, w^2 =
+    1.5 K^(2/3) F^(1/3) / m, may add `OF_FORCE` of these.
+    """
+    turning = np.abs(p[:, at.SPEED])
+    pin = turning * p[:, at.CRANK_LENGTH]
+    mass = sum(get(path) for path in scene.numeric_paths() if path.endswith(".mass"))
+    force = np.maximum(mass * pin * turning, 1e-300)
+    needed = np.ones(len(p))
+    if scene.effects.guide_friction is not None:
+        needed = p[:, at.GUIDE_INVERSE_RAMP] / OF_RAMP
+    for joint in scene.clearance_joints():
+        own = p[:, at.JOINT_BLOCKS + _place(scene, joint) * at.JOINT_ROWS :]
+        if scene.effects.friction.law != "none":
+            needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
+        swing = np.sqrt(1.5 * own[:, at.CONTACT_STIFFNESS] ** (2 / 3) * force ** (1 / 3) / mass)
+        needed = np.maximum(needed, mass * swing / (OF_FORCE * force))
+    return (1.0 + pin) * needed
 
 
 def _own_rows(scene: Scene) -> int:

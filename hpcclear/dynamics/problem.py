@@ -135,9 +135,7 @@ class Problem:
         s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s.beta = 0.04
         s.implicit = IMPLICIT_USE[self.implicit]
-        e = self.effects
-        rubs = any(one is not None for one in (e.coulomb, e.ambrosio, e.guide))
-        s.senses = 1.0 if self.implicit != "never" or (rubs and self.rtol > STRICT) else 0.0
+        s.senses = 1.0 if self.implicit != "never" or self.rtol > STRICT else 0.0
         s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
         s.at_rest = THROWN_BACK if self.from_rest else 0.0
         last = at.waves_of(self.effects)[-1:]

@@ -37,37 +37,29 @@ SQUARE = at.place(at.FOLLOWED_SQUARE)
 ACROSS = at.place(at.FOLLOWED_ACROSS)
 
 
-OF_INERTIA, OF_RAMP = 0.02, 0.5
-"""Error of an explicit step, of a velocity, at most: of a film's force over the forces of inertia; and, at the edge of
-stability, over friction's ramp."""
+OF_INERTIA = 0.02
+"""Error of a film's force in an explicit step at most, over the forces of inertia: implicit steps take over at the edge of
+stability, but what a loose tolerance makes of forces by then are peaks."""
 
 
 @lane_event
 def make_stricter(lane, W, work, par, settings):
-    """How many times tighter than the run's the tolerances of this sample's explicit steps are, squared.
-
-    At the edge of stability steps are as short as a film or friction's ramp wants them, whatever the tolerance, and errors grow
-    until they meet it. Beyond the ramp the direction of friction is chance: at rtol 1e-3 forces and accelerations were off
-    by 10 to 1000 %, for as many evaluations. Where lanes may take implicit steps they do so at the edge, but a film's forces
-    are peaks by then. No tolerance gets below `STRICT`.
-    """
+    """How many times tighter than the run's the tolerances of this sample's explicit steps are, squared: within the range of
+    stability, and at its edge, where no implicit steps take over. None gets below `STRICT`."""
     film = 0.0
-    ramp = par[at.GUIDE_INVERSE_RAMP * W + lane]  # of 1 m/s where no guide has friction
     for k in range(JOINTS):
-        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        film = max(film, par[(block + at.FILM_STEEPNESS) * W + lane])
-        if par[(block + at.FRICTION) * W + lane] > 0.0:
-            ramp = max(ramp, par[(block + at.INVERSE_RAMP) * W + lane])
-    if settings[IMPLICIT] > 0.0:
-        ramp = 0.0
+        row = at.JOINT_BLOCKS + k * at.JOINT_ROWS + at.FILM_STEEPNESS
+        film = max(film, par[row * W + lane])
     rtol = settings[RTOL]
     speed = 1.0 + par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]
     by_film = rtol * min(speed * film / OF_INERTIA, 1.0 / STRICT)
-    by_ramp = rtol * min(speed * ramp / OF_RAMP, 1.0 / STRICT)
     within = max(par[at.STRICTNESS * W + lane], by_film * by_film)
+    edge = 0.0
+    if settings[IMPLICIT] == 0.0:
+        edge = rtol * min(par[at.EDGE * W + lane], 1.0 / STRICT)
     work[at.STRICTER * W + lane] = within
     work[at.STRICTER_WITHIN * W + lane] = within
-    work[at.STRICTER_AT_EDGE * W + lane] = max(within, by_ramp * by_ramp)
+    work[at.STRICTER_AT_EDGE * W + lane] = max(within, edge * edge)
 
 
 @lane_event
