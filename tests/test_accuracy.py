@@ -104,7 +104,9 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
     best = found.error[0, :, :]  # dormand-prince
     assert (best[0] > best[2]).all()
     position = QUANTITIES.index("slider_position")
-    assert best[1, position] < 1e-2 * best[0, position] < 1e-3
+    # Not by (1e-5 / 1e-3): at the loosest tolerance most steps are at the edge of stability, and held stricter there.
+    assert best[1, position] < 0.1 * best[0, position] < 1e-4
+    assert best[2, position] < 1e-2 * best[1, position]
     pairs = [k for k, name in enumerate(found.methods) if name != "lobatto"]  # may be better still
     floor = integration.MARGIN * found.reference_error[position]
     assert (found.error[pairs, :, position] >= floor).all()

@@ -147,12 +147,14 @@ def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_F
     if not settled and revolutions >= 4 * CHECKPOINTS[-1] and _drifts(history, level):
         return _unsteady(history)
     limit = settling + kick + 0.5 * tolerance  # of the stricter copies, an order better
-    met = bool(settled and limit <= level)
+    outcomes = history.window(seen.length)
+    mean = float(objective(outcomes.mean_gap.mean(axis=(0, 1))))  # as it is told with the limits
+    met = bool(settled and limit <= target * mean)
     orbits = ORBITS if sample.latched and target >= COARSE else 0.0
-    unseen = _unseen(seen, float(f.mean()), max(TOLERANCES * rtol / given.STRICTER, orbits))
-    told = max(limit, min(float(np.hypot(limit, unseen)), level if met else np.inf))
+    unseen = _unseen(seen, mean, max(TOLERANCES * rtol / given.STRICTER, orbits))
+    told = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
     return _Found(
-        Regime.REGULAR if settled else Regime.SETTLING, told, history.window(seen.length),
+        Regime.REGULAR if settled else Regime.SETTLING, told, outcomes,
         met=met, final=settled, period=seen.period if settled else None,
     )  # fmt: skip
 
