@@ -9,6 +9,7 @@ import urllib.request
 from pathlib import Path
 from typing import Any
 
+import pytest
 from patience import crowded
 
 _ARGUMENTS = (
@@ -40,6 +41,13 @@ def _program(*names: str) -> str:
     raise RuntimeError(
         f"{wanted} is not installed; on Debian: apt-get install chromium chromium-driver"
     )
+
+
+needed = pytest.mark.skipif(
+    shutil.which("chromedriver") is None,
+    reason="no Chromium here; on Debian: apt-get install chromium chromium-driver",
+)
+"""For a test of the short profile, which asks for nothing but Python; the full profile's fail without a browser."""
 
 
 class Browser:

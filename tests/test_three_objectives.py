@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from browser import Browser
+from browser import Browser, needed
 from commands import MPIEXEC, warm
 from patience import crowded
 
@@ -309,6 +309,7 @@ return select.map((one) => [...one.options].map((option) => option.textContent))
 """
 
 
+@needed
 def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
     shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
     page = write_report(tmp_path / "page")

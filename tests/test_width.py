@@ -7,10 +7,13 @@ import sys
 from pathlib import Path
 
 import llvmlite.binding as llvm
+import numpy as np
 import pytest
+from numba import config, njit
 
 from hpcclear.base import width
 from hpcclear.base.errors import InputError
+from hpcclear.base.jit import narrow_vectors
 
 WIDE = llvm.get_host_cpu_features().get("avx512f", False)
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -95,7 +98,7 @@ def test_another_width_is_refused(monkeypatch, tmp_path, named):
 @wide
 @pytest.mark.full
 def test_no_result_depends_on_it(tmp_path):
-    """An ensemble in lanes, and a response by collocation, compiled for each."""
+    """An ensemble in lanes, responses by collocation and by a pair, compiled for each."""
     files = {}
     for bits in map(str, width.WIDTHS):
         settings = {**os.environ, "HPCCLEAR_VECTOR_BITS": bits}
@@ -104,13 +107,34 @@ def test_no_result_depends_on_it(tmp_path):
             ["sample", "jobs/quickstart.toml", "--set", "study.samples=64", "-o", out / "samples.nc"],
             ["simulate", "jobs/slider_crank.toml", "-o", out / "response.nc",
              "--set", "effects.friction=none", "--set", "numerics.method=lobatto"],
+            ["simulate", "jobs/slider_crank.toml", "-o", out / "steps.nc", "--set", "numerics.method=tsitouras"],
         ):  # fmt: skip
             out.mkdir(exist_ok=True)
             command = [sys.executable, "-m", "hpcclear", *map(str, words)]
             subprocess.run(command, env=settings, cwd=SCENE.parents[1], check=True, timeout=600)
         files[bits] = [path.read_bytes() for path in sorted(out.glob("[rs]*.nc"))]
-        assert len(files[bits]) == 2
+        assert len(files[bits]) == 3
     assert files["256"] == files["512"]
+
+
+@wide
+def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
+    """With 512 bits preferred, four coordinates went one by one."""
+
+    def doubled(narrow):
+        def double(x):
+            if narrow:
+                narrow_vectors()
+            for k in range(len(x)):
+                x[k] *= 2.0
+
+        compiled = njit(double)
+        compiled(np.ones(4))
+        return compiled.inspect_asm(compiled.signatures[0])
+
+    assert "zmm" not in doubled(True)
+    if "-prefer-256-bit" in config.CPU_FEATURES:
+        assert "zmm" in doubled(False)
 
 
 def test_a_trial_that_llvm_refuses_decides_nothing(monkeypatch):

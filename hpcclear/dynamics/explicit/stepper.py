@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from hpcclear.base.bits import call_at
-from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.switching import settle_methods
@@ -72,6 +72,8 @@ def ask_explicit(address, block, method):
 @lane_function
 def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
     """Take at most `budget` block steps. Returns whether lanes are running."""
+    if W == 1:
+        narrow_vectors()
     block, queue, method = borrowed_all(block, queue, method, W)
     settings, numbers, work = method.settings, method.numbers, block.work
     running = load_lanes(codes.special, numbers, block, queue, settings, W)

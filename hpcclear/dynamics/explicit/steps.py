@@ -6,7 +6,7 @@ from typing import Any
 from numba import carray, cfunc, types
 
 from hpcclear.base.bits import beyond
-from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
@@ -141,6 +141,8 @@ def take_explicit_steps(effects, motion, step, tables, senses, W):
 @lane_function
 def explicit_steps(W, numbers, lanes, settings, weights, tables, measures):
     """`take_explicit_steps` for arrays at addresses."""
+    if W == 1:
+        narrow_vectors()
     of = carray(numbers, NUMBERS)
     work = carray(lanes, (at.STAGES + tab.STAGES * at.MAX_COORDINATES) * W)
     entries = carray(settings, SETTINGS)
