@@ -18,6 +18,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import hpcclear.base.jit  # before numbalsoda, which compiles as it is imported: then vectors' width is decided  # noqa: F401
+
+# isort: split
 import numpy as np
 import xarray as xr
 from drawing import error_panels
