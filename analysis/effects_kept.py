@@ -24,6 +24,7 @@ command goes on from there.
 import argparse
 import json
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -270,6 +271,29 @@ def summary(rows: list[dict]) -> None:
             print(f"  {name}: {len(own)}, median {np.median(own):.2f} times faster")
 
 
+def going_on(
+    output: Path, numbers: range, judge: Callable[[int], dict], told: Sequence[str]
+) -> list[dict]:
+    """A row of each scene, from a file with a line of JSON each or judged now and added to it; what is `told` is printed."""
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.touch()
+    rows = [json.loads(line) for line in output.read_text().splitlines()]
+    done = {row["number"] for row in rows}
+    for number in numbers:
+        if number in done:
+            continue
+        try:
+            row = judge(number)
+        except InputError as error:
+            print(f"scene {number}: {error}", flush=True)
+            continue
+        rows.append(row)
+        with output.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        print(*(row[name] for name in told if name in row), flush=True)
+    return rows
+
+
 def main() -> None:
     """Judge the scenes that are not done yet, then sum up."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -283,28 +307,12 @@ def main() -> None:
         "-o", "--output", type=Path, default=JOB.parent.parent / "results" / "effects_kept.jsonl"
     )
     options = parser.parse_args()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    rows = (
-        [json.loads(line) for line in options.output.read_text().splitlines()]
-        if options.output.exists()
-        else []
+    rows = going_on(
+        options.output,
+        range(options.first, options.first + options.scenes),
+        lambda number: judged(number, options.replicates, options.linkages),
+        ("number", "objective", "tolerance", "off", "times", "mean", "deviation"),
     )
-    done = {row["number"] for row in rows}
-    for number in range(options.first, options.first + options.scenes):
-        if number in done:
-            continue
-        try:
-            row = judged(number, options.replicates, options.linkages)
-        except InputError as error:
-            print(f"scene {number}: {error}", flush=True)
-            continue
-        rows.append(row)
-        with options.output.open("a") as file:
-            file.write(json.dumps(row) + "\n")
-        print(
-            number, row["objective"], f"{row['tolerance']:.0%}", row["off"], f"{row['times']:.2f} times",
-            row.get("mean"), row.get("deviation"), flush=True,
-        )  # fmt: skip
     summary(rows)
 
 

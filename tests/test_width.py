@@ -1,6 +1,7 @@
 """Vectors of 256 or 512 bits: what the trial computes, what is kept of it, and that no result depends on it."""
 
 import ctypes
+import inspect
 import os
 import subprocess
 import sys
@@ -14,6 +15,8 @@ from numba import config, njit
 from hpcclear.base import width
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import narrow_vectors
+from hpcclear.base.one_text import one_text
+from hpcclear.dynamics.explicit.steps import explicit_steps
 
 WIDE = llvm.get_host_cpu_features().get("avx512f", False)
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
@@ -133,8 +136,14 @@ def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
         return compiled.inspect_asm(compiled.signatures[0])
 
     assert "zmm" not in doubled(True)
-    if "-prefer-256-bit" in config.CPU_FEATURES:
+    if "-prefer-256-bit" in (config.CPU_FEATURES or ""):
         assert "zmm" in doubled(False)
+
+
+@pytest.mark.parametrize("lanes", [1, 16])
+def test_single_responses_ask_for_such_vectors_and_ensembles_do_not(lanes):
+    text = inspect.getsource(one_text(explicit_steps, f"explicit_{lanes}", W=lanes))
+    assert ("narrow_vectors()" in text) == (lanes == 1)
 
 
 def test_a_trial_that_llvm_refuses_decides_nothing(monkeypatch):

@@ -136,9 +136,8 @@ def narrow_vectors(typingctx):
     """
 
     def codegen(context, builder, signature, args):
-        set.add(
-            builder.function.attributes, '"prefer-vector-width"="256"'
-        )  # llvmlite lets only known ones pass
+        # llvmlite's own `add` lets only those pass that it knows
+        set.add(builder.function.attributes, '"prefer-vector-width"="256"')
         return context.get_dummy_value()
 
     return types.none(), codegen
