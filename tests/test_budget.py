@@ -116,6 +116,19 @@ def test_failed_simulations_are_left_out_in_pairs():
     np.testing.assert_allclose(of(values).bias, [[0.04, 0.04]], rtol=0.05)
 
 
+def test_a_tolerance_that_was_not_looked_at_is_not_known_and_its_price_is_that_of_the_others():
+    values = pilot_values((0.02, -0.003, 0.001), length=64)
+    values[[1, 3]] = np.nan
+    found = of(values, [1.0, np.nan, 4.0, np.nan])
+    np.testing.assert_allclose(found.bias[0], (0.02 - 0.001) / 0.75, rtol=0.05)
+    assert np.isnan(found.bias[1:]).all()
+    np.testing.assert_allclose(found.evaluations, [1.0, 2.0, 4.0, 8.0])
+    split = cheapest(found, np.array([0.2, 0.2]), lambda points: points, (64, 2**20))
+    assert split is not None
+    assert split.rung == 0
+    assert cheapest(found, np.array([0.01, 0.01]), lambda points: points, (64, 2**20)) is None
+
+
 def test_values_without_scatter_need_no_simulations():
     found = of(np.full((2, 3, 16, 4), 2.0))
     assert found.points_for(np.array([0.01, 0.01]), 128, 4096) == 128
@@ -243,6 +256,17 @@ def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
     )
     assert made.returncode == 0, made.stderr
     assert contents(tmp_path / "out") == contents(done[0])
+
+
+def test_a_pilot_whose_loosest_tolerance_is_surely_good_enough_looks_at_few(tmp_path, monkeypatch):
+    monkeypatch.setattr(formula, "BIAS", 0.01 * BIAS)  # 0.015 % at 1e-3
+    run_study(scene_of(), tmp_path / "out", alone(), progress_style="quiet")
+    found = dataset.read(tmp_path / "out" / "budget.nc")
+    assert found["rtol"][found["chosen"] == 1].to_numpy() == pytest.approx([1e-3])
+    assert np.isfinite(found["bias"][0]).all()
+    assert np.isnan(found["bias"][1:]).all()
+    assert np.isfinite(found["evaluations"]).all()
+    assert found.attrs["sure"] == "yes"
 
 
 def test_an_accuracy_below_all_tolerances_is_not_promised(tmp_path, monkeypatch):

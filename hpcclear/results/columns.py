@@ -194,13 +194,13 @@ VERIFICATION: Columns = {
 }
 
 BUDGET: Columns = {
-    "rung": count(("rung",), "rung of the ladder of tolerances; the last is what the others are measured against"),
+    "rung": count(("rung",), "rung of tolerances; the last looked at is what the others are measured against"),
     "design": text(("design",), "design of the pilot"),
     "moment": text(("moment",), "what the error is of"),
     "rtol": number(("rung",), "1", "relative tolerance of a step", required=True),
     "evaluations": number(("rung",), "1", "evaluations of the equations of motion, a simulation", required=True),
     "bias": number(("rung", "moment"), "1",
-        "relative error that the tolerance makes, root mean square over designs", required=True),
+        "relative error that the tolerance makes, root mean square over designs; missing where not looked at", required=True),
     "bias_error": number(("rung", "moment"), "1", "standard error of its mean", required=True),
     "chosen": flag(("rung",), "whether verified designs are simulated at it", required=True),
     "reach": number(("design", "moment"), "1", "relative half-width of the limits by the pilot's points", required=True),

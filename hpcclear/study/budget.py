@@ -97,14 +97,17 @@ def asked(scene: Scene) -> Array:
 
 def priced(scene: Scene, found: Evidence, *, doubtful: bool = True) -> Split | None:
     """The cheapest split of the scene's accuracy by what is known so far."""
-    verification = scene.required_study.verification
-    limits = LEAST, max(verification.most_samples, LEAST)
 
     def simulations(points: float) -> float:
         way = Split(0, 1e-6, np.zeros(2), asked(scene), points, 0.0, True)
         return float(sum(extent.samples_of(settled(scene, way), round(points)).values()))
 
-    return cheapest(found, asked(scene), simulations, limits, doubtful=doubtful)
+    return cheapest(found, asked(scene), simulations, _limits(scene), doubtful=doubtful)
+
+
+def _limits(scene: Scene) -> tuple[int, int]:
+    """Simulations of a verified design, at least and at most."""
+    return LEAST, max(scene.required_study.verification.most_samples, LEAST)
 
 
 def spread(scene: Scene, simulate: Simulate) -> Budget:
@@ -124,6 +127,9 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
     pilot = Pilot(scene, simulate)
     while True:
         found = pilot.evidence()
+        if pilot.partial and not _enough(scene, found):
+            pilot.fuller()
+            continue
         split, known = decided(scene, found), priced(scene, found, doubtful=False)
         share = PILOT * split.evaluations - pilot.spent
         if known is None and _goes_on(pilot, share):
@@ -135,6 +141,12 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
             pilot.longer()
             continue
         return Budget(split, found, pilot.labels, pilot.spent, split.rtol)
+
+
+def _enough(scene: Scene, found: Evidence) -> bool:
+    """Whether a tolerance is surely good enough and takes so little that samples are as few as without it."""
+    sure = priced(scene, found)
+    return sure is not None and sure.points <= found.points_for(asked(scene), *_limits(scene))
 
 
 def _goes_on(pilot: Pilot, share: float) -> bool:
@@ -161,8 +173,7 @@ def _at(scene: Scene, found: Evidence, rung: int) -> Split:
     share, wanted = found.tolerance_shares(False)[rung], asked(scene)
     room = np.nan_to_num(share) < wanted
     samples = np.sqrt(wanted**2 - np.where(room, share, 0.0) ** 2)
-    verification = scene.required_study.verification
-    points = found.points_for(samples, LEAST, max(verification.most_samples, LEAST))
+    points = found.points_for(samples, *_limits(scene))
     way = Split(rung, float(found.rtol[rung]), share, samples, points, 0.0, False)
     count = sum(extent.samples_of(settled(scene, way), round(points)).values())
     return Split(rung, way.rtol, share, samples, points, count * found.evaluations[rung], False)

@@ -20,8 +20,11 @@ from hpcclear.statistics.random.allocation import Evidence, evidence
 from hpcclear.statistics.random.replicates import moments
 
 LADDER = tuple(10.0**-k for k in range(3, 7))
-"""Tolerances of the pilot; the last one is what the others are measured against, and the ladder goes on if none is
-good enough."""
+"""Tolerances of the pilot; the ladder goes on if none is good enough."""
+
+STEPS = (0, 2), (1,), (3,)
+"""Which of them are looked at first, and which where that does not tell: tight ones are dear. The tightest is what the others
+are measured against."""
 
 DESIGNS = 4
 """Designs of the pilot over all cases, the originals besides."""
@@ -33,8 +36,8 @@ deviation has larger relative errors."""
 PAIRS = 4
 """Points of each scrambling that pairs are made of at first."""
 
-POINTS, POINTS_RTOL = 8, 1e-4
-"""Points of each scrambling that tell how errors of samples fall, and at which tolerance."""
+POINTS = 8
+"""Points of each scrambling that tell how errors of samples fall, at the loosest tolerance, which designs are chosen by."""
 
 Simulate = Callable[[str, Scene, Points], tuple[Array, float]]
 """Objectives of points, NaN where failed, and evaluations of the equations of motion a simulation; by a label of its own."""
@@ -63,6 +66,8 @@ class Pilot:
         Of its designs.
     rungs : list of float
         Tolerances, loosest first.
+    partial : bool
+        Whether some of them were not looked at yet.
     length : int
         Points of each scrambling that pairs are made of.
     spent : float
@@ -77,50 +82,69 @@ class Pilot:
     def __init__(self, scene: Scene, simulate: Simulate) -> None:
         self._scene, self._simulate = scene, simulate
         self.spent, self._parts = 0.0, 0
-        self._designs = self._chosen()
+        self._designs, screened = self._chosen()
         self.labels = [f"{design.case} {design.name}" for design in self._designs]
         self.rungs, self.length = list(LADDER), PAIRS
-        self._points, self._each = self._values(POINTS_RTOL, 0, POINTS)
-        first = [self._pairs_of(rtol, 0, PAIRS) for rtol in self.rungs]
-        self._pairs = [values for values, _ in first]
-        self._evaluations = [each for _, each in first]
+        more, each = self._values(LADDER[0], SCREENING, POINTS - SCREENING)
+        self._points, self._each = np.concatenate([screened, more], axis=2), each
+        self._pairs: dict[int, Array] = {}
+        self._evaluations: dict[int, float] = {}
+        self._steps = list(STEPS)
+        self.fuller()
+
+    @property
+    def partial(self) -> bool:
+        return bool(self._steps)
 
     def evidence(self) -> Evidence:
         """What they tell."""
+        count = len(self.rungs)
+        pairs = np.full((count, len(self._designs), SCRAMBLINGS, self.length), np.nan)
+        evaluations = np.full(count, np.nan)
+        for rung, values in self._pairs.items():
+            pairs[rung], evaluations[rung] = values, self._evaluations[rung]
         return evidence(
-            np.array(self.rungs), np.array(self._evaluations), np.stack(self._pairs), self._points,
+            np.array(self.rungs), evaluations, pairs, self._points,
             self._scene.required_study.verification.confidence,
         )  # fmt: skip
+
+    def fuller(self) -> None:
+        """The next of the ladder's tolerances that were not looked at."""
+        for rung in self._steps.pop(0):
+            self._look(rung)
 
     def tighter(self) -> None:
         """A rung more."""
         self.rungs.append(self.rungs[-1] / 10.0)
-        values, each = self._values(self.rungs[-1], 0, self.length)
-        self._pairs.append(values)
-        self._evaluations.append(each)
+        self._look(len(self.rungs) - 1)
 
     def longer(self) -> None:
-        """Twice the pairs at every tolerance."""
-        for k, rtol in enumerate(self.rungs):
-            more, each = self._pairs_of(rtol, self.length, self.length)
-            self._pairs[k] = np.concatenate([self._pairs[k], more], axis=2)
-            self._evaluations[k] = (self._evaluations[k] + each) / 2.0
+        """Twice the pairs at every tolerance that was looked at."""
+        for rung in self._pairs:
+            more, each = self._pairs_of(rung, self.length, self.length)
+            self._pairs[rung] = np.concatenate([self._pairs[rung], more], axis=2)
+            self._evaluations[rung] = (self._evaluations[rung] + each) / 2.0
         self.length *= 2
 
     def price_of_tightening(self) -> float:
         """Evaluations that `tighter` takes, about: as much more than the last rung as that took more than the one before."""
-        grown = self._evaluations[-1] ** 2 / max(self._evaluations[-2], 1.0)
+        before, last = (self._evaluations[rung] for rung in sorted(self._evaluations)[-2:])
+        grown = last**2 / max(before, 1.0)
         return len(self._designs) * SCRAMBLINGS * self.length * grown
 
     def price_of_doubling(self) -> float:
         """Evaluations that `longer` takes."""
-        return len(self._designs) * SCRAMBLINGS * self.length * float(np.sum(self._evaluations))
+        each = sum(self._evaluations.values())
+        return len(self._designs) * SCRAMBLINGS * self.length * each
 
-    def _pairs_of(self, rtol: float, first: int, length: int) -> tuple[Array, float]:
-        """The same, from those that are there already as far as they go."""
-        if rtol == POINTS_RTOL and first + length <= POINTS:
+    def _look(self, rung: int) -> None:
+        self._pairs[rung], self._evaluations[rung] = self._pairs_of(rung, 0, self.length)
+
+    def _pairs_of(self, rung: int, first: int, length: int) -> tuple[Array, float]:
+        """Objectives and evaluations, from those that are there already as far as they go."""
+        if rung == 0 and first + length <= POINTS:
             return self._points[:, :, first : first + length], self._each
-        return self._values(rtol, first, length)
+        return self._values(self.rungs[rung], first, length)
 
     def _values(self, rtol: float, first: int, length: int) -> tuple[Array, float]:
         """Objectives (designs, scramblings, length), and evaluations a simulation."""
@@ -142,30 +166,31 @@ class Pilot:
         self.spent += spent
         return made, spent / made.size
 
-    def _chosen(self) -> list[Design]:
-        """The original of each case, and of a Latin hypercube the designs of least mean and least deviation, then others."""
-        study, found = self._scene.required_study, []
+    def _chosen(self) -> tuple[list[Design], Array]:
+        """The original of each case, and of a Latin hypercube the designs of least mean and least deviation, then others; with
+        their first objectives at the loosest tolerance, (designs, scramblings, SCREENING)."""
+        study = self._scene.required_study
         each = -(-DESIGNS // len(study.cases))
-        self._designs = _hypercubes(self._scene)
+        self._designs = _screened(self._scene)
         values, _ = self._values(LADDER[0], 0, SCREENING)
+        chosen: list[int] = []
         for case in study.cases:
-            rows = [k for k, design in enumerate(self._designs) if design.case == case.name]
+            first, *rows = [k for k, one in enumerate(self._designs) if one.case == case.name]
             both = np.array([[one.value for one in moments(values[k])] for k in rows])
             both = np.where(np.isfinite(both), both, np.inf)
             best = [rows[k] for k in (*both.argmin(axis=0), *range(len(rows)))]
-            names = study.design_variables(case.name)
-            first = [self._scene.number(study.variable(name).paths[0]) for name in names]
-            found.append(Design(case.name, "original", dict(zip(names, first, strict=True))))
-            found += [self._designs[k] for k in list(dict.fromkeys(best))[:each]]
-        return found
+            chosen += [first, *list(dict.fromkeys(best))[:each]]
+        return [self._designs[k] for k in chosen], values[chosen]
 
 
-def _hypercubes(scene: Scene) -> list[Design]:
-    """Designs of a Latin hypercube of each case."""
+def _screened(scene: Scene) -> list[Design]:
+    """The original and designs of a Latin hypercube, of each case in turn."""
     study = scene.required_study
     found = []
     for case in study.cases:
         names = study.design_variables(case.name)
+        first = [scene.number(study.variable(name).paths[0]) for name in names]
+        found.append(Design(case.name, "original", dict(zip(names, first, strict=True))))
         region = box(scene, names)
         unit = unit_lhs(SCREENED, len(names), generator(study.seed, "budget", case.name))
         rows = to_physical(scene, names, region.lower + unit * (region.upper - region.lower))

@@ -38,11 +38,12 @@ class Evidence:
     """What a pilot has measured; all errors relative, of mean and deviation."""
 
     rtol: Array
-    """Shape (r,): loosest first; biases are against the last one."""
+    """Shape (r,): loosest first; biases are against the last one that was looked at."""
     evaluations: Array
     """Shape (r,): of the equations of motion, a simulation."""
     bias: Array
-    """Shape (r - 1, 2): root mean square over designs, without what chance adds to it; with that of the last one (`FALL`)."""
+    """Shape (r - 1, 2): root mean square over designs, without what chance adds to it; with that of the last one (`FALL`). NaN
+    where it was not looked for."""
     doubt: Array
     """Shape (r - 1, 2): standard error of the mean bias of all designs."""
     pairs: int
@@ -97,13 +98,17 @@ def evidence(
     Parameters
     ----------
     rtol, evaluations : array, shape (r,)
+        Evaluations are NaN at tolerances that were not looked at: they go by those of the others.
     pairs : array, shape (r, d, replicates, n)
-        The same points of d designs at every tolerance; NaN where a simulation failed.
+        The same points of d designs at every tolerance; NaN where a simulation failed, and at tolerances that were not
+        looked at, whose biases are NaN. Two were at least.
     points : array, shape (d, replicates, m)
         Of one of them, m a multiple of 4.
     confidence : float
     """
-    bias, error = biases(rtol, pairs)
+    seen = np.flatnonzero(np.isfinite(pairs).any(axis=(1, 2, 3)))
+    bias, error = np.full((2, len(rtol) - 1, pairs.shape[1], 2), np.nan)
+    bias[seen[:-1]], error[seen[:-1]] = biases(rtol[seen], pairs[seen])
     square, chance = _mean(bias**2), _mean(error**2)
     designs = np.isfinite(bias).sum(axis=1)
     reach = np.array([_reach(one, confidence) for one in points])
@@ -113,10 +118,19 @@ def evidence(
     fall = np.where(np.isfinite(fall), fall, np.nan)
     power = np.clip(np.nan_to_num(_mean(fall[None])[0], nan=SLOWEST), SLOWEST, FASTEST)
     return Evidence(
-        np.asarray(rtol), np.asarray(evaluations),
+        np.asarray(rtol), _all_evaluations(rtol, evaluations),
         np.sqrt(np.maximum(square - chance, 0.0)), np.sqrt(chance / np.maximum(designs, 1)),
         pairs[0, 0].size, points[0].size, reach, power, confidence,
     )  # fmt: skip
+
+
+def _all_evaluations(rtol: Array, evaluations: Array) -> Array:
+    """Evaluations, (r,), where NaN by the power of the tolerance that fits the others."""
+    known = np.isfinite(evaluations)
+    if known.all():
+        return np.asarray(evaluations)
+    fitted = np.polyfit(np.log(rtol[known]), np.log(evaluations[known]), 1)
+    return np.where(known, evaluations, np.exp(np.polyval(fitted, np.log(rtol))))
 
 
 def biases(rtol: Array, pairs: Array) -> tuple[Array, Array]:
