@@ -123,10 +123,10 @@ def test_a_tolerance_that_was_not_looked_at_is_not_known_and_its_price_is_that_o
     np.testing.assert_allclose(found.bias[0], (0.02 - 0.001) / 0.75, rtol=0.05)
     assert np.isnan(found.bias[1:]).all()
     np.testing.assert_allclose(found.evaluations, [1.0, 2.0, 4.0, 8.0])
-    split = cheapest(found, np.array([0.2, 0.2]), lambda points: points, (64, 2**20))
+    split = cheapest(found, np.array([0.2, 0.2]), price(), (64, 2**20))
     assert split is not None
     assert split.rung == 0
-    assert cheapest(found, np.array([0.01, 0.01]), lambda points: points, (64, 2**20)) is None
+    assert cheapest(found, np.array([0.01, 0.01]), price(), (64, 2**20)) is None
 
 
 def test_values_without_scatter_need_no_simulations():
@@ -140,6 +140,11 @@ EVIDENCE = Evidence(
     np.array([[0.01, 0.02], [0.001, 0.004], [0.0, 0.001]]), np.zeros((3, 2)),
     64, 256, np.tile([[0.002, 0.02], [0.004, 0.04]], (3, 1)), np.array([0.5, 0.5]), 0.95,
 )  # fmt: skip
+
+
+def price(fixed=0.0, each=1.0):
+    """Evaluations by rung and points, where all is simulated at the rung."""
+    return lambda rung, points: float(EVIDENCE.evaluations[rung]) * (fixed + each * points)
 
 
 def test_the_share_of_a_tolerance_holds_biases_of_other_designs():
@@ -157,7 +162,7 @@ def test_the_share_of_a_tolerance_holds_biases_of_other_designs():
 @pytest.mark.parametrize("asked", [0.1, 0.06, 0.03, 0.015, 0.01, 0.005])
 def test_the_cheapest_split_is_that_of_brute_force(asked):
     wanted, t = np.array([asked, asked]), 2.44691  # Student's quantile of six designs
-    found = cheapest(EVIDENCE, wanted, lambda points: 1000.0 + 10.0 * points, (64, 2**20))
+    found = cheapest(EVIDENCE, wanted, price(1000.0, 10.0), (64, 2**20))
     best = np.inf
     for rung in range(3):
         room = 1.0 - (t * EVIDENCE.bias[rung] / asked) ** 2
@@ -174,7 +179,7 @@ def test_the_cheapest_split_is_that_of_brute_force(asked):
 
 
 def test_no_tolerance_is_good_enough_for_an_accuracy_below_all_biases():
-    assert cheapest(EVIDENCE, np.array([0.001, 0.001]), lambda points: points, (64, 2**20)) is None
+    assert cheapest(EVIDENCE, np.array([0.001, 0.001]), price(), (64, 2**20)) is None
 
 
 # -- a study ----------------------------------------------------------------------------------------
@@ -291,7 +296,9 @@ def test_a_tolerance_that_alpha_needs_tighter_than_the_pilot_is_taken(tmp_path, 
     assert any("designs are verified at 1e-06" in text for text in told)
     found = dataset.read(tmp_path / "it" / "budget.nc", "budget")
     assert found["rtol"].to_numpy()[found["chosen"].to_numpy() == 1] == pytest.approx([1e-6])
-    assert found.attrs["searched_rtol"] == pytest.approx(1e-5)
+    assert found.attrs["searched_rtol"] == pytest.approx(
+        1e-5
+    )  # 0.15 % at 1e-4 are more than is asked of the mean
     alpha = dataset.read(tmp_path / "it" / "verification.nc").sel(design="play alpha")
     assert float(alpha["m2"]) == pytest.approx(0.42, abs=1e-3)
     # of the bias at 1e-5, 0.08 %, a half may be left
@@ -325,15 +332,20 @@ def test_no_tolerance_is_tightened_for_what_most_samples_ended(tmp_path):
     assert "study.verification.most_samples ended them" in " ".join(told)
 
 
-def test_simulations_of_a_study_are_those_of_its_split():
-    scene = scene_of()
+def test_simulations_of_a_study_are_those_of_its_split_searched_at_a_looser_tolerance():
+    scene = scene_of("study.accuracy=0.0025")  # at 1e-4 0.15 %: less, but no margin
     made = budget.spread(scene, lambda label, one, points: budget.simulated(alone(), one, points))
     final = budget.settled(scene, made.split)
     assert final.numerics.rtol == made.split.rtol
     assert final.required_study.accuracy is None
-    count = sum(extent.samples_of(final, round(made.split.points)).values())
-    each = made.found.evaluations[made.split.rung]
-    assert made.split.evaluations == pytest.approx(count * each)
+    count = extent.samples_of(final, round(made.split.points))
+    verified = count["verification"] + count["chaos"]
+    search = count["kriging"] + count["check"] + count["infill"]
+    assert sum(count.values()) == verified + search
+    looser, each = (made.found.evaluations[k] for k in (made.searched, made.split.rung))
+    assert made.split.evaluations == pytest.approx(verified * each + search * looser)
+    assert looser < each
+    assert budget.searching(scene, made).numerics.rtol == pytest.approx(1e-4)
 
 
 # -- what is refused --------------------------------------------------------------------------------

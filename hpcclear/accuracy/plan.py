@@ -190,8 +190,10 @@ def splits(scene: Scene, points: Points, ranks: Ranks, tell: Callable[[str], obj
         made = budget.spread(one, simulate)
         split = made.split
         final = budget.settled(one, split)
-        pilot = made.pilot / made.found.evaluations[split.rung]
-        count = sum(extent.samples_of(final, round(split.points)).values()) + round(pilot)
+        each = made.found.evaluations[
+            split.rung
+        ]  # simulations at other tolerances count by their price
+        count = round((split.evaluations + made.pilot) / each)
         seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}")
         label = asked_for + ("" if split.sure else " ?")
         rows.append(Row(None if factor == 1.0 else factor, final, seconds, "", count, label))

@@ -146,7 +146,7 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
     run, shared = given, None
     if given.study.accuracy is not None:
         shared = budget.share_out(given)
-        run = given.of(budget.settled(given.scene, shared.split))
+        run = given.of(budget.searching(given.scene, shared))
     sensitivity: Result | None = None
     if run.study.certificate is not None:
         certificate.certify(run)

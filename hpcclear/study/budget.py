@@ -8,7 +8,7 @@ whatever the machine was doing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,8 +54,8 @@ class Budget:
     """Of the pilot's designs."""
     pilot: float
     """Evaluations of the equations of motion that it took, and pairs on alpha and beta."""
-    searched: float
-    """Tolerance of the search; that of the split is verification's."""
+    searched: int
+    """Rung of the search; that of the split is verification's."""
     ends: Array = field(default_factory=lambda: np.full(2, np.nan))
     """Shape (2,): what the tolerance was found to take of alpha and beta, at worst; NaN before they are known."""
 
@@ -88,6 +88,12 @@ def settled(scene: Scene, split: Split) -> Scene:
     )
 
 
+def searching(scene: Scene, made: Budget) -> Scene:
+    """The same with the tolerance of the search."""
+    rtol = float(made.found.rtol[made.searched])
+    return settled(scene, made.split).with_({"numerics.rtol": rtol})
+
+
 def asked(scene: Scene) -> Array:
     """Mean and deviation, relative, shape (2,)."""
     wanted = scene.required_study.accuracy
@@ -98,11 +104,26 @@ def asked(scene: Scene) -> Array:
 def priced(scene: Scene, found: Evidence, *, doubtful: bool = True) -> Split | None:
     """The cheapest split of the scene's accuracy by what is known so far."""
 
-    def simulations(points: float) -> float:
-        way = Split(0, 1e-6, np.zeros(2), asked(scene), points, 0.0, True)
-        return float(sum(extent.samples_of(settled(scene, way), round(points)).values()))
+    def price(rung: int, points: float) -> float:
+        way = Split(rung, float(found.rtol[rung]), np.zeros(2), asked(scene), points, 0.0, True)
+        return _evaluations(scene, found, way)
 
-    return cheapest(found, asked(scene), simulations, _limits(scene), doubtful=doubtful)
+    return cheapest(found, asked(scene), price, _limits(scene), doubtful=doubtful)
+
+
+def _evaluations(scene: Scene, found: Evidence, split: Split) -> float:
+    """Of the equations of motion, in a study of this split."""
+    count = extent.samples_of(settled(scene, split), round(split.points))
+    search = sum(n for stage, n in count.items() if stage not in extent.VERIFYING)
+    searched = float(found.evaluations[search_rung(scene, found, split.rung)])
+    return search * searched + (sum(count.values()) - search) * float(found.evaluations[split.rung])
+
+
+def search_rung(scene: Scene, found: Evidence, rung: int) -> int:
+    """Where designs are looked for: at the loosest tolerance whose bias, as far as it is known, is less than the accuracy. No
+    number of the search is told, and what a tolerance takes of all designs alike changes none's place."""
+    known = (found.bias[:rung] < asked(scene)).all(axis=1)
+    return int(np.append(known, True).argmax())
 
 
 def _limits(scene: Scene) -> tuple[int, int]:
@@ -140,7 +161,8 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
         if few and pilot.price_of_doubling() <= min(saved / 2.0, share):
             pilot.longer()
             continue
-        return Budget(split, found, pilot.labels, pilot.spent, split.rtol)
+        searched = search_rung(scene, found, split.rung)
+        return Budget(split, found, pilot.labels, pilot.spent, searched)
 
 
 def _enough(scene: Scene, found: Evidence) -> bool:
@@ -175,8 +197,7 @@ def _at(scene: Scene, found: Evidence, rung: int) -> Split:
     samples = np.sqrt(wanted**2 - np.where(room, share, 0.0) ** 2)
     points = found.points_for(samples, *_limits(scene))
     way = Split(rung, float(found.rtol[rung]), share, samples, points, 0.0, False)
-    count = sum(extent.samples_of(settled(scene, way), round(points)).values())
-    return Split(rung, way.rtol, share, samples, points, count * found.evaluations[rung], False)
+    return replace(way, evaluations=_evaluations(scene, found, way))
 
 
 # ---- as a stage of a study -------------------------------------------------------------------------
@@ -216,11 +237,12 @@ def told(scene: Scene, made: Budget) -> list[str]:
     final = settled(scene, split).required_study
     count = extent.samples_of(settled(scene, split), round(split.points))
     level = f"{study.verification.confidence:.0%}"
+    looser = f" (at {made.found.rtol[made.searched]:.0e})" if made.searched < split.rung else ""
     texts = [
         f"Accuracy asked at {level}: {_shares(asked(scene))}.",
         f"Split: rtol {split.rtol:.0e}, which takes {_shares(split.tolerance)}; samples {_shares(split.samples)}, "
         f"about {split.points:.0f} simulations of a verified design and {final.verification.infill_samples} of one that is "
-        f"searched; the surrogate nothing, its {study.samples} points only say where to look.",
+        f"searched{looser}; the surrogate nothing, its {study.samples} points only say where to look.",
         f"That is {sum(count.values())} simulations, {split.evaluations:.2g} evaluations of the equations of motion; "
         f"the pilot took {made.pilot / (made.pilot + split.evaluations):.0%} of it.",
     ]
@@ -299,7 +321,7 @@ def write(run: StudyRun, made: Budget, worst: Array) -> None:
         "points": found.points,
         "verified_points": split.points,
         "pilot_evaluations": made.pilot,
-        "searched_rtol": made.searched,
+        "searched_rtol": found.rtol[made.searched],
         "study_evaluations": split.evaluations,
         "sure": "yes" if split.sure else "no",
     }

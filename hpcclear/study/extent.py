@@ -19,6 +19,9 @@ from hpcclear.study.goals import ends_in_all
 from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
+VERIFYING = frozenset({"verification", "lives", "chaos", "readings"})
+"""Stages of `samples_of` that come after the search, at the tolerance of verified designs."""
+
 
 def samples_of(scene: Scene, verified: int | None = None) -> dict[str, int]:
     """Samples on the ranks by stage, if no surface or model is refused.

@@ -49,7 +49,7 @@ def verified(
             f"Pairs on alpha and beta show that rtol {before.rtol:.0e} takes more of their accuracy than the samples leave: "
             f"designs are verified at {rtol:.0e}."
         )
-        run = run.of(run.scene.with_({"numerics.rtol": rtol}))
+    run = run.of(run.scene.with_({"numerics.rtol": rtol}))
     return run, made, true, verification.named(run, designs, true)
 
 

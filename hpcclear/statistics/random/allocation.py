@@ -157,7 +157,7 @@ def biases(rtol: Array, pairs: Array) -> tuple[Array, Array]:
 def cheapest(
     found: Evidence,
     asked: Array,
-    simulations: Callable[[float], float],
+    price: Callable[[int, float], float],
     limits: tuple[int, int],
     *,
     doubtful: bool = True,
@@ -169,8 +169,9 @@ def cheapest(
     found : Evidence
     asked : array, shape (2,)
         Of mean and deviation, relative.
-    simulations : callable
-        In the whole study, by those of a verified design.
+    price : callable
+        Evaluations of the equations of motion in the whole study, by a tolerance's rung and the simulations of a verified
+        design.
     limits : (int, int)
         Simulations of a verified design, at least and at most.
     doubtful : bool
@@ -183,9 +184,8 @@ def cheapest(
             continue
         samples = np.sqrt(asked**2 - share**2)
         points = found.points_for(samples, *limits)
-        price = float(found.evaluations[rung]) * simulations(points)
-        rtol = float(found.rtol[rung])
-        ways.append(Split(rung, rtol, share, samples, points, price, doubtful))
+        rtol, spent = float(found.rtol[rung]), price(rung, points)
+        ways.append(Split(rung, rtol, share, samples, points, spent, doubtful))
     return min(ways, key=lambda way: way.evaluations, default=None)
 
 
