@@ -142,9 +142,9 @@ def energy_figure(response: xr.Dataset) -> "Figure":
             label = name.replace("_", " ").removesuffix(" energy")
             panel.plot(turn, values, style.DASHES[row], color=style.CYCLE[row], lw=0.8, label=label)
         panel.set_ylabel(unit.label(f"energy {kind}"))
-        panel.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(present), borderaxespad=0.0
-        )
+        if present:  # a response that failed at once has none
+            place = {"bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0.0}
+            panel.legend(loc="lower right", ncols=len(present), **place)
     residual = abs(response["energy_residual"].to_numpy())
     unit = labels.scale("J", residual)
     axes[2, 0].plot(turn, residual * unit.factor, color=style.PALETTE["black"], lw=0.7)
