@@ -166,9 +166,21 @@ def spread(scene: Scene, simulate: Simulate) -> Budget:
 
 
 def _enough(scene: Scene, found: Evidence) -> bool:
-    """Whether a tolerance is surely good enough and takes so little that samples are as few as without it."""
+    """Whether a tolerance is surely good enough, and the next one, if it took nothing, would not be cheaper."""
     sure = priced(scene, found)
-    return sure is not None and sure.points <= found.points_for(asked(scene), *_limits(scene))
+    if sure is None:
+        return False
+    best, rung = asked(scene), sure.rung + 1
+    free = Split(
+        rung,
+        float(found.rtol[rung]),
+        np.zeros(2),
+        best,
+        found.points_for(best, *_limits(scene)),
+        0.0,
+        True,
+    )
+    return sure.evaluations <= _evaluations(scene, found, free)
 
 
 def _goes_on(pilot: Pilot, share: float) -> bool:

@@ -33,8 +33,9 @@ SCREENED, SCREENING = 16, 2
 """Designs that each case's are chosen from, and points of each scrambling for that: what is verified is good, and a small
 deviation has larger relative errors."""
 
-PAIRS = 4
-"""Points of each scrambling that pairs are made of at first."""
+PAIRS, FIRST_PAIRS = 4, 8
+"""Points of each scrambling that pairs are made of, and of the first step, which is the only one where it tells: few motions
+that go another way look like a bias."""
 
 POINTS = 8
 """Points of each scrambling that tell how errors of samples fall, at the loosest tolerance, which designs are chosen by."""
@@ -69,7 +70,7 @@ class Pilot:
     partial : bool
         Whether some of them were not looked at yet.
     length : int
-        Points of each scrambling that pairs are made of.
+        Points of each scrambling that pairs are made of at least.
     spent : float
         Evaluations of the equations of motion.
 
@@ -98,11 +99,12 @@ class Pilot:
 
     def evidence(self) -> Evidence:
         """What they tell."""
-        count = len(self.rungs)
-        pairs = np.full((count, len(self._designs), SCRAMBLINGS, self.length), np.nan)
+        count, most = len(self.rungs), max(one.shape[2] for one in self._pairs.values())
+        pairs = np.full((count, len(self._designs), SCRAMBLINGS, most), np.nan)
         evaluations = np.full(count, np.nan)
         for rung, values in self._pairs.items():
-            pairs[rung], evaluations[rung] = values, self._evaluations[rung]
+            pairs[rung, :, :, : values.shape[2]] = values
+            evaluations[rung] = self._evaluations[rung]
         return evidence(
             np.array(self.rungs), evaluations, pairs, self._points,
             self._scene.required_study.verification.confidence,
@@ -110,21 +112,20 @@ class Pilot:
 
     def fuller(self) -> None:
         """The next of the ladder's tolerances that were not looked at."""
+        length = FIRST_PAIRS if not self._pairs else self.length
         for rung in self._steps.pop(0):
-            self._look(rung)
+            self._look(rung, length)
 
     def tighter(self) -> None:
         """A rung more."""
         self.rungs.append(self.rungs[-1] / 10.0)
-        self._look(len(self.rungs) - 1)
+        self._look(len(self.rungs) - 1, self.length)
 
     def longer(self) -> None:
         """Twice the pairs at every tolerance that was looked at."""
-        for rung in self._pairs:
-            more, each = self._pairs_of(rung, self.length, self.length)
-            self._pairs[rung] = np.concatenate([self._pairs[rung], more], axis=2)
-            self._evaluations[rung] = (self._evaluations[rung] + each) / 2.0
         self.length *= 2
+        for rung in self._pairs:
+            self._look(rung, self.length)
 
     def price_of_tightening(self) -> float:
         """Evaluations that `tighter` takes, about: as much more than the last rung as that took more than the one before."""
@@ -134,11 +135,19 @@ class Pilot:
 
     def price_of_doubling(self) -> float:
         """Evaluations that `longer` takes."""
-        each = sum(self._evaluations.values())
-        return len(self._designs) * SCRAMBLINGS * self.length * each
+        more = [max(2 * self.length - one.shape[2], 0) for one in self._pairs.values()]
+        each = np.dot(more, list(self._evaluations.values()))
+        return len(self._designs) * SCRAMBLINGS * float(each)
 
-    def _look(self, rung: int) -> None:
-        self._pairs[rung], self._evaluations[rung] = self._pairs_of(rung, 0, self.length)
+    def _look(self, rung: int, length: int) -> None:
+        """At least so many points of each scrambling at a tolerance."""
+        known = self._pairs.get(rung, np.empty((len(self._designs), SCRAMBLINGS, 0)))
+        there = known.shape[2]
+        if there < length:
+            more, each = self._pairs_of(rung, there, length - there)
+            before = there * self._evaluations.get(rung, 0.0)
+            self._pairs[rung] = np.concatenate([known, more], axis=2)
+            self._evaluations[rung] = (before + (length - there) * each) / length
 
     def _pairs_of(self, rung: int, first: int, length: int) -> tuple[Array, float]:
         """Objectives and evaluations, from those that are there already as far as they go."""

@@ -101,7 +101,7 @@ def evidence(
         Evaluations are NaN at tolerances that were not looked at: they go by those of the others.
     pairs : array, shape (r, d, replicates, n)
         The same points of d designs at every tolerance; NaN where a simulation failed, and at tolerances that were not
-        looked at, whose biases are NaN. Two were at least.
+        looked at, whose biases are NaN, and beyond the points of one that has fewer. Two were looked at at least.
     points : array, shape (d, replicates, m)
         Of one of them, m a multiple of 4.
     confidence : float
@@ -120,7 +120,7 @@ def evidence(
     return Evidence(
         np.asarray(rtol), _all_evaluations(rtol, evaluations),
         np.sqrt(np.maximum(square - chance, 0.0)), np.sqrt(chance / np.maximum(designs, 1)),
-        pairs[0, 0].size, points[0].size, reach, power, confidence,
+        int(np.isfinite(pairs[seen]).any(axis=1).sum(axis=(1, 2)).min()), points[0].size, reach, power, confidence,
     )  # fmt: skip
 
 
