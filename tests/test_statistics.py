@@ -301,7 +301,9 @@ def written(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("keeps", ["nothing", "by leaders", "by ranks"])
+@pytest.mark.parametrize(
+    "keeps", [pytest.param("nothing", marks=pytest.mark.full), "by leaders", "by ranks"]
+)
 def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
     here, there, stopped = (tmp_path / name for name in ("here", "there", "stopped"))
     for place in (here, there, stopped):

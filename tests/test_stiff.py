@@ -91,19 +91,20 @@ def largest(found: xr.Dataset) -> np.ndarray:
     return found["peak_contact_force"].to_numpy().max(axis=1)
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
-def test_a_film_is_as_good_and_no_dearer_at_a_loose_tolerance(rtol: float):
+def test_a_film_is_as_good_and_no_dearer_at_a_loose_tolerance():
     """Its explicit steps stood at the edge of stability: peaks were five times too high at 1e-4; at 1e-3 lanes went to and fro
     between both kinds of steps until the cap on steps."""
     film = {"viscosity": 1.0, "length": "20 mm", "model": "short"}
     changes = {f"joints.{joint}.film": film for joint in ("crank_rod", "rod_slider")}
     changes["numerics.transient_revolutions"] = 0
     play = np.linspace(35e-6, 70e-6, 16)
-    usual, loose = (ensemble("slider_crank", changes, one, play) for one in (1e-6, rtol))
-    assert (loose["status"] == 0).all()
-    assert largest(loose) == pytest.approx(largest(usual), rel=1e-3)
-    assert loose["objective"].to_numpy() == pytest.approx(usual["objective"].to_numpy(), rel=1e-6)
-    assert loose["rhs_evaluations"].mean() < 1.1 * usual["rhs_evaluations"].mean()
+    usual, *others = (ensemble("slider_crank", changes, one, play) for one in (1e-6, 1e-3, 1e-4))
+    for loose in others:
+        assert (loose["status"] == 0).all()
+        assert largest(loose) == pytest.approx(largest(usual), rel=1e-3)
+        f = usual["objective"].to_numpy()
+        assert loose["objective"].to_numpy() == pytest.approx(f, rel=1e-6)
+        assert loose["rhs_evaluations"].mean() < 1.1 * usual["rhs_evaluations"].mean()
 
 
 AT_EDGE = {
@@ -114,9 +115,8 @@ AT_EDGE = {
 }
 
 
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 @pytest.mark.parametrize("name", AT_EDGE)
-def test_forces_stand_at_a_loose_tolerance(name: str, rtol: float):
+def test_forces_stand_at_a_loose_tolerance(name: str):
     """At the edge of stability errors grew to the tolerance: peaks were 2 to 60 % off, the moment up to three times too high.
 
     Better ones cost nothing: there steps are as short as ramp and contact want them, whatever the tolerance.
@@ -125,13 +125,14 @@ def test_forces_stand_at_a_loose_tolerance(name: str, rtol: float):
         "drive.speed": "1500 rpm", "numerics.responses": True, "numerics.transient_revolutions": 1,
     }  # fmt: skip
     play = np.linspace(4e-6, 6e-6, 8)
-    exact, loose = (ensemble("hunt_crossley", changes, one, play) for one in (1e-7, rtol))
-    assert largest(loose) == pytest.approx(largest(exact), rel=5e-3)
+    exact, *others = (ensemble("hunt_crossley", changes, one, play) for one in (1e-7, 1e-3, 1e-4))
     bounds = {"slider_acceleration_deviation": 2e-3, "peak_crank_moment": 2e-2, "objective": 1e-3}
-    for response, bound in bounds.items():
-        values = loose[response].to_numpy()
-        assert values == pytest.approx(exact[response].to_numpy(), rel=bound), response
-    assert loose["rhs_evaluations"].mean() < 0.5 * exact["rhs_evaluations"].mean()
+    for loose in others:
+        assert largest(loose) == pytest.approx(largest(exact), rel=5e-3)
+        for response, bound in bounds.items():
+            values = loose[response].to_numpy()
+            assert values == pytest.approx(exact[response].to_numpy(), rel=bound), response
+        assert loose["rhs_evaluations"].mean() < 0.5 * exact["rhs_evaluations"].mean()
 
 
 def test_scenes_that_are_not_stiff_do_not_pay():

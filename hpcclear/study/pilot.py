@@ -34,8 +34,8 @@ SCREENED, SCREENING = 16, 2
 deviation has larger relative errors."""
 
 PAIRS, FIRST_PAIRS = 4, 8
-"""Points of each scrambling that pairs are made of, and of the first step, which is the only one where it tells: few motions
-that go another way look like a bias."""
+"""Points of each scrambling that pairs are made of; of the first step, which may end the pilot, twice as many: a few motions
+that go another way would look like a bias."""
 
 POINTS = 8
 """Points of each scrambling that tell how errors of samples fall, at the loosest tolerance, which designs are chosen by."""
