@@ -229,6 +229,11 @@ def summary(rows: list[dict[str, Any]]) -> None:
             f"up to 2: {np.mean(times <= 2):.0%}, at most {times.max():.2f}"
         )
     pilot, predicted = (np.array([row[key] for row in rows]) for key in ("pilot", "predicted"))
+    bias = [[np.abs(row["bias"][str(rtol)]) for row in rows] for rtol in RUNGS]
+    bias = np.array(bias).reshape(len(RUNGS), -1)
+    large = bias[:, bias[0] > np.median(bias[0])]  # others are chance
+    left = np.median(large / large[0], axis=1)
+    print(f"what tolerances from {RUNGS[0]} on leave of its bias, medians: {left.round(2)}")
     print(
         f"pilot and pairs: median {np.median(pilot):.1%} of the study; predicted over counted evaluations: "
         f"median {np.median(predicted):.2f}, within 20 %: {np.mean(abs(predicted - 1) <= 0.2):.0%}"

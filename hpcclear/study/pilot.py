@@ -22,9 +22,9 @@ from hpcclear.statistics.random.replicates import moments
 LADDER = tuple(10.0**-k for k in range(3, 7))
 """Tolerances of the pilot; the ladder goes on if none is good enough."""
 
-STEPS = (0, 2), (1,), (3,)
-"""Which of them are looked at first, and which where that does not tell: tight ones are dear. The tightest is what the others
-are measured against."""
+STEPS = (0, 3), (1, 2)
+"""Which of them are looked at first, and which where that does not tell. The tightest is what the others are measured against:
+less tight ones do not show all that a loose one does."""
 
 DESIGNS = 4
 """Designs of the pilot over all cases, the originals besides."""
@@ -33,9 +33,8 @@ SCREENED, SCREENING = 16, 2
 """Designs that each case's are chosen from, and points of each scrambling for that: what is verified is good, and a small
 deviation has larger relative errors."""
 
-PAIRS, FIRST_PAIRS = 4, 8
-"""Points of each scrambling that pairs are made of; of the first step, which may end the pilot, twice as many: a few motions
-that go another way would look like a bias."""
+PAIRS = 4
+"""Points of each scrambling that pairs are made of at first."""
 
 POINTS = 8
 """Points of each scrambling that tell how errors of samples fall, at the loosest tolerance, which designs are chosen by."""
@@ -70,7 +69,7 @@ class Pilot:
     partial : bool
         Whether some of them were not looked at yet.
     length : int
-        Points of each scrambling that pairs are made of at least.
+        Points of each scrambling that pairs are made of.
     spent : float
         Evaluations of the equations of motion.
 
@@ -99,12 +98,11 @@ class Pilot:
 
     def evidence(self) -> Evidence:
         """What they tell."""
-        count, most = len(self.rungs), max(one.shape[2] for one in self._pairs.values())
-        pairs = np.full((count, len(self._designs), SCRAMBLINGS, most), np.nan)
+        count = len(self.rungs)
+        pairs = np.full((count, len(self._designs), SCRAMBLINGS, self.length), np.nan)
         evaluations = np.full(count, np.nan)
         for rung, values in self._pairs.items():
-            pairs[rung, :, :, : values.shape[2]] = values
-            evaluations[rung] = self._evaluations[rung]
+            pairs[rung], evaluations[rung] = values, self._evaluations[rung]
         return evidence(
             np.array(self.rungs), evaluations, pairs, self._points,
             self._scene.required_study.verification.confidence,
@@ -112,9 +110,8 @@ class Pilot:
 
     def fuller(self) -> None:
         """The next of the ladder's tolerances that were not looked at."""
-        length = FIRST_PAIRS if not self._pairs else self.length
         for rung in self._steps.pop(0):
-            self._look(rung, length)
+            self._look(rung, self.length)
 
     def tighter(self) -> None:
         """A rung more."""
@@ -135,9 +132,8 @@ class Pilot:
 
     def price_of_doubling(self) -> float:
         """Evaluations that `longer` takes."""
-        more = [max(2 * self.length - one.shape[2], 0) for one in self._pairs.values()]
-        each = np.dot(more, list(self._evaluations.values()))
-        return len(self._designs) * SCRAMBLINGS * float(each)
+        each = sum(self._evaluations.values())
+        return len(self._designs) * SCRAMBLINGS * self.length * each
 
     def _look(self, rung: int, length: int) -> None:
         """At least so many points of each scrambling at a tolerance."""

@@ -17,12 +17,13 @@ from hpcclear.statistics.random.allocation import FALL, Evidence, biases
 from hpcclear.study import truth, verification
 from hpcclear.study.budget import Budget, reach_of
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.pilot import PAIRS
+from hpcclear.study.pilot import LADDER, PAIRS
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verification import Table
 
-APART = 2
-"""Rungs to the tolerance that one is measured against, if there are so many: the next leaves half of a bias."""
+APART, NEAREST = 2, len(LADDER) - 1
+"""Rungs to the tolerance that one is measured against, if there are so many, and the loosest that any is: what is nearer leaves
+most of a bias."""
 
 HIDDEN = 0.25
 """Standard error of a bias of alpha or beta, over the accuracy, that is small enough."""
@@ -72,7 +73,8 @@ def _verify(run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice
         reach = reach_of(ladder.told(rung))[fresh]
         left = np.sqrt(np.fmax(wanted**2 - reach**2, np.fmin(made.split.tolerance, wanted) ** 2))
         against = max(min(rung, last - 1), 0)
-        bias, error = ladder.bias(against, min(against + APART, last), fresh, left, wanted)
+        tight = min(max(against + APART, NEAREST), last)
+        bias, error = ladder.bias(against, tight, fresh, left, wanted)
         if rung == last:
             bias, error = FALL * bias, FALL * error
         # what chance may have made counts no more: a needless tolerance is dear
