@@ -256,7 +256,7 @@ def main() -> None:
         if number in done:
             continue
         row = judged(number)
-        rows.append(row)
+        rows.append(json.loads(json.dumps(row)))  # as from the file
         with options.output.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(
