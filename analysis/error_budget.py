@@ -1,6 +1,6 @@
 """Random small studies of which an accuracy is asked: is it reached, and at how much more than the cheapest split costs?
 
-python analysis/error_budget.py --studies 40      (an hour and a half on one core: nearly all of it to compare with)
+python analysis/error_budget.py --studies 40      (half an hour on one core: nearly all of it to compare with)
 
 Each study has a slider-crank of its own, one or two joints with play, and asks 0.8 to 4 % of mean and deviation. The truth of
 its alpha and beta is 16 384 simulations by fresh scramblings at a tolerance of 1e-8. The cheapest split is found

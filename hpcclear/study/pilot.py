@@ -66,8 +66,6 @@ class Pilot:
         Of its designs.
     rungs : list of float
         Tolerances, loosest first.
-    partial : bool
-        Whether some of them were not looked at yet.
     length : int
         Points of each scrambling that pairs are made of.
     spent : float
@@ -94,6 +92,7 @@ class Pilot:
 
     @property
     def partial(self) -> bool:
+        """Whether some tolerances of the ladder were not looked at yet."""
         return bool(self._steps)
 
     def evidence(self) -> Evidence:
