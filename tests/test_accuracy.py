@@ -117,7 +117,9 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
     assert found.setting[list(found.methods).index("RK4, fixed steps"), 0] == LARGEST_STEP / 4
 
 
-@pytest.mark.parametrize("drive", ["constant-speed", "torque"])
+@pytest.mark.parametrize(
+    "drive", [pytest.param("constant-speed", marks=pytest.mark.full), "torque"]
+)
 def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     """scipy on the generated equations, and the kernel; a revolution of a free crank ends at an angle, not at a time."""
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")

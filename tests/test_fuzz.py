@@ -415,7 +415,7 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     assert second.exists()
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(200, marks=FULL)])
+@pytest.mark.parametrize("count", [5, pytest.param(200, marks=FULL)])
 @pytest.mark.timeout(1800)
 def test_commands_refuse_damaged_results(hpcclear, result, count):
     words, output = result

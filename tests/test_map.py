@@ -127,13 +127,13 @@ def test_a_map_folds_back_into_a_grid(tmp_path):
 def test_ranks_and_a_kill_change_no_byte(tmp_path):
     grids = ("C=0.3mm:1mm:8", "m3=0.1:0.2:4")
     files = []
-    for ranks in (0, 2, 3):
+    for ranks in (0, 3):  # two of them go on below
         out = tmp_path / str(ranks) / "map.nc"
         out.parent.mkdir()
         code, output = run(words(out, *grids), ranks)
         assert code == 0, output
         files.append(out.read_bytes())
-    assert files[0] == files[1] == files[2]
+    assert files[0] == files[1]
     out = tmp_path / "killed" / "map.nc"
     out.parent.mkdir()
     kill_once_it_saved([*words(out, *grids), "--checkpoint-interval", "0.1"], 2, out.parent)
