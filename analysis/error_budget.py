@@ -151,8 +151,8 @@ def judged(number: int) -> dict[str, Any]:
         "within": [[float(verified[f"{m}_within"].sel(design=n)) for m in ("mean", "deviation")]
                    for n in names],
         "told": told, "evaluations": each,
-        "spent": {f"{stage} {rtol:.0e}": n for one, of in ((counted, ""), (pilot, "pilot "))
-                  for (stage, rtol), n in ((( of + k[0], k[1]), v) for k, v in one.evaluations.items())},
+        "spent": {f"{who}{stage} {rtol:.0e}": n for who, one in (("", counted), ("pilot ", pilot))
+                  for (stage, rtol), n in one.evaluations.items()},
         "bias": {rtol: [one["bias"][rtol].tolist() for one in prices] for rtol in RUNGS},
     }  # fmt: skip
 

@@ -190,9 +190,8 @@ def splits(scene: Scene, points: Points, ranks: Ranks, tell: Callable[[str], obj
         made = budget.spread(one, simulate)
         split = made.split
         final = budget.settled(one, split)
-        each = made.found.evaluations[
-            split.rung
-        ]  # simulations at other tolerances count by their price
+        # simulations at other tolerances count by their price
+        each = made.found.evaluations[split.rung]
         count = round((split.evaluations + made.pilot) / each)
         seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}")
         label = asked_for + ("" if split.sure else " ?")

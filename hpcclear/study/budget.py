@@ -8,7 +8,8 @@ whatever the machine was doing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -103,20 +104,17 @@ def asked(scene: Scene) -> Array:
 
 def priced(scene: Scene, found: Evidence, *, doubtful: bool = True) -> Split | None:
     """The cheapest split of the scene's accuracy by what is known so far."""
-
-    def price(rung: int, points: float) -> float:
-        way = Split(rung, float(found.rtol[rung]), np.zeros(2), asked(scene), points, 0.0, True)
-        return _evaluations(scene, found, way)
-
+    price = partial(_evaluations, scene, found)
     return cheapest(found, asked(scene), price, _limits(scene), doubtful=doubtful)
 
 
-def _evaluations(scene: Scene, found: Evidence, split: Split) -> float:
-    """Of the equations of motion, in a study of this split."""
-    count = extent.samples_of(settled(scene, split), round(split.points))
+def _evaluations(scene: Scene, found: Evidence, rung: int, points: float) -> float:
+    """Of the equations of motion, in a study that verifies at a rung by so many simulations of a design."""
+    way = Split(rung, float(found.rtol[rung]), np.zeros(2), asked(scene), points, 0.0, True)
+    count = extent.samples_of(settled(scene, way), round(points))
     search = sum(n for stage, n in count.items() if stage not in extent.VERIFYING)
-    searched = float(found.evaluations[search_rung(scene, found, split.rung)])
-    return search * searched + (sum(count.values()) - search) * float(found.evaluations[split.rung])
+    searched = float(found.evaluations[search_rung(scene, found, rung)])
+    return search * searched + (sum(count.values()) - search) * float(found.evaluations[rung])
 
 
 def search_rung(scene: Scene, found: Evidence, rung: int) -> int:
@@ -170,17 +168,8 @@ def _enough(scene: Scene, found: Evidence) -> bool:
     sure = priced(scene, found)
     if sure is None:
         return False
-    best, rung = asked(scene), sure.rung + 1
-    free = Split(
-        rung,
-        float(found.rtol[rung]),
-        np.zeros(2),
-        best,
-        found.points_for(best, *_limits(scene)),
-        0.0,
-        True,
-    )
-    return sure.evaluations <= _evaluations(scene, found, free)
+    points = found.points_for(asked(scene), *_limits(scene))
+    return sure.evaluations <= _evaluations(scene, found, sure.rung + 1, points)
 
 
 def _goes_on(pilot: Pilot, share: float) -> bool:
@@ -208,8 +197,8 @@ def _at(scene: Scene, found: Evidence, rung: int) -> Split:
     room = np.nan_to_num(share) < wanted
     samples = np.sqrt(wanted**2 - np.where(room, share, 0.0) ** 2)
     points = found.points_for(samples, *_limits(scene))
-    way = Split(rung, float(found.rtol[rung]), share, samples, points, 0.0, False)
-    return replace(way, evaluations=_evaluations(scene, found, way))
+    spent = _evaluations(scene, found, rung, points)
+    return Split(rung, float(found.rtol[rung]), share, samples, points, spent, False)
 
 
 # ---- as a stage of a study -------------------------------------------------------------------------

@@ -110,18 +110,18 @@ class Pilot:
     def fuller(self) -> None:
         """The next of the ladder's tolerances that were not looked at."""
         for rung in self._steps.pop(0):
-            self._look(rung, self.length)
+            self._look(rung)
 
     def tighter(self) -> None:
         """A rung more."""
         self.rungs.append(self.rungs[-1] / 10.0)
-        self._look(len(self.rungs) - 1, self.length)
+        self._look(len(self.rungs) - 1)
 
     def longer(self) -> None:
         """Twice the pairs at every tolerance that was looked at."""
         self.length *= 2
         for rung in self._pairs:
-            self._look(rung, self.length)
+            self._look(rung)
 
     def price_of_tightening(self) -> float:
         """Evaluations that `tighter` takes, about: as much more than the last rung as that took more than the one before."""
@@ -134,15 +134,14 @@ class Pilot:
         each = sum(self._evaluations.values())
         return len(self._designs) * SCRAMBLINGS * self.length * each
 
-    def _look(self, rung: int, length: int) -> None:
-        """At least so many points of each scrambling at a tolerance."""
+    def _look(self, rung: int) -> None:
+        """As many points of each scrambling at a tolerance as pairs are made of."""
         known = self._pairs.get(rung, np.empty((len(self._designs), SCRAMBLINGS, 0)))
         there = known.shape[2]
-        if there < length:
-            more, each = self._pairs_of(rung, there, length - there)
-            before = there * self._evaluations.get(rung, 0.0)
-            self._pairs[rung] = np.concatenate([known, more], axis=2)
-            self._evaluations[rung] = (before + (length - there) * each) / length
+        more, each = self._pairs_of(rung, there, self.length - there)
+        before = there * self._evaluations.get(rung, 0.0)
+        self._pairs[rung] = np.concatenate([known, more], axis=2)
+        self._evaluations[rung] = (before + (self.length - there) * each) / self.length
 
     def _pairs_of(self, rung: int, first: int, length: int) -> tuple[Array, float]:
         """Objectives and evaluations, from those that are there already as far as they go."""
