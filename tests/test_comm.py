@@ -136,6 +136,7 @@ ERRORS = [
     "call on root",
     "call on a rank",
     "call on a rank, root busy",
+    "call on a rank, root late",
     "import on a rank",
     "first on node",
     "payload",

@@ -98,14 +98,14 @@ def _watch(ranks: Ranks) -> Watch:
         )
         if ranks.is_root:
             mail.tell_itself(
-                Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", None))
+                Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
             )
             return
         if rank == ranks.mail.neighbours[0]:  # root, or the way to it
             _say(f"{text}. Rank {ranks.rank} on {socket.gethostname()} ends")
             stop.leave_within(0.0, Exit.FAILED)
         else:
-            mail.send(0, Tag.ERROR, (f"{text}. What was finished is saved", None))
+            mail.send(0, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
 
     def orphaned() -> None:
         stop.request("the process that started it is gone")
@@ -223,7 +223,7 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
 
 def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     """Run the program, say how it ended, and send the others home with the same exit code."""
-    text = ""
+    text = told = ""
     try:
         code = program(ranks) or Exit.DONE
     except Stopped as error:
@@ -233,21 +233,25 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     except StorageError as error:
         code, text = Exit.FAILED, f"Error: {error}"
     except RankFailed as error:
-        code, text = Exit.FAILED, str(error)
+        code, told = error.code, str(error)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
     except BaseException as error:  # noqa: BLE001 - the rank boundary
         user_error = isinstance(mendable(error), InputError)
         code = Exit.BAD_INPUT if user_error else Exit.FAILED
         text = _report(ranks, error)
-    if text:
+    if text or told:
         ranks.stop_switch.told = True
+    if text:
         _say(text)
-    return _dismiss(ranks, int(code))
+    return _dismiss(ranks, int(code), told)
 
 
-def _dismiss(ranks: Ranks, code: int) -> int:
-    """Tell the others to leave; after a failure those who do not listen are ended."""
+def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
+    """Tell the others to leave; after a failure those who do not listen are ended.
+
+    What another rank told is said last: who found root deaf says it itself, does not leave, and ends the job.
+    """
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
     ranks.mail.tell_others(Tag.LEAVE, code)
@@ -257,12 +261,14 @@ def _dismiss(ranks: Ranks, code: int) -> int:
         message = ranks.mail.poll()
         if message is None:
             if code != Exit.DONE and time.monotonic() > patience:
-                ranks.mail.abort(code)
+                _say_and_abort(ranks, told, code)
             nap.take()
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
-            _say_and_abort(ranks, str(message.body[0]), Exit.FAILED)
+            _say_and_abort(ranks, *message.body[:2])
+    if told:
+        _say(told)
     return code
 
 
@@ -283,17 +289,16 @@ def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
 def _tell_root(ranks: Ranks, error: BaseException) -> int:
     """Send a report and finished records to root; if root is deaf, report and end the job here."""
     known = isinstance(error, InputError)
-    report = error if known else _report(ranks, error)
-    ranks.mail.send(0, Tag.ERROR, (report, ranks.outbox()))
+    told = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
+    ranks.mail.send(0, Tag.ERROR, (*told, ranks.outbox()))
     patience, nap = time.monotonic() + 2.0, Nap()
     while time.monotonic() < patience:
         message = ranks.mail.poll()
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
         nap.take()
-    text = f"Error: {error}" if known else str(report)
-    _say_and_abort(ranks, text, Exit.BAD_INPUT if known else Exit.FAILED)
-    return Exit.FAILED
+    _say_and_abort(ranks, *told)
+    return told[1]
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:
@@ -310,9 +315,10 @@ def _report(ranks: Ranks, error: BaseException) -> str:
 
 
 def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
-    """Report, and end every rank."""
-    _say(text)
-    time.sleep(0.3)  # an abort may overtake what the launcher has not passed on to the user yet
+    """Report, if there is anything to say, and end every rank."""
+    if text:
+        _say(text)
+        time.sleep(0.3)  # an abort may overtake what the launcher has not passed on to the user yet
     ranks.mail.abort(code)
 
 

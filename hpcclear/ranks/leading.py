@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Desk, HandOut, Kept, Need, Points
@@ -203,7 +202,7 @@ class RootLead(Lead):
             elif until is None:
                 self._answer(message)
             else:  # one failure is on its way up already: the records count, not another report
-                with contextlib.suppress(RankFailed, InputError):
+                with contextlib.suppress(RankFailed):
                     self._answer(message)
 
     def _book_times(self, times: list[tuple[int, float, float]]) -> None:
@@ -213,7 +212,7 @@ class RootLead(Lead):
     def _hear_more(self, message: Message) -> None:
         if message.tag == Tag.ERROR:
             self._present.discard(message.source)
-            self._accept(message.body[1])
+            self._accept(message.body[2])
         self._ranks.heed(message)
 
     def _accept(self, records: np.ndarray | None) -> None:

@@ -34,7 +34,18 @@ class Stopped(Exception):
 
 
 class RankFailed(Exception):
-    """Another rank met a program error; the text is its report."""
+    """Another rank cannot go on: bad input or a program error; the text is its report.
+
+    Parameters
+    ----------
+    report : str
+    code : int, optional
+        Exit code that follows of it.
+    """
+
+    def __init__(self, report: str, code: int = Exit.FAILED) -> None:
+        super().__init__(report)
+        self.code = code
 
 
 class StopSwitch:

@@ -15,7 +15,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
@@ -117,7 +116,7 @@ class Ranks:
 
         Raises
         ------
-        RankFailed, InputError
+        RankFailed
             If another rank has failed.
         """
         while (message := self.mail.poll()) is not None:
@@ -178,7 +177,7 @@ class Ranks:
         ------
         Stopped
             If asked to end early; `on_records` got everything that was finished, `save` may be due.
-        RankFailed, InputError
+        RankFailed
             If another rank failed; likewise.
         """
         earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
@@ -214,7 +213,7 @@ class Ranks:
         ------
         Stopped
             If asked to end early.
-        RankFailed, InputError
+        RankFailed
             If another rank failed.
         """
         with self._timed(name) as spent:
@@ -264,8 +263,7 @@ class Ranks:
         if message.tag == Tag.STOP:
             self.stop_switch.request(message.body)
         elif message.tag == Tag.ERROR:
-            report, _ = message.body
-            raise report if isinstance(report, InputError) else RankFailed(report)
+            raise RankFailed(*message.body[:2])
 
     def make_desk(self, task: Task) -> tuple[Desk, float]:
         """This rank's worker, and the seconds it took to make it."""
