@@ -11,8 +11,9 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import SCRAMBLINGS, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student, surely_less
+from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.statistics.search.infill import NEAR, TwoScales, proposals
+from hpcclear.statistics.search.infill import NEAR, TwoScales, believed_ends, proposals
 from hpcclear.study import refinement, truth
 from hpcclear.study.optimisation import Choice
 
@@ -265,6 +266,69 @@ def test_proposals_find_the_least_of_both(seed):
     steps = abs(designs[:, None] - designs) / (BOUNDS[:, 1] - BOUNDS[:, 0])
     apart = steps.max(axis=2)[np.triu_indices(len(designs), 1)]
     assert apart.min() > NEAR
+
+
+def test_the_least_of_values_with_errors_is_what_all_of_them_make_it():
+    """Means over 40 sets: the design of the least value is a lucky one, farther off than what a model believes."""
+    off = np.zeros((40, 2))
+    for k in range(len(off)):
+        rng = np.random.default_rng(k)
+        designs = BOUNDS[:, 0] + rng.random((60, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+        along = (designs[:, 0] - 0.3) ** 2
+        values = np.column_stack([along + 0.02 * rng.standard_normal(60), designs[:, 0]])
+        (row, other) = believed_ends(designs, values, BOUNDS, rng, None)
+        off[k] = along[row], along[values[:, 0].argmin()]
+        assert abs(designs[other, 0] - designs[:, 0].min()) < 0.02  # without errors it is the least
+    assert off[:, 0].mean() < 0.5 * off[:, 1].mean()
+
+
+def test_what_breaks_a_constraint_is_not_believed_to_be_an_end():
+    rng = np.random.default_rng(3)
+    designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = designs[:, :1]
+    (free,) = believed_ends(designs, values, BOUNDS, rng, None)
+    (kept,) = believed_ends(designs, values, BOUNDS, rng, 0.5 - designs[:, 0])
+    assert designs[free, 0] < 0.1
+    assert 0.5 <= designs[kept, 0] < 0.6
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_more_is_looked_for_near_each_end(seed):
+    """Within a tenth of each range, and by the bolder belief where the other one rules out no less (candidates are drawn)."""
+    rng = np.random.default_rng(seed)
+    designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    models = [TwoScales(designs, column, BOUNDS, rng) for column in rippled(designs).T]
+    ends = [int(model.predict(designs).argmin()) for model in models]
+    found = infill._about(models, designs, ends, BOUNDS, rng)
+    assert found.shape == (2 * len(infill.NEARBY), 2)
+    assert ((found >= BOUNDS[:, 0]) & (found <= BOUNDS[:, 1])).all()
+    reach = 1.001 * infill.LOCAL * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    assert (abs(found - designs[ends * 2]) <= reach).all()
+    for k, model in enumerate(models):
+        careful, bold = model.predict(found[[k, k + 2]])
+        assert careful <= model.predict(designs[ends])[k] + 5e-3
+        own, other = np.sqrt(model.variance(found[[k + 2, k]]))
+        assert bold - 3.0 * own <= careful - 3.0 * other + 5e-3
+
+
+def test_small_steps_that_a_search_wins_count_together():
+    scene = load_scene(ROBUST)
+    run = SimpleNamespace(scene=scene, study=scene.required_study)
+    (case, *_) = (one.name for one in scene.required_study.cases)
+    share = scene.required_study.verification.accuracy.deviation
+    names = scene.required_study.design_variables(case)
+
+    def met(steps):
+        tables = [np.array([[1.0, (1.0 - step * share)]]) for step in steps]
+        nothing = np.zeros((1, len(names)))
+        return [refinement.Tried(names, nothing, table, np.full(1, -1.0)) for table in tables]
+
+    assert not refinement._stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
+    assert refinement._stands(run, case, met([0.0, 0.3, 0.6, 0.9]))
+    small = met([0.0, 0.4, 0.8, 1.2])
+    assert not refinement._stands(run, case, small)
+    assert refinement._won(run, case, small) == "still lowered the least deviation by 0.6%"
+    assert refinement._stands(run, case, met([0.0, 2.0, 2.0, 2.0, 2.0]))
 
 
 def test_too_few_designs_for_a_model_are_refused():

@@ -162,10 +162,10 @@ def test_each_solution_knows_all_three(study: Path) -> None:
 
 
 def test_the_search_counts_what_it_takes(study: Path) -> None:
-    """The expected counts know three ends: two swarm's designs, a runner-up and a response each."""
+    """The expected counts know three ends: two swarm's designs, a runner-up, a believed one and a response each."""
     two = 'study.cases={three={random=["C"]}}'
     here, there = (extent.samples_of(scene, 64) for scene in (scene_of(), scene_of(two)))
-    assert here["verification"] - there["verification"] == (2 + 1) * 64
+    assert here["verification"] - there["verification"] == (2 + 2) * 64
     assert here["check"] - there["check"] == 2 * 64
     assert extent.responses_of(scene_of()) - extent.responses_of(scene_of(two)) == 3
     assert (study / "responses" / "three_gamma.nc").exists()

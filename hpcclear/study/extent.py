@@ -49,7 +49,7 @@ def _of_stages(scene: Scene, each: int | None = None) -> dict[str, int]:
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
     count = truth.expected(study.verification) if each is None else each
     if study.verification.infill_rounds:
-        verified += ends_in_all(study)  # runners-up
+        verified += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
     begun, rounds = refinement.simulations(study)
     return {
         "wear": lives.simulations(scene),

@@ -6,6 +6,7 @@ is simulated; models of the moments themselves say where to look next, until som
 win nothing or all are spent.
 """
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,7 +20,7 @@ from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.scene.study import Study
-from hpcclear.statistics.search.infill import proposals
+from hpcclear.statistics.search.infill import believed_ends, eligible, proposals
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.study import truth
 from hpcclear.study.goals import excess, most_of, wanted
@@ -30,7 +31,7 @@ RAYS = 6
 """Designs along each design variable, through a design of the swarm, beside the swarm's."""
 
 PATIENCE = 3
-"""Rounds in a row that win nothing, after which a front stands."""
+"""Rounds in a row that win nothing together, after which a front stands."""
 
 
 @dataclass
@@ -57,10 +58,7 @@ class Tried:
     def best(self) -> Array:
         """Numbers of the designs that no other one dominates, of those that keep the constraints; if none does, of the one that
         comes nearest."""
-        known = np.isfinite(self.values).all(axis=1) & ~np.isnan(self.excess)
-        if known.any():
-            known &= self.excess <= max(self.excess[known].min(), 0.0)
-        rows = np.flatnonzero(known)
+        rows = np.flatnonzero(eligible(self.values, self.excess))
         return rows[moocore.is_nondominated(self.values[rows])]
 
 
@@ -98,30 +96,36 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
     if run.study.verification.infill_rounds == 0:
         return [], []
     begun = run.stage("check-0", _begin, start)
-    tried = {case.name: _tried(run, case.name, begun, None) for case in run.study.cases}
-    won = {name: [""] for name in tried}
+    met = {case.name: [_tried(run, case.name, begun, None)] for case in run.study.cases}
     for round_ in range(run.study.verification.infill_rounds):
-        going = {name: tried[name] for name in tried if not _stands(won[name])}
+        going = {name: its[-1] for name, its in met.items() if not _stands(run, name, its)}
         if not going:
             break
         stage = f"infill-{round_}"
         found = run.stage(stage, _go_on, going, stage)
         for name, before in going.items():
-            tried[name] = _tried(run, name, found, before)
-            won[name].append(_won(run, name, before, tried[name]))
+            met[name].append(_tried(run, name, found, before))
     remarks = [
-        f"The search of {name} ended with its rounds while {rounds[-1]}; more "
+        f"The search of {name} ended with its rounds while the last {_counted(its)} {won}; more "
         "study.verification.infill_rounds may still win."
-        for name, rounds in won.items()
-        if rounds[-1]
+        for name, its in met.items()
+        if (won := _won(run, name, its))
     ]
     named = [choice for choice in start if choice.name]
-    return [one for name in tried for one in _finalists(run, name, tried[name], named)], remarks
+    return [
+        one for name, its in met.items() for one in _finalists(run, name, its[-1], named)
+    ], remarks
 
 
-def _stands(won: Sequence[str]) -> bool:
-    """Whether a front stands, from what each round won."""
-    return len(won) > PATIENCE and not any(won[-PATIENCE:])
+def _stands(run: StudyRun, name: str, met: Sequence[Tried]) -> bool:
+    """Whether a front stands, from what was known after each round."""
+    return len(met) > PATIENCE and not _won(run, name, met)
+
+
+def _counted(met: Sequence[Tried]) -> str:
+    """How many rounds `_won` looks at, as one says it."""
+    rounds = min(len(met) - 1, PATIENCE)
+    return "one" if rounds == 1 else f"{rounds} together"
 
 
 def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
@@ -153,17 +157,22 @@ def _go_on(run: StudyRun, tried: Mapping[str, Tried], stage: str) -> Result:
     """One round of the cases that are not decided."""
     chosen = []
     for name, one in tried.items():
-        region = box(run.scene, one.names)
-        bounds = np.column_stack([region.lower, region.upper])
+        bounds = _bounds(run, one.names)
         count, rng = run.study.verification.infill_designs, run.rng(stage, name)
         try:
             broken = one.excess if run.study.case(name).kept else None
             where = proposals(one.coordinates, one.values, bounds, count, rng, broken)
         except InputError:  # too few designs that did not fail for a model
             unit = unit_lhs(count, len(one.names), rng)
-            where = region.lower + unit * (region.upper - region.lower)
+            where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
         chosen += _choices(run, name, where)
     return _simulated(run, chosen, stage)
+
+
+def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
+    """Of design variables, in sampling coordinates, (d, 2)."""
+    region = box(run.scene, names)
+    return np.column_stack([region.lower, region.upper])
 
 
 def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
@@ -221,17 +230,19 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
     )
 
 
-def _won(run: StudyRun, name: str, before: Tried, now: Tried) -> str:
-    """What a round has won, in words; empty if nothing by more than the accuracy asked for.
+def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
+    """What the last rounds have won together, in words; empty if nothing that counts.
 
-    Designs that only stand between those of the earlier front count for nothing.
+    That is the accuracy asked for: many small steps are one large one. Designs that only stand between those of the earlier
+    front count for nothing.
     """
+    before, now = met[max(len(met) - 1 - PATIENCE, 0)], met[-1]
     old, new = (one.values[one.best()] for one in (before, now))
     if not (len(old) and len(new)):
         return "no design had moments"
     broken = before.excess[before.best()].min()
     if broken > 0.0 and now.excess[now.best()].min() < broken:
-        return "the last one still came nearer to the constraints"
+        return "still came nearer to the constraints"
     case, accuracy = run.study.case(name), run.study.verification.accuracy
     shares, relative = zip(*(wanted(goal, accuracy) for goal in case.goals), strict=True)
     gains = _gains(old, new, relative)
@@ -240,10 +251,10 @@ def _won(run: StudyRun, name: str, before: Tried, now: Tried) -> str:
         gain = _gains(old.min(axis=0)[None], new.min(axis=0)[None], relative)[0, 0, column]
         if gain > shares[column]:
             words = goal.words(run.scene.objective.unit).removesuffix(" of f")
-            return f"the last one still lowered the least {words} by {gain:.1%}"
+            return f"still lowered the least {words} by {gain:.1%}"
     better = np.any(counts, axis=2) & np.all(gains >= 0.0, axis=2)
     moved = int(np.any(better, axis=1).sum())
-    return f"the last one still dominated {moved} of {len(old)} designs" if moved else ""
+    return f"still dominated {moved} of {len(old)} designs" if moved else ""
 
 
 def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
@@ -256,11 +267,18 @@ def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
 def _finalists(run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice]) -> list[Choice]:
     """The best designs of a case, well spread, for verification on scatter of its own; those of `verified` have it anyway.
 
-    Beside those of the front one for each end, since ends are chosen among designs that are nearly as good.
+    Beside those of the front one for each end, since ends are chosen among designs that are nearly as good, and what all
+    values together make the end: the least of them has luck.
     """
     best = tried.best()
     most = run.study.verification.designs + len(run.study.case(case).goals)
     kept = best[cut(tried.values[best], most)]
+    rng, broken = run.rng("finalists", case), tried.excess if run.study.case(case).kept else None
+    with contextlib.suppress(InputError):  # too few designs that did not fail for a model
+        believed = believed_ends(
+            tried.coordinates, tried.values, _bounds(run, tried.names), rng, broken
+        )
+        kept = np.unique(np.append(kept, believed))
     own = [list(choice.design.values()) for choice in verified if choice.case == case]
     return [
         choice

@@ -4,7 +4,9 @@ Each objective gets a model of two scales: Kriging over everything that is known
 short length scales over what that one leaves. On the moments of a mechanism with clearances
 one model alone took ripples of some percent, which decide the least deviation, for noise. Swarms search
 what the models expect and what they do not rule out (their mean less one, two, three standard deviations): the
-ends of what they find come first, then whatever lies farthest from all designs that are known.
+ends of what they find come first, then the same near the designs that are believed to be the ends, then whatever lies
+farthest from all designs that are known. Values have errors: believed of a design is what the model makes of all of them,
+not its own lucky one.
 
 Sources of the bound: D. D. Cox and S. John, "SDO: a statistical method for global optimization" (1997);
 N. Srinivas et al., ICML 2010, arXiv:0912.3995; of two scales S. Ba and V. R. Joseph, "Composite Gaussian process models for
@@ -15,13 +17,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 BOLD = (0.0, 1.0, 2.0, 3.0)
 """Standard deviations below the mean that each swarm believes in."""
+
+NEARBY = 1.0, 3.0
+"""The same, near the designs that are believed to be the ends."""
+
+LOCAL, CANDIDATES = 0.1, 512
+"""How near that is, as a part of each range, and how many designs are looked at."""
 
 ITERATIONS, PARTICLES = 30, 32
 SHORT = (0.02, 0.3)
@@ -113,16 +121,66 @@ def proposals(
         fronts = [
             front for front in fronts if len(front.points)
         ]  # none where nothing keeps the constraints
+        least = _least(models[: values.shape[1]], designs, eligible(values, excess))
+        near = _about(models, designs, least, bounds, rng)
     if not fronts:
         assert excess is not None  # only constraints leave a front without designs
-        near = _nearer(designs, excess, bounds, rng)
-        return _chosen(designs[:0], near, designs, bounds, count, count)
-    ends = np.concatenate([front.points[front.values.argmin(axis=0)] for front in fronts])
+        about = _nearer(designs, excess, bounds, rng)
+        return _chosen(designs[:0], about, designs, bounds, count, count)
+    told = [front.points[front.values.argmin(axis=0)] for front in fronts]
+    ends = np.concatenate([told[0], near, told[-1]])
     others = np.concatenate([front.points for front in fronts])
     most = (
         count if values.shape[1] == 2 else count // 2
     )  # between the ends of a surface there is more
     return _chosen(ends, others, designs, bounds, count, most)
+
+
+def eligible(values: Array, excess: Array | None) -> Booleans:
+    """Which designs may be the best: those whose objectives are known, and that keep the constraints; if none does, those
+    that come nearest. `values` (n, m), `excess` (n,), as `proposals` takes them."""
+    known = np.asarray(np.isfinite(values).all(axis=1))
+    if excess is not None:
+        known &= ~np.isnan(excess)
+        known &= excess <= max(excess[known].min(initial=np.inf), 0.0)
+    return known
+
+
+def believed_ends(
+    designs: Array, values: Array, bounds: Array, rng: np.random.Generator, excess: Array | None
+) -> list[int]:
+    """Of each objective the evaluated design that its model takes for the least; parameters and errors of `proposals`."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        models = [TwoScales(designs, column, bounds, rng) for column in values.T]
+        return _least(models, designs, eligible(values, excess))
+
+
+def _least(models: Sequence[TwoScales], designs: Array, allowed: Booleans) -> list[int]:
+    """Of each model the design that it takes for the least."""
+    found = [model.predict(designs) for model in models]
+    return [int(np.where(allowed, one, np.inf).argmin()) for one in found]
+
+
+def _about(
+    models: Sequence[TwoScales],
+    designs: Array,
+    ends: Sequence[int],
+    bounds: Array,
+    rng: np.random.Generator,
+) -> Array:
+    """Near the design that is believed to be the end of each objective, the least that may be there, by each of `NEARBY`."""
+    width = bounds[:, 1] - bounds[:, 0]
+    found = []
+    for boldness in NEARBY:
+        for column, row in enumerate(ends):
+            steps = LOCAL * width * rng.uniform(-1.0, 1.0, (CANDIDATES, len(width)))
+            points = np.clip(designs[row] + steps, bounds[:, 0], bounds[:, 1])
+            told = _believed(models, boldness, len(ends))(points)
+            least, broken = told if isinstance(told, tuple) else (told, np.zeros(len(points)))
+            found.append(points[np.lexsort((least[:, column], broken))[0]])
+    return np.array(found)
 
 
 def _nearer(
