@@ -80,7 +80,9 @@ def test_simulations_of_a_study_are_counted():
     assert counted(10_000, 0) - counted(10, 0) == designs * 9_990
     rays, swarm = 2 * 6 * 4, 2 * (4 + verified.designs)
     search = rays + swarm + 2 * 3 * verified.infill_designs
-    beside = 2 * 2 * 2 * (10_000 + 2 * chaos.PAIRS)  # runners-up, and what is believed to be the ends
+    beside = (
+        2 * 2 * 2 * (10_000 + 2 * chaos.PAIRS)
+    )  # runners-up, and what is believed to be the ends
     assert counted(10_000, 3) - counted(10_000, 0) == search * verified.infill_samples + beside
 
 

@@ -106,10 +106,10 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
         for name, before in going.items():
             met[name].append(_tried(run, name, found, before))
     remarks = [
-        f"The search of {name} ended with its rounds while the last {_counted(its)} {won}; more "
+        f"The search of {name} ended with its rounds while the last one {won}; more "
         "study.verification.infill_rounds may still win."
         for name, its in met.items()
-        if (won := _won(run, name, its))
+        if not _stands(run, name, its) and (won := _won(run, name, its[-2:]))
     ]
     named = [choice for choice in start if choice.name]
     return [
@@ -119,13 +119,7 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
 
 def _stands(run: StudyRun, name: str, met: Sequence[Tried]) -> bool:
     """Whether a front stands, from what was known after each round."""
-    return len(met) > PATIENCE and not _won(run, name, met)
-
-
-def _counted(met: Sequence[Tried]) -> str:
-    """How many rounds `_won` looks at, as one says it."""
-    rounds = min(len(met) - 1, PATIENCE)
-    return "one" if rounds == 1 else f"{rounds} together"
+    return len(met) > PATIENCE and not _won(run, name, met[-1 - PATIENCE :])
 
 
 def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
@@ -231,12 +225,12 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
 
 
 def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
-    """What the last rounds have won together, in words; empty if nothing that counts.
+    """What was won from the first to the last of what was known, in words; empty if nothing that counts.
 
     That is the accuracy asked for: many small steps are one large one. Designs that only stand between those of the earlier
     front count for nothing.
     """
-    before, now = met[max(len(met) - 1 - PATIENCE, 0)], met[-1]
+    before, now = met[0], met[-1]
     old, new = (one.values[one.best()] for one in (before, now))
     if not (len(old) and len(new)):
         return "no design had moments"
