@@ -122,7 +122,7 @@ def proposals(
             front for front in fronts if len(front.points)
         ]  # none where nothing keeps the constraints
         least = _least(models[: values.shape[1]], designs, eligible(values, excess))
-        near = _about(models, designs, least, bounds, rng)
+        near = _about(models, designs, least, bounds, rng) if fronts else designs[:0]
     if not fronts:
         assert excess is not None  # only constraints leave a front without designs
         about = _nearer(designs, excess, bounds, rng)
