@@ -32,7 +32,9 @@ FILES = {
     "hpcclear/below.py": "number: int = 1\n",
     "tests/test_one.py": "def test_one():\n    assert True\n",
 }
-STEPS = ("tests, serial and under mpiexec", "lint", "format", "types", "layers")
+TESTS = "tests, serial and under mpiexec"
+STEPS = (TESTS, "lint", "format", "types", "layers")
+ALL_TYPES = "types, every locked Python"
 FAULTS = {
     (): {},
     ("lint",): {"hpcclear/below.py": "import os\n\nnumber: int = 1\n"},
@@ -74,10 +76,26 @@ def test_every_step_runs_and_the_table_names_the_red_ones(red, tmp_path):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     code, output, rows = run(tmp_path)
-    assert code == bool(red), output
+    assert code == (TESTS in red), output
     expected = {"set-up": "ok"} | {name: "RED" if name in red else "ok" for name in STEPS}
     assert rows == expected, output
     assert re.search(r"^1 (passed|failed) in ", output, re.MULTILINE), output
+    assert ("concerns developers only" in output) == (red == ("lint",))
+
+
+@pytest.mark.parametrize("wrong", ["lint", ALL_TYPES])
+def test_what_lands_is_decided_by_every_step_and_every_locked_python(wrong, tmp_path):
+    faults = FAULTS[("lint",)] if wrong == "lint" else {}
+    for name, text in faults.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "tests").mkdir(exist_ok=True)
+    (tmp_path / "tests" / "types.sh").write_text(f"exit {int(wrong == ALL_TYPES)}\n")
+    code, output, rows = run(tmp_path, "--strict")
+    assert code == 1, output
+    assert [name for name, result in rows.items() if result == "RED"] == [wrong], output
+    assert ALL_TYPES in rows
+    assert "--strict" in (HERE.parent / ".ci" / "run").read_text()
 
 
 @pytest.mark.parametrize("words", ["return 3", "exit 2", "no-such-command"])

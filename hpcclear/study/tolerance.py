@@ -67,7 +67,8 @@ def _verify(run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice
             if ladder.finish(rung, range(len(designs))):
                 continue  # other designs may be the ends
             worst = np.max(list(taken.values()), axis=0, initial=0.0)
-            return true | {"rung": rung, "ends": worst, "pairs_evaluations": ladder.spent}
+            spent = np.asarray(ladder.spent)
+            return true | {"rung": np.asarray(rung), "ends": worst, "pairs_evaluations": spent}
         ladder.finish(rung, fresh)
         # what samples leave, at least the split's share: where `most_samples` ended them no tolerance makes up for it
         reach = reach_of(ladder.told(rung))[fresh]

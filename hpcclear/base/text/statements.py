@@ -2,7 +2,6 @@
 
 import ast
 import copy
-import sys
 from typing import Any
 
 import numpy as np
@@ -83,10 +82,9 @@ class Writer(Expressions):
         also = {p: self.opened(value, p, leaves) for p, value in sorted(named.items())}
         scope = self.scope_of(plain, given, also)
         self.several(tail_form(node.body), scope)
-        holder = ast.arguments([], [ast.arg(a) for a in leaves], None, [], [], None, [])
-        made = ast.FunctionDef(name, holder, self.block or [ast.Pass()], [], None, None)
-        if sys.version_info >= (3, 12):
-            made.type_params = []
+        made = ast.parse(f"def {name}({', '.join(leaves)}): pass").body[0]
+        assert isinstance(made, ast.FunctionDef)
+        made.body = self.block or made.body
         self.shared.functions.append((made, self.kind))
 
     def write_out(self, function: Any, arguments: list[Value], named: dict[str, Value]) -> Value:

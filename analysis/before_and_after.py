@@ -1,0 +1,93 @@
+"""Is this checkout slower than an earlier commit? Ensembles of several scenes, both sources in turn, ratios pair by pair.
+
+    python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about ten minutes
+    python analysis/before_and_after.py 1386e2f --pairs 15 --designs 512
+
+Each source has one process, which compiles first and is not timed then; processor time of `evaluate` counts. A line per scene
+says the median of the ratios, new over old, and their lower and upper quarter.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from same_bytes import ROOT, sources
+
+LINKAGES = "linkages/"
+CASES = {
+    "Lankarani-Nikravesh": ("slider_crank", {"C": (3e-4, 1e-3)}),
+    "Hunt-Crossley": ("hunt_crossley", {"C": (3e-4, 1e-3)}),
+    "V-twin": (f"{LINKAGES}v_twin", {"C": (2e-5, 8e-5)}),
+    "crank-rocker, masses": (f"{LINKAGES}crank_rocker", {"mass": (0.2, 0.4), "C": (5e-5, 3e-4)}),
+    "crank-rocker, length": (f"{LINKAGES}crank_rocker", {"coupler": (0.115, 0.125), "C": (5e-5, 3e-4)}),
+}  # fmt: skip
+"""Scenes of `jobs/`, and the ranges that their designs are drawn from, SI."""
+
+
+def work(designs: int) -> None:
+    """Answer each line, a case, with the processor time of its ensemble, s."""
+    import hpcclear
+
+    for line in sys.stdin:
+        name, ranges = CASES[line.rstrip("\n")]
+        scene = hpcclear.load_scene(ROOT / "jobs" / f"{name}.toml", [])
+        dice = np.random.default_rng(1)
+        points = {key: dice.uniform(*ends, designs) for key, ends in ranges.items()}
+        start = time.process_time()
+        hpcclear.evaluate(scene, points)
+        print(time.process_time() - start, flush=True)
+
+
+class Worker:
+    """A process with the package below `root`."""
+
+    def __init__(self, root: Path, designs: int) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, "--worker", "--designs", str(designs)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(root)},
+        )
+
+    def seconds(self, case: str) -> float:
+        """Processor time of one ensemble."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(case, file=self._process.stdin, flush=True)
+        return float(self._process.stdout.readline())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("commit", nargs="?")
+    parser.add_argument("--pairs", type=int, default=7)
+    parser.add_argument("--designs", type=int, default=256)
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    words = parser.parse_args()
+    if words.worker:
+        return work(words.designs)
+    with tempfile.TemporaryDirectory() as place:
+        old = Worker(sources(words.commit, Path(place) / "before"), words.designs)
+        new = Worker(ROOT, words.designs)
+        print(f"{'scene':24s} {'before, s':>10s} {'ratio':>7s} {'quarters':>14s}")
+        for case in CASES:
+            old.seconds(case), new.seconds(case)  # compile
+            pairs = [(old.seconds(case), new.seconds(case)) for _ in range(words.pairs)]
+            before, after = np.array(pairs).T
+            low, middle, high = np.quantile(after / before, (0.25, 0.5, 0.75))
+            print(
+                f"{case:24s} {np.median(before):10.3f} {middle:7.3f} {low:7.3f}-{high:.3f}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
