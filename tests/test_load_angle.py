@@ -1,0 +1,194 @@
+"""Tables of loads and torques are taken at the angle of the drive's body: from the x axis, counter-clockwise, start included.
+
+The oracle is virtual work by kinematics of its own, complex numbers and scipy's monotone cubic: a load that depends on the
+drive's angle alone has done U(angle) - U(start), however the angle got there.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from hpcclear import load_scene, simulate
+from hpcclear.report.figures import motion
+from hpcclear.report.figures.portraits import poincare_figure
+from hpcclear.report.figures.response import response_figure
+from hpcclear.report.html.picture import frames
+
+TURN = 2 * math.pi
+STARTS = [math.radians(angle) for angle in (-70.0, 20.0, 115.0, 230.0, 400.0)]
+WAYS = (1, -1)
+SECONDS = 0.5  # of a turn, or of a swing to and fro
+PLAY = 1e-6  # m: works then are off by the load times this, and what the contact gives way
+CRANK, COUPLER, ROCKER, FOOT = 0.04, 0.12, 0.08, complex(0.13, 0.01)
+PUSH = ((0.1, -60.0), (1.2, 90.0), (2.0, 15.0), (3.5, -40.0), (5.0, 10.0))  # rad, N
+TWIST = ((0.0, 1.0), (0.9, -2.0), (2.5, 3.0), (4.0, 0.5))  # rad, N m
+LEAN = 0.7  # direction of the force, rad
+MATERIAL = {"youngs_modulus": 2e11, "poisson_ratio": 0.3}
+SURFACES = {"bearing_radius": 0.01, "materials": {"bearing": MATERIAL, "journal": MATERIAL}}
+
+
+# ---- the oracle ----------------------------------------------------------------------------------------
+
+
+def curve(rows, turns=1):
+    """A periodic table as a function of an angle."""
+    rows, span = sorted(rows), TURN * turns
+    x, y = np.array([(a + k * span, v) for k in (-1, 0, 1) for a, v in rows]).T
+    smooth = PchipInterpolator(x, y)
+    return lambda angle: smooth(rows[0][0] + np.mod(angle - rows[0][0], span))
+
+
+def four_bar(angle, a=CRANK, b=COUPLER, c=ROCKER, foot=FOOT, tip=complex(0.06, 0.05)):
+    """Tip of the coupler, angles of coupler and rocker, at angles of the crank."""
+    pin = a * np.exp(1j * np.asarray(angle))
+    way = foot - pin
+    far = np.abs(way)
+    along = (b * b - c * c + far * far) / (2 * far)
+    top = pin + way / far * (along + 1j * np.sqrt(b * b - along * along))
+    coupler = np.angle(top - pin)
+    return pin + tip * np.exp(1j * coupler), coupler, np.angle(top - foot)
+
+
+def worked(loads, angle, places, turns=1):
+    """U(angle) - U(angle[0]) of tables; `places(angle)`: what each load moves, along its direction."""
+    fine = np.linspace(angle.min() - 0.1, angle.max() + 0.1, 40_001)
+    middle = 0.5 * (fine[1:] + fine[:-1])
+    moved = zip(loads, places(fine), strict=True)
+    steps = sum(curve(rows, turns)(middle) * np.diff(place) for rows, place in moved)
+    done = np.interp(angle, fine, np.concatenate([[0.0], np.cumsum(steps)]))
+    return done - done[0]
+
+
+def four_bar_works(angle, push=PUSH, twist=TWIST, lean=LEAN, turns=1, **sizes):
+    """Work of the force at the four-bar's tip and of the torque on its rocker, at angles of its crank."""
+
+    def places(fine):
+        tip, _, rocker = four_bar(fine, **sizes)
+        return (tip * np.exp(-1j * lean)).real, np.unwrap(rocker)
+
+    return worked((push, twist), angle, places, turns)
+
+
+# ---- scenes --------------------------------------------------------------------------------------------
+
+
+def drive(kind, way, start, body="crank"):
+    """A drive, its angle as a function of time, and where it starts; a free one has none."""
+    rate = way * TURN / SECONDS
+    if kind == "constant":
+        return {"kind": "constant-speed", "body": body, "speed": rate}, lambda t: start + rate * t
+    if kind == "harmonic":
+        phase = 0.4 if way > 0 else math.pi + 0.4
+        swing = {"amplitude": 2.5, "frequency": 1 / SECONDS, "mean": start - 2.5 * math.sin(phase)}
+        made = {"kind": "harmonic", "body": body, "phase": phase, **swing}
+        return made, lambda t: swing["mean"] + 2.5 * np.sin(abs(rate) * t + phase)
+    if kind == "table":
+
+        def given(t):
+            return start + way * (TURN * t / SECONDS + 0.4 * np.sin(TURN * t / SECONDS))
+
+        times = np.linspace(0.0, SECONDS, 181)
+        rows = [[float(t), float(given(t))] for t in times]
+        return {"kind": "table", "body": body, "angle": rows}, given
+    assert kind == "torque"
+    torque = [[angle, 2.0 + value] for angle, value in TWIST]
+    made = {"kind": "torque", "body": body, "torque": torque, "initial_speed": TURN / SECONDS}
+    return {**made, "flywheel_inertia": 0.5}, None
+
+
+def bar(length, start, **more):
+    """A slender bar of steel, light enough to be of no account."""
+    return {"length": float(length), "mass": 0.1, "inertia": 1e-4, "start_angle": float(start), **more}
+
+
+def pin(journal, bearing, play=0.0):
+    """A pin between two places."""
+    kind = {"kind": "clearance", "clearance": play, **SURFACES} if play else {"kind": "revolute"}
+    return {**kind, "journal": journal, "bearing": bearing}
+
+
+def scene_of(bodies, joints, drives, loads, ground, *, revolutions=1, **numerics):
+    """A scene without gravity or friction; stiff contacts are damped, so that little rattles."""
+    play = any(joint["kind"] == "clearance" for joint in joints.values())
+    return load_scene(
+        {
+            "format_version": 2,
+            "mechanism": {
+                "kind": "planar", "bodies": bodies, "joints": joints, "drives": drives, "loads": loads,
+                "ground": {"points": ground},
+            },
+            "effects": {"contact": {"law": "hunt-crossley", "damping": 5.0}} if play else {},
+            "numerics": {
+                "rtol": 1e-6, "method": "tsitouras", "transient_revolutions": 0,
+                "averaged_revolutions": revolutions, **numerics,
+            },
+            "output": {"instants_per_revolution": 120},
+        }
+    )  # fmt: skip
+
+
+def bars(start, play, a=CRANK, b=COUPLER, c=ROCKER, foot=FOOT, tip=complex(0.06, 0.05)):
+    """Bodies, joints and ground of the four-bar, its crank at an angle."""
+    _, coupler, rocker = four_bar(start, a, b, c, foot, tip)
+    bodies = {
+        "crank": bar(a, start),
+        "coupler": bar(b, coupler, points={"tip": [tip.real, tip.imag]}),
+        "rocker": bar(c, rocker),
+    }
+    joints = {
+        "o1": pin("crank.a", "ground.o"),
+        "o2": pin("crank.b", "coupler.a", play),
+        "o3": pin("coupler.b", "rocker.b"),
+        "o4": pin("rocker.a", "ground.p"),
+    }
+    return bodies, joints, {"o": [0.0, 0.0], "p": [foot.real, foot.imag]}
+
+
+def pushed(push=PUSH, twist=TWIST, lean=LEAN):
+    """The four-bar's loads."""
+    force = {"kind": "force", "place": "coupler.tip", "size": [*map(list, push)], "direction": lean}
+    return {"push": force, "twist": {"kind": "torque", "body": "rocker", "torque": [*map(list, twist)]}}
+
+
+def linkage(kind, way, start, play, **more):
+    """The four-bar under its loads, and its drive's angle over time."""
+    made, angle = drive(kind, way, start)
+    bodies, joints, ground = bars(start, play)
+    return scene_of(bodies, joints, {"motor": made}, pushed(), ground, **more), angle
+
+
+def closes(response, right, play=0.0, largest_load=90.0):
+    """The loads have done at every instant what virtual work says, to the play and to sums over 120 instants."""
+    assert int(response["status"]) == 0
+    found, largest = response["load_work"].to_numpy(), np.abs(right).max()
+    assert largest > 0.3  # J, or nothing is compared
+    room = 1e-3 * largest + 20 * play * largest_load
+    np.testing.assert_allclose(found, right, rtol=0, atol=room)
+    assert float(np.abs(response["energy_residual"]).max()) < 1e-3 * largest
+
+
+# ---- one machine, five starts, both ways round, every drive --------------------------------------------
+
+
+@pytest.mark.parametrize("play", [0.0, PLAY], ids=["ideal", "play"])
+@pytest.mark.parametrize("way", WAYS, ids=["ccw", "cw"])
+@pytest.mark.parametrize("kind", ["constant", "harmonic", "table"])
+def test_loads_are_taken_at_the_angle_of_the_drive_s_body(kind, way, play):
+    for start in STARTS:
+        scene, given = linkage(kind, way, start, play)
+        response = simulate(scene)
+        angle = given(response["time"].to_numpy())
+        closes(response, four_bar_works(angle), play)
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_free_body_s_torque_and_loads_too_and_its_revolution_is_a_whole_turn(start):
+    scene, _ = linkage("torque", 1, start, PLAY, revolutions=2)
+    response = simulate(scene)
+    angle = response["crank_angle"].to_numpy()
+    assert angle[[0, -1]] == pytest.approx([start, start + 2 * TURN], abs=1e-9)
+    closes(response, four_bar_works(angle), PLAY)
+    right = worked([[(a, 2.0 + value) for a, value in TWIST]], angle, lambda fine: (fine,))
+    np.testing.assert_allclose(response["driving_work"], right, rtol=0, atol=1e-4)
