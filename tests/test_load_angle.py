@@ -9,6 +9,8 @@ import math
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
+from test_linkage_scenes import slider_crank_pair
+from test_rest import REST
 
 from hpcclear import load_scene, simulate
 from hpcclear.report.figures import motion
@@ -192,3 +194,168 @@ def test_a_free_body_s_torque_and_loads_too_and_its_revolution_is_a_whole_turn(s
     closes(response, four_bar_works(angle), PLAY)
     right = worked([[(a, 2.0 + value) for a, value in TWIST]], angle, lambda fine: (fine,))
     np.testing.assert_allclose(response["driving_work"], right, rtol=0, atol=1e-4)
+
+
+# ---- bodies whose angle is not read off easily ---------------------------------------------------------
+
+
+RADIUS, PIVOT, TILT = 0.06, complex(0.02, 0.01), 0.6
+
+
+def on_its_line(angle):
+    """Distance along a line through 0 in a direction at which it meets the circle that a lever's end makes."""
+    along = (PIVOT * np.exp(-1j * np.asarray(angle))).real
+    return along + np.sqrt(RADIUS**2 - abs(PIVOT) ** 2 + along**2)
+
+
+@pytest.mark.parametrize("play", [0.0, PLAY], ids=["ideal", "play"])
+def test_a_driven_body_that_a_slide_holds_at_an_angle_has_its_own(play):
+    """A block on a carrier that it turns, its line 0.6 rad off the carrier's axis; a lever leads it."""
+    for start, way in zip(STARTS, (1, -1, 1, -1, 1), strict=True):
+        distance = float(on_its_line(start))
+        lever = np.angle(distance * np.exp(1j * start) - PIVOT)
+        bodies = {
+            "carrier": bar(0.05, start - TILT),
+            "block": {"mass": 0.1, "inertia": 1e-4, "points": {"pin": [0.0, 0.0]}, "start_angle": start},
+            "lever": bar(RADIUS, lever),
+        }
+        joints = {
+            "main": pin("carrier.a", "ground.o"),
+            "line": {"kind": "slide", "point": "block.pin", "line": "carrier.a", "angle": TILT},
+            "end": pin("lever.b", "block.pin", play),
+            "foot": pin("lever.a", "ground.p"),
+        }
+        made, given = drive("constant", way, start, "block")
+        push = {"kind": "force", "place": "lever.b", "size": [*map(list, PUSH)], "direction": LEAN}
+        ground = {"o": [0.0, 0.0], "p": [PIVOT.real, PIVOT.imag]}
+        response = simulate(scene_of(bodies, joints, {"motor": made}, {"push": push}, ground))
+        angle = given(response["time"].to_numpy())
+        np.testing.assert_allclose(response["crank_angle"], angle, rtol=0, atol=1e-9)
+        right = worked(
+            [PUSH], angle, lambda fine: ((on_its_line(fine) * np.exp(1j * (fine - LEAN))).real,)
+        )
+        closes(response, right, play)
+
+
+@pytest.mark.parametrize("play", [0.0, PLAY], ids=["ideal", "play"])
+def test_a_rotor_that_moves_nothing_gives_the_angle_all_the_same(play):
+    """It gives the period, another drive turns the crank three times as fast: series of both go on from turn to turn."""
+    for rotor, way, start in zip(STARTS, (1, -1, 1, -1, 1), reversed(STARTS), strict=True):
+        bodies, joints, ground = bars(start, play)
+        bodies["rotor"] = {"mass": 1.0, "inertia": 1e-3, "points": {"hub": [0.0, 0.0]}, "start_angle": rotor}
+        joints["bearing"] = pin("rotor.hub", "ground.o")
+        main, given = drive("constant", way, rotor, "rotor")
+        drives = {"main": main, "motor": {**main, "body": "crank", "speed": 3 * main["speed"]}}
+        scene = scene_of(bodies, joints, drives, pushed(twist=((0.0, 0.0), (1.0, 0.0))), ground, revolutions=2)
+        response = simulate(scene)
+        turned = given(response["time"].to_numpy()) - rotor
+
+        def places(fine, rotor=rotor, start=start):
+            tip = four_bar(start + 3 * (fine - rotor))[0]
+            return ((tip * np.exp(-1j * LEAN)).real,)
+
+        closes(response, worked([PUSH], rotor + turned, places), play)
+        for body, angle in (("rotor", rotor + turned), ("crank", start + 3 * turned)):
+            found = response["body_angle"].sel(body=body)
+            np.testing.assert_allclose(found, angle, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(response["crank_angle"], rotor + turned, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(response["crank_speed"], main["speed"], rtol=1e-9)
+        np.testing.assert_allclose(response["drive_phase"], abs(turned), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("play", [0.0, PLAY], ids=["ideal", "play"])
+def test_of_two_turns_the_angle_itself_says_which_it_is(play):
+    """The start angle begins the first turn, 360 deg more the second; clockwise the angle falls from there."""
+    push = [*PUSH, *((angle + TURN, -2 * size) for angle, size in PUSH)]
+    twist = [(2 * angle, size) for angle, size in TWIST]
+    for way in WAYS:
+        for start in (0.3, 0.3 + TURN, -4.0):
+            made, given = drive("constant", way, start)
+            bodies, joints, ground = bars(start, play)
+            made["turns"] = 2
+            response = simulate(scene_of(bodies, joints, {"motor": made}, pushed(push, twist), ground))
+            angle = given(response["time"].to_numpy())
+            assert abs(angle[-1] - start) == pytest.approx(2 * TURN)
+            np.testing.assert_allclose(response["crank_angle"], angle, rtol=0, atol=1e-9)
+            closes(response, four_bar_works(angle, push, twist, turns=2), play, 180.0)
+
+
+# ---- any four-bar --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_four_bars_under_random_tables(seed):
+    """Lengths by Grashof's condition, starts, ways round, drives and tables at random; every third with play."""
+    rng = np.random.default_rng(seed)
+    play = PLAY if seed % 3 == 0 else 0.0
+    a, (b, c), d = rng.uniform(0.02, 0.03), rng.uniform(0.06, 0.1, 2), rng.uniform(0.07, 0.09)
+    while a + max(b, c, d) > 0.95 * (b + c + d - max(b, c, d)):
+        b, c = rng.uniform(0.06, 0.1, 2)
+    sizes = {
+        "a": a, "b": b, "c": c, "foot": d * np.exp(1j * rng.uniform(0.2, 1.2)),
+        "tip": complex(*rng.uniform(0.02, 0.06, 2)),
+    }  # fmt: skip
+    places = np.arange(4) * TURN / 4 + rng.uniform(0.0, 0.7, (2, 4))
+    push = [(float(x), float(y)) for x, y in zip(places[0], rng.uniform(-150, 150, 4), strict=True)]
+    twist = [(float(x), float(y)) for x, y in zip(places[1], rng.uniform(-5, 5, 4), strict=True)]
+    start, way, lean = rng.uniform(-6, 6), int(rng.choice(WAYS)), rng.uniform(0.2, 1.4)
+    made, given = drive(str(rng.choice(["constant", "harmonic", "table"])), way, start)
+    bodies, joints, ground = bars(start, play, **sizes)
+    scene = scene_of(bodies, joints, {"motor": made}, pushed(push, twist, lean), ground)
+    response = simulate(scene.with_({"output.instants_per_revolution": 240}))
+    angle = given(response["time"].to_numpy())
+    np.testing.assert_allclose(response["crank_angle"], angle, rtol=0, atol=2e-6)
+    closes(response, four_bar_works(angle, push, twist, lean, **sizes), play, 150.0)
+
+
+# ---- series and what reads them ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", ["minimal", "baumgarte"])
+def test_series_of_the_driven_body_go_on_from_turn_to_turn(formulation):
+    start = STARTS[2]
+    scene, given = linkage("constant", -1, start, PLAY, revolutions=2, formulation=formulation)
+    response = simulate(scene)
+    assert int(response["status"]) == 0
+    time = response["time"].to_numpy()
+    np.testing.assert_allclose(response["crank_angle"], given(time), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(response["body_angle"].sel(body="crank"), given(time), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(response["crank_speed"], -TURN / SECONDS, rtol=1e-6)
+    np.testing.assert_allclose(response["body_spin"].sel(body="crank"), response["crank_speed"])
+    # the other bodies are where geometry has them, in both turns
+    tip = response[["point_x", "point_y"]].sel(point="coupler.tip")
+    off = tip["point_x"] + 1j * tip["point_y"] - four_bar(given(time))[0]
+    assert float(np.abs(off).max()) < 20 * PLAY
+
+
+def test_figures_know_which_way_a_drive_goes():
+    for kind, way in (("constant", -1), ("table", -1), ("harmonic", 1)):
+        scene, _ = linkage(kind, way, STARTS[1], PLAY, revolutions=2)
+        response = simulate(scene)
+        assert motion.whole_turns(response) == 2
+        last = motion.steady(response, 1)
+        assert float(last["time"][0]) == pytest.approx(SECONDS, rel=1e-6)
+        if kind != "harmonic":  # which has no one angle once a turn
+            crossed = motion.section(response, "crank_angle", 0.5)
+            np.testing.assert_allclose(np.mod(crossed, TURN), 0.5, rtol=0, atol=1e-9)
+            assert len(crossed) == 2
+        for made in (response_figure(response), poincare_figure(response, 0.5)):
+            assert made.axes
+        assert np.ptp(frames(response)["turn"]) == pytest.approx(2.0)
+
+
+def test_a_body_from_rest_may_be_thrown_back_wherever_it_starts():
+    """By the first impacts in its joints, some degrees: counted from where it starts."""
+    start = 2.0
+    light = {f"mechanism.bodies.crank.{k}": v for k, v in (("mass", 1e-3), ("inertia", 1e-6), ("mass_center", 0.0))}
+    turned = {
+        "mechanism.bodies.crank.start_angle": start, "mechanism.bodies.rod.start_angle": start,
+        "mechanism.bodies.slider.start_angle": start, "mechanism.joints.guide.angle": start,
+        "mechanism.joints.crank_rod.clearance": 1e-3, "effects.gravity": 0.0,
+        "mechanism.drives.motor": {**REST, "body": "crank"},
+    }  # fmt: skip
+    response = simulate(slider_crank_pair()[1].with_(light | turned))
+    assert int(response["status"]) == 0
+    assert float(response["crank_speed"].min()) < -100.0
+    angle = response["crank_angle"].to_numpy()
+    assert angle[-1] == pytest.approx(start + TURN, abs=1e-9)
