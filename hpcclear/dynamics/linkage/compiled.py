@@ -59,7 +59,10 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     rows = ", ".join(f"at.{joint!r}" for joint in joints)
     looked_up = "".join(
         _LOOK_UP.format(
-            row=row, first=first, before="".join(f"        {line}\n" for line in before), angle=angle
+            row=row,
+            first=first,
+            before="".join(f"        {line}\n" for line in before),
+            angle=angle,
         )
         for row, first, (before, angle) in _curves(motion)
     )

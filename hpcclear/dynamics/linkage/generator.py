@@ -88,7 +88,7 @@ class Motion:
     curves: Mapping[str, int] = field(default_factory=dict)
     """Rows of tabulated values, by drive or load."""
     turned: tuple[tuple[str, ...], str] = ((), "")
-    """Statements, and after them the angle that tables are looked up at, over the turns of a revolution."""
+    """Statements, and the angle at which tables are looked up after them, divided by the turns of a revolution."""
 
 
 def generate(
@@ -150,11 +150,13 @@ class _Generator:
         )
 
     def _looked_up_at(self) -> tuple[tuple[tuple[str, ...], str], Writer]:
-        """The angle of the body whose turn is the revolution, from the x axis, as `Motion.turned`; a text of its own, for
-        tables are looked up before the lane's."""
+        """`Motion.turned`: the angle of the body whose turn is the revolution, from the x axis. It has a writer of its own,
+        since tables are looked up before the lane's text runs."""
         rows, drive = self.rows, self.mechanism.period
         write = Writer(self.writer.rows, self.writer.free, hoist=False)
-        if not any(getattr(one, "table", False) for one in (*self.mechanism.drives, *self.mechanism.loads)):
+        if not any(
+            getattr(one, "table", False) for one in (*self.mechanism.drives, *self.mechanism.loads)
+        ):
             return ((), ""), write
         kin = Kinematics(
             self.forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves

@@ -188,8 +188,8 @@ class Linkage:
         return result
 
     def gained(self, body: str) -> float:
-        """By how much a body's angle begins anew with each revolution, rad: what a drive prescribes by the time in it does, and
-        a coordinate that gives the period."""
+        """Return by how much a body turns in a revolution, rad, where its angle restarts with each: of a drive that prescribes
+        it by the time in the revolution, and of the coordinate that gives the period."""
         main, frame = self.mechanism.period, self.forest.frames[body]
         drive = self.forest.prescribed.get(frame)
         if drive is None:

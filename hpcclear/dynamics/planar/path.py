@@ -39,7 +39,7 @@ def followed(
     ----------
     scene : Scene
     phase : ndarray, shape (t,)
-        How far the revolutions have come, 2 pi a turn of the drive, rad.
+        Progress of the drive since the start, 2 pi a turn of its body, rad.
     points : dict
         ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
     acceleration : ndarray of complex, shape (t,)

@@ -54,8 +54,11 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
     phase = cycle * times / period
     gravity = scene.effects.gravity
-    kept = {"turns": turns_of(tables), "interpolation": scene.numerics.interpolation}
-    curves = {name: partial(curve_at, curve, **kept) for name, curve in curves_of(tables).items()}
+    turns, interpolation = turns_of(tables), scene.numerics.interpolation
+    curves = {
+        name: partial(curve_at, curve, turns=turns, interpolation=interpolation)
+        for name, curve in curves_of(tables).items()
+    }
     found = prescribed_motion(mechanism, times, gravity, curves)
     forest = found.assembly.loops.forest
     poses = Poses(forest, {}, 0)

@@ -173,7 +173,7 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
 
 
 def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
-    """Where the angle that the body of the period's drive has as a coordinate starts, rad; of samples, (m,)."""
+    """Return the start of the angle that the period's body has as a coordinate, rad; of samples, (m,)."""
     body = mechanism.period.body
     return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 

@@ -19,7 +19,7 @@ def check_some(responses: Collection[object], remedy: str) -> None:
 
 
 def phase(response: xr.Dataset) -> Array:
-    """How far the drive has come since the start, rad, rising by 2 pi a turn or swing, shape (time,); a slider-crank's angle."""
+    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle."""
     name = "drive_phase" if "drive_phase" in response else "crank_angle"
     return response[name].to_numpy()
 
@@ -30,18 +30,17 @@ def turns(response: xr.Dataset) -> Array:
 
 
 def turns_label(response: xr.Dataset) -> str:
-    """What an axis of `turns` is called."""
-    told = "turns of the drive" if "drive_phase" in response else "crank angle"
-    return f"{told} (revolutions)"
+    """The label of an axis of `turns`."""
+    return f"{'turns of the drive' if 'drive_phase' in response else 'crank angle'} (revolutions)"
 
 
 def crank_angle(response: xr.Dataset) -> tuple[Array, int]:
-    """Crank angle (time,), rad, counted the way it goes, and that way, 1 or -1; of a drive that swings its phase."""
+    """Crank angle times its sense (time,), rad, which rises, and the sense, -1 clockwise; of a drive that swings its phase."""
     angle = response["crank_angle"].to_numpy()
-    way = -1 if angle[-1] < angle[0] else 1
-    if "drive_phase" in response and (way * np.diff(angle) < 0.0).any():
+    sense = -1 if angle[-1] < angle[0] else 1
+    if "drive_phase" in response and (sense * np.diff(angle) < 0.0).any():
         return phase(response), 1
-    return way * angle, way
+    return sense * angle, sense
 
 
 def whole_turns(response: xr.Dataset) -> int:
@@ -166,8 +165,8 @@ def objective_by_turn(response: xr.Dataset) -> Array:
 
 def section(response: xr.Dataset, name: str | xr.DataArray, phase: float = 0.0) -> Array:
     """A variable, by name or itself, once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
-    angle, way = crank_angle(response)
-    phase = way * phase
+    angle, sense = crank_angle(response)
+    phase = sense * phase
     first = np.ceil((angle[0] - phase) / TURN - 1e-6)
     last = np.floor((angle[-1] - phase) / TURN + 1e-6)
     at = phase + TURN * np.arange(first, last + 1)

@@ -56,8 +56,8 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
         len(joints), 1, 82.5 * len(joints), subplot_kw={"projection": "polar"}
     )
     force = labels.of(shown["contact_force"])
-    angle, way = motion.crank_angle(shown)
-    turn = way * angle / motion.TURN
+    angle, sense = motion.crank_angle(shown)
+    turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() for c in "xy")
         radius = shown["contact_force"].sel(joint=joint).to_numpy() * force.factor
