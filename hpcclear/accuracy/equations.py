@@ -35,11 +35,10 @@ def classical_turn(motion, tables, rule, steps, y, contacts, seen):
     """Integrate `y` over one revolution by the classical Runge-Kutta method of order 4, in equal steps.
 
     Contacts start and end between steps, as they come. `rule`: whether contacts latch, whether the last coordinate is the
-    driven angle (then the last step is cut at a full revolution), least impact speed, period, and by how much that angle
-    turns in a revolution. Returns duration, largest contact
-    force at a step's end, and evaluations.
+    driven angle (then the last step is cut where its turn ends), least impact speed, period, and that angle there.
+    Returns duration, largest contact force at a step's end, and evaluations.
     """
-    latched, free, floor, period, cycle = rule
+    latched, free, floor, period, end = rule
     out, joints = seen.rates, seen.joints
     n = (len(y) - len(joints)) // 2
     stage, total = y.copy(), np.empty(len(y))
@@ -66,9 +65,9 @@ def classical_turn(motion, tables, rule, steps, y, contacts, seen):
             s = 0
             for k in range(len(y)):
                 stage[k] = y[k] + h / 6.0 * total[k]
-            beyond = free and (corrections > 0 or stage[n - 1] > cycle)
+            beyond = free and (corrections > 0 or stage[n - 1] > end)
             if beyond and corrections < 6:
-                h += (cycle - stage[n - 1]) / stage[2 * n - 1]
+                h += (end - stage[n - 1]) / stage[2 * n - 1]
                 corrections += 1
                 stage[:] = y
             else:
@@ -124,7 +123,8 @@ class Equations:
         """State after one revolution in `steps` classical steps, its duration, largest force, evaluations."""
         y, contacts = self.start.copy(), self.contacts.copy()
         problem, period = self.problem, float(self.named.period)
-        rule = (self.latched, self.free, problem.impact_floor, period, problem.cycle)
+        end = float(self.named.turn_end)
+        rule = (self.latched, self.free, problem.impact_floor, period, end)
         time, peak, count = classical_turn(
             *self._head,
             rule,

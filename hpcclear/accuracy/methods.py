@@ -184,7 +184,7 @@ def solve_turn(
         gaps = here.joints(t, y)[:, OPEN].copy()
         events = [_crossing(here, j, side[j], gaps[j]) for j in joints]
         if one.free:
-            events.append(_full_turn(one.n, one.problem.cycle))
+            events.append(_full_turn(one.n, float(one.named.turn_end)))
         piece = solve_ivp(
             here, (t, limit), y, solver, rtol=rtol, atol=atol, events=events, dense_output=True,
             max_step=period / 64.0,  # a whole contact inside a step would go unnoticed
@@ -214,8 +214,8 @@ def _crossing(one: Equations, joint: int, side: float, at_start: float) -> Event
     return _event(lambda time, y: float(one.joints(time, y)[joint, OPEN]) - shift, -side)
 
 
-def _full_turn(n: int, cycle: float) -> Event:
-    return _event(lambda time, y: float(y[n - 1] - cycle), 1.0)
+def _full_turn(n: int, end: float) -> Event:
+    return _event(lambda time, y: float(y[n - 1] - end), 1.0)
 
 
 def _event(value: Event, direction: float) -> Event:

@@ -16,7 +16,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
-from hpcclear.report.figures import labels
+from hpcclear.report.figures import labels, motion
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
@@ -240,10 +240,10 @@ def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
     if "crank_speed" not in response:
         return []
     speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
-    if np.ptp(speed) < 1e-9 * abs(speed[0]):
-        return []
-    turns = response["crank_angle"].to_numpy() / (2.0 * np.pi)
-    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, response["time"])
+    turns, time = motion.turns(response), response["time"].to_numpy()
+    if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
+        return []  # it is prescribed
+    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)
     told = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
     means = 60.0 / np.diff(ends)
     if len(means) > 1:

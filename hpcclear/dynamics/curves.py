@@ -105,10 +105,10 @@ def angle_cells(rows: Rows) -> Array:
 
 
 def curve_at(curve: Curve, angle: Array, turns: int = 1, interpolation: str = "smooth") -> Array:
-    """A torque or load at crank angles (n,) in rad, over `turns` where it takes several, as the kernel reads it."""
+    """A torque or load at angles (n,) of the driven body in rad, which repeats after `turns`, as the kernel reads it."""
     if not isinstance(curve, tuple):
         return np.full(len(angle), curve)
-    place = np.mod(angle, at.TURN) * (at.CELLS / at.TURN)
+    place = np.mod(angle / turns, at.TURN) * (at.CELLS / at.TURN)
     cell = np.minimum(place.astype(int), at.CELLS - 1)
     s = place - cell
     c0, c1, c2, c3 = (

@@ -137,9 +137,10 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
     EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
-) = range(29)
+    TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
+) = range(30)
 JOINT_ROWS = 14
-JOINT_BLOCKS = 29  # of all joints, one behind the other
+JOINT_BLOCKS = 30  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,

@@ -89,6 +89,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     p[:, at.SPEED] = speed
     p[:, at.PERIOD] = at.TURN / speed
     p[:, at.FIRST_STEP] = 1e-3 * p[:, at.PERIOD]
+    p[:, at.TURN_END] = at.TURN
     p[:, at.CRANK_LENGTH] = body["crank.length"]
     p[:, at.ROD_LENGTH] = body["rod.length"]
     near = get("mechanism.rod.mass_center")

@@ -17,7 +17,7 @@ from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
-from hpcclear.dynamics.linkage.parts import Harmonic, TableDrive, TorqueDrive
+from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
@@ -94,7 +94,7 @@ class Problem:
     collocation: bool = False
     """Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes."""
     cycle: float = at.TURN
-    """By how much the driven body turns in a revolution, rad."""
+    """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
     parameter_rows: int = at.OWN
     """Parameters of a sample."""
     linkage: Linkage | None = None
@@ -198,7 +198,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         first = second = False
         main = planar.linkage_of(scene).mechanism.period
         free = isinstance(main, TorqueDrive)
-        swings = isinstance(main, Harmonic) or (isinstance(main, TableDrive) and not main.advance)
+        swings = not main.advance
     else:
         first, second, free = topology(scene)
     contact_law = e.contact.law if e.contact is not None and count else None
@@ -389,7 +389,7 @@ def problem_of(
         implicit=implicit_method(scene),
         collocation=takes_collocation(scene, single),
         single=single,
-        cycle=turns * at.TURN,
+        cycle=at.TURN if linkage is None else linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
         linkage=linkage,
         curves=curves,

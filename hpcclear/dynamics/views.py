@@ -201,6 +201,7 @@ class Parameters(View):
     period = Column(at.PERIOD)
     first_step = Column(at.FIRST_STEP)
     strictness = Column(at.STRICTNESS)  # squared: how many times tighter than the run's tolerances
+    turn_end = Column(at.TURN_END)  # rad
     crank_length = Column(at.CRANK_LENGTH)
     crank_near = Column(at.CRANK_NEAR)
     crank_mass = Column(at.CRANK_MASS)

@@ -20,8 +20,9 @@ from hpcclear.results.rows import (
 RESPONSE: Columns = {
     "time": number(("time",), "s", "time since the start"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
-    "crank_angle": number(("time",), "rad", "crank angle"),
-    "crank_speed": number(("time",), "rad/s", "crank speed"),
+    "crank_angle": number(("time",), "rad", "angle of the crank, or of the body that gives the period, from the x axis"),
+    "crank_speed": number(("time",), "rad/s", "its angular velocity, negative clockwise"),
+    "drive_phase": number(("time",), "rad", "progress of the drive since the start, 2 pi a turn of its body or a swing"),
     "slider_load": number(("time",), "N", "force applied to the slider, along +x"),
     "slider_position": number(("time",), "m", "slider position"),
     "slider_velocity": number(("time",), "m/s", "slider velocity"),

@@ -48,11 +48,12 @@ class PlanarSpeed(Table):
     body: str
     """That turns."""
     speed: Annotated[float, Quantity("rad/s")]
-    """rad/s, counter-clockwise."""
+    """rad/s, counter-clockwise; negative: clockwise."""
     period: bool = False
     """Whether its turn is the revolution; the first drive is, where none says so."""
     turns: Annotated[int, Count(least=1, most=64)] = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
+    360 degrees or more begins in the second."""
 
 
 class PlanarHarmonic(Table):
@@ -83,7 +84,7 @@ class PlanarTable(Table):
     """That is moved."""
     angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
     """``[[time, angle], ...]``, s and rad: the first time is 0, and the motion repeats at the last, where the angle is the
-    first one again or a turn further on. A cubic spline between, smooth where it repeats."""
+    first one again, or a turn further on or (clockwise) back. A cubic spline between, smooth where it repeats."""
     period: bool = False
     """Whether the table's span is the revolution; the first drive is, where none says so."""
 
@@ -96,7 +97,7 @@ class PlanarTorque(Table):
     body: str
     """That the torque turns, against the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
-    """N m, constant or over a revolution of the body that gives the period."""
+    """N m, constant or against the angle of the body that gives the period."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
@@ -108,7 +109,8 @@ class PlanarTorque(Table):
     period: bool = False
     """Whether a turn of the body is the revolution; the first drive is, where none says so."""
     turns: Annotated[int, Count(least=1, most=64)] = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine."""
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
+    360 degrees or more begins in the second."""
 
     @model_validator(mode="after")
     def _started(self) -> "PlanarTorque":
@@ -139,7 +141,8 @@ class ForceLoad(Table):
     """``body.point`` that the force acts on."""
     force: Components | None = None
     size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """N along `direction`, constant or against the angle of the body that gives the period."""
+    """N along `direction`, constant or against the angle of the body that gives the period: from the x axis, counter-clockwise,
+    `start_angle` included, whichever way it turns."""
     direction: Angle = 0.0
     """From the ground's x axis, rad."""
 

@@ -304,10 +304,10 @@ class MotionTable(Converted):
                 "Sort the rows by time, the first at 0",
             )
         gained = pairs[-1][1] - pairs[0][1]
-        if not any(abs(gained - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
+        if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
             raise invalid(
                 f"the last angle is {gained:.6g} rad from the first, and the motion repeats there",
-                "Let it end where it began, or a turn further on",
+                "Let it end where it began, or a turn further on or back",
             )
         return pairs
 

@@ -48,7 +48,8 @@ class PlanarBody(Table):
     points: NamedPlaces = ()
     """Where joints and loads act, in the body's own axes, m."""
     start_angle: Angle = 0.0
-    """Rough angle at the start, rad: assembly starts from it. Of a driven body, its angle at the start."""
+    """Rough angle at the start, rad: assembly starts from it. Of a driven body, its angle at the start, unless its drive gives
+    the angle itself (harmonic, table)."""
     bending: Bending | None = None
     """Of a bar between two pins: how it bends; left out, it is rigid."""
 

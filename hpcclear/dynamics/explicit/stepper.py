@@ -20,7 +20,7 @@ from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.peaks import peaks_inside
 from hpcclear.dynamics.stepping.record import record_step
-from hpcclear.dynamics.stepping.settings import CYCLE, GAP_TOLERANCE, PROFILE
+from hpcclear.dynamics.stepping.settings import GAP_TOLERANCE, PROFILE
 from hpcclear.dynamics.stepping.special import END_OF_REVOLUTION, END_OF_STEP, NEXT_SAMPLE, ask
 
 
@@ -41,7 +41,7 @@ def judge_steps(special, rules, n, numbers, block, queue, settings, W):
     work = block.work
     change = 0.0
     judge_step(work, settings, W)
-    if flag_gaps(rules, work, n - 1, settings[GAP_TOLERANCE], settings[CYCLE], W) > 0.0:
+    if flag_gaps(rules, work, block.par, n - 1, settings[GAP_TOLERANCE], W) > 0.0:
         for i in range(W):
             if work[at.SPECIAL * W + i] == 1.0:
                 change += ask(special, END_OF_STEP, i, numbers, block, queue, settings)

@@ -9,7 +9,7 @@ from types import ModuleType
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.generator import Motion
-from hpcclear.dynamics.linkage.parts import ConstantSpeed, Force, TableDrive, Torque, TorqueDrive
+from hpcclear.dynamics.linkage.parts import Force, Torque, TorqueDrive
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
@@ -50,7 +50,7 @@ BANK = 8
 """Lanes of an implicit step's and of collocation's motion."""
 
 _LOOK_UP = """    for i in range(W):
-        work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})
+{before}        work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})
 """
 
 
@@ -58,15 +58,28 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     """The text of that module; `joints`: the rows of the joints with clearance, in the mechanism's order."""
     rows = ", ".join(f"at.{joint!r}" for joint in joints)
     looked_up = "".join(
-        _LOOK_UP.format(row=row, first=first, angle=angle) for row, first, angle in _curves(motion)
+        _LOOK_UP.format(
+            row=row,
+            first=first,
+            before="".join(f"        {line}\n" for line in before),
+            angle=angle,
+        )
+        for row, first, (before, angle) in _curves(motion)
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"
     return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
 
 
-def _curves(motion: Motion) -> list[tuple[int, int, str]]:
-    """Rows of tabulated values, where their tables begin, and the angles that they are looked up at."""
+Angle = tuple[tuple[str, ...], str]
+"""Statements and what is looked up at after them."""
+
+
+def _curves(motion: Motion) -> list[tuple[int, int, Angle]]:
+    """Rows of tabulated values, where their tables begin, and the angles that they are looked up at.
+
+    Tables that move bodies come first: the angle of loads may be theirs.
+    """
     if motion.curves:
         return [
             (row, 4 * at.CELLS * (row - at.CURVES), _looked_up_at(motion, name))
@@ -79,38 +92,18 @@ def _curves(motion: Motion) -> list[tuple[int, int, str]]:
     found = [(at.LOAD_VALUE, at.LOAD_TABLE)] if tabulated else []
     if any(isinstance(drive, TorqueDrive) and drive.table for drive in mechanism.drives):
         found.append((at.TORQUE_VALUE, at.TORQUE_TABLE))
-    return [(*one, _turned(motion)) for one in found]
+    return [(*one, motion.turned) for one in found]
 
 
-def _looked_up_at(motion: Motion, name: str) -> str:
+def _looked_up_at(motion: Motion, name: str) -> Angle:
     """Of a curve: the angle of the body whose turn is the revolution, or the time of a table that drives a body."""
     drives = {drive.name: drive for drive in motion.forest.mechanism.drives}
     drive = drives.get(name.partition(".")[0]) if "." in name else None
     if drive is None:
-        return _turned(motion)
+        return motion.turned
     main = motion.forest.mechanism.period
-    share = main.seconds / drive.seconds / getattr(main, "turns", 1)
-    return f"par[{at.SPEED} * W + i] * work[{at.STAGE_TIME} * W + i] * {share!r}"
-
-
-def _turned(motion: Motion) -> str:
-    """Angle of the body whose turn is the revolution."""
-    forest = motion.forest
-    drive = forest.mechanism.period
-    frame = forest.frames[drive.body]
-    k = forest.index("angle", frame)
-    if k is not None:
-        turned = f"work[{motion.coordinates + k} * W + i]"
-    else:
-        speed = at.SPEED
-        if not isinstance(drive, TableDrive):
-            rate = "speed" if isinstance(drive, ConstantSpeed) else "rate"
-            speed = motion.parameters[f"{drive.name}_{rate}"]
-        turned = f"par[{speed} * W + i] * work[{at.STAGE_TIME} * W + i]"
-        start = motion.parameters.get(f"{frame}_start")
-        turned = turned if start is None else f"par[{start} * W + i] + {turned}"
-    turns = getattr(drive, "turns", 1)
-    return turned if turns == 1 else f"({turned}) * {1.0 / turns!r}"
+    share = main.seconds / drive.seconds / main.turns
+    return (), f"par[{at.SPEED} * W + i] * work[{at.STAGE_TIME} * W + i] * {share!r}"
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

@@ -87,8 +87,8 @@ class Motion:
     """Names of the multipliers."""
     curves: Mapping[str, int] = field(default_factory=dict)
     """Rows of tabulated values, by drive or load."""
-    coordinates: int = at.QS
-    """Row of the first of the forest's coordinates."""
+    turned: tuple[tuple[str, ...], str] = ((), "")
+    """Statements, and the angle at which tables are looked up after them, divided by the turns of a revolution."""
 
 
 def generate(
@@ -135,17 +135,37 @@ class _Generator:
         found = self._solved(torques)
         self._store(found, dict(torques))
         lines = "\n".join(f"    {line}" for line in (self._described(), *self.writer.lines))
-        names = {k: row for k, row in self.writer.rows.items() if k in self.writer.read}
+        turned, looking = self._looked_up_at()
+        read = self.writer.read | looking.read
+        names = {k: row for k, row in looking.rows.items() if k in read}
         return Motion(
             f"def lane(effects, joints, work, par, i, W):\n{lines}\n",
             self.forest,
             names,
             {name: text for name, text in self.writer.derived.items() if name in names},
-            tuple(self.writer.inputs),
+            tuple(self.writer.inputs | looking.inputs),
             tuple(row.name for row in self.constraints),
             self.rows.curves,
-            self.rows.coordinates,
+            turned,
         )
+
+    def _looked_up_at(self) -> tuple[tuple[tuple[str, ...], str], Writer]:
+        """`Motion.turned`: the angle of the body whose turn is the revolution, from the x axis. It has a writer of its own,
+        since tables are looked up before the lane's text runs."""
+        rows, drive = self.rows, self.mechanism.period
+        write = Writer(self.writer.rows, self.writer.free, hoist=False)
+        if not any(
+            getattr(one, "table", False) for one in (*self.mechanism.drives, *self.mechanism.loads)
+        ):
+            return ((), ""), write
+        kin = Kinematics(
+            self.forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves
+        )
+        angle = kin.angle(drive.body)
+        if drive.turns != 1:
+            angle = angle * named(repr(1.0 / drive.turns))
+        text = write.text(angle)
+        return (tuple(write.lines), text), write
 
     def _described(self) -> str:
         """First line of the text: what is integrated, where the contacts are, what closes loops."""

@@ -153,6 +153,11 @@ class Kinematics:
         start = self.forest.mechanism.body(drive.body).start_angle
         return start - self.forest.offsets[drive.body]
 
+    def angle(self, body: str) -> Term:
+        """Angle of a body that turns, from the x axis."""
+        offset = self._number(f"{body}_offset", self.forest.offsets[body])
+        return named(f"angle_{self.forest.frames[body]}") + offset
+
     def trig(self, frame: str) -> Vector:
         """Cosine and sine of a frame's angle."""
         if frame == GROUND:

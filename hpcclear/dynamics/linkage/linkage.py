@@ -15,7 +15,7 @@ from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
+from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.linkage.trees import Forest, forest
@@ -187,10 +187,14 @@ class Linkage:
             result[k] = bent(found, q[rows], v[rows], (along, across, pose.spin[k]))
         return result
 
-    @property
-    def turning(self) -> bool:
-        """Whether the angle that gives the period is the last coordinate, and goes round."""
-        return isinstance(self.mechanism.period, TorqueDrive)
+    def gained(self, body: str) -> float:
+        """Return by how much a body turns in a revolution, rad, where its angle restarts with each: of a drive that prescribes
+        it by the time in the revolution, and of the coordinate that gives the period."""
+        main, frame = self.mechanism.period, self.forest.frames[body]
+        drive = self.forest.prescribed.get(frame)
+        if drive is None:
+            return main.advance if frame == self.forest.frames[main.body] else 0.0
+        return drive.advance * round(main.seconds / drive.seconds)
 
 
 def _curves_of(part: object) -> list[str]:

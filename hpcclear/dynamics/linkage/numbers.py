@@ -61,6 +61,7 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             f"{body.name}_inverse_mass": 1.0 / body.mass,
             f"{body.name}_inertia": inertia,
             f"{body.name}_inverse_inertia": 1.0 / inertia,
+            f"{body.name}_offset": angle,
             f"{body.name}_offset_cos": np.cos(angle),
             f"{body.name}_offset_sin": np.sin(angle),
         }

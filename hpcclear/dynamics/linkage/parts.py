@@ -120,6 +120,11 @@ class ConstantSpeed:
         """One revolution of as many turns, s."""
         return 2 * math.pi * self.turns / abs(self.speed)
 
+    @property
+    def advance(self) -> float:
+        """By how much the angle changes until then, rad: negative clockwise."""
+        return math.copysign(2 * math.pi * self.turns, self.speed)
+
 
 @dataclass(frozen=True)
 class Harmonic:
@@ -133,6 +138,8 @@ class Harmonic:
     phase: float = 0.0
     period: bool = False
     prescribed: ClassVar[bool] = True
+    turns: ClassVar[int] = 1
+    advance: ClassVar[float] = 0.0
 
     @property
     def seconds(self) -> float:
@@ -145,7 +152,7 @@ class TableDrive:
     """The body's angle is prescribed by rows (time in s, angle in rad), the first at 0, the last where it repeats.
 
     A cubic spline that is smooth where it repeats as well; `cells`: what the kernel reads of it (`curves.angle_cells`). The
-    last angle is the first, or a turn further on.
+    last angle is the first, or a turn further on or back.
     """
 
     name: str
@@ -154,6 +161,7 @@ class TableDrive:
     cells: Any = field(compare=False, repr=False)
     period: bool = False
     prescribed: ClassVar[bool] = True
+    turns: ClassVar[int] = 1
 
     @property
     def seconds(self) -> float:
@@ -162,13 +170,14 @@ class TableDrive:
 
     @property
     def advance(self) -> float:
-        """What is gained until then, rad."""
-        return self.rows[-1][1] - self.rows[0][1]
+        """What is gained until then, rad: a turn, either way round, or nothing."""
+        return 2 * math.pi * round((self.rows[-1][1] - self.rows[0][1]) / (2 * math.pi))
 
 
 @dataclass(frozen=True)
 class TorqueDrive:
-    """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: it follows the body's angle.
+    """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: times a curve over the angle of the
+    period's body.
 
     Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one.
     """
@@ -195,13 +204,18 @@ class TorqueDrive:
         """One revolution of as many turns at the usual speed, s."""
         return 2 * math.pi * self.turns / abs(self.usual_speed)
 
+    @property
+    def advance(self) -> float:
+        """By how much the angle changes until then, rad."""
+        return 2 * math.pi * self.turns
+
 
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
 @dataclass(frozen=True)
 class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the period's body's turn."""
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body."""
 
     name: str
     place: str

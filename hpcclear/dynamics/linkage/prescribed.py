@@ -4,7 +4,7 @@ Positions and velocities from the loops, accelerations, reactions and drive mome
 coordinates (feedback off), all instants at once.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,9 +54,10 @@ def prescribed_motion(
     mechanism: Mechanism,
     times: Array,
     gravity: float = 0.0,
-    turned: Mapping[str, Array] | None = None,
+    curves: Mapping[str, Callable[[Array], Array]] | None = None,
 ) -> Prescribed:
-    """Motion and reactions at instants (t,), s, which rise from 0; `turned`: values (t,) of tabulated loads, by name.
+    """Motion and reactions at instants (t,), s, which rise from 0; `curves`: tabulated loads by name, each as a function of the
+    angle (t,) of the body that gives the period, rad.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def prescribed_motion(
         )  # fmt: skip
     assembly = assemble(mechanism)
     found, margin = passed_through(assembly, times)
-    return _reactions(assembly, np.asarray(times), found, gravity, margin, turned or {})
+    return _reactions(assembly, np.asarray(times), found, gravity, margin, curves or {})
 
 
 def passed_through(assembly: Assembly, times: Array) -> tuple[Array, Array]:
@@ -137,13 +138,13 @@ def _reactions(
     found: Array,
     gravity: float,
     margin: Array,
-    turned: Mapping[str, Array],
+    tabulated: Mapping[str, Callable[[Array], Array]],
 ) -> Prescribed:
     """Accelerations and reactions from the equations of motion, instants side by side as rows of arrays."""
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)
-    curves = {name: rates + at.RATES + 2 + k for k, name in enumerate(turned)}
+    curves = {name: rates + at.RATES + 2 + k for k, name in enumerate(tabulated)}
     rows = Rows(
         0, n, 2 * n, rates, 3 * n, rates + at.RATES, rates + at.RATES + 1, holds, curves=curves
     )
@@ -154,8 +155,10 @@ def _reactions(
     work = np.zeros((rates + at.RATES + 2 + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
     work[rates + at.RATES :] = 1.0
+    turned = assembly.loops.forest.index("angle", mechanism.period.body)
+    assert turned is not None  # every body turns by itself here
     for name, row in curves.items():
-        work[row] = turned[name]
+        work[row] = tabulated[name](work[turned])
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     names["lane"](None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}

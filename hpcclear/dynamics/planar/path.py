@@ -31,15 +31,15 @@ INSTANTS = 720
 
 
 def followed(
-    scene: Scene, angle: Array, points: Mapping[str, Array], acceleration: Array, play: bool = True
+    scene: Scene, phase: Array, points: Mapping[str, Array], acceleration: Array, play: bool = True
 ) -> dict[str, Array]:
     """Series of the followed point, none where none is followed: place, acceleration (t,) and `path_error`.
 
     Parameters
     ----------
     scene : Scene
-    angle : ndarray, shape (t,)
-        Of the drive of the period, from the start on and rising by all its turns, rad.
+    phase : ndarray, shape (t,)
+        Progress of the drive since the start, 2 pi a turn of its body, rad.
     points : dict
         ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
     acceleration : ndarray of complex, shape (t,)
@@ -61,7 +61,7 @@ def followed(
     path = ideal_path(mechanism, place) if play else None
     if path is not None:
         cycle = at.TURN * turns_of(tables_of(scene))
-        ideal = path(np.mod(angle - angle[0], cycle) / cycle)
+        ideal = path(np.mod(phase - phase[0], cycle) / cycle)
         found["path_error"] = np.abs(x + 1j * y - ideal)
     return found
 
@@ -70,7 +70,7 @@ def _path(ideal: Mechanism, place: str) -> Path:
     from scipy.interpolate import CubicHermiteSpline  # a third of a second, for these alone
 
     drive = ideal.period
-    share = np.linspace(0.0, 1.0, INSTANTS * getattr(drive, "turns", 1) + 1)
+    share = np.linspace(0.0, 1.0, INSTANTS * drive.turns + 1)
     assembly = assemble(ideal)
     times = share * drive.seconds
     rows, _ = passed_through(assembly, times)

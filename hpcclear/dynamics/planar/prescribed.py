@@ -1,5 +1,7 @@
 """Linkages without clearance whose drives prescribe everything: time series and outcomes, nothing integrated."""
 
+from functools import partial
+
 import numpy as np
 
 from hpcclear.base.arrays import Array
@@ -11,7 +13,7 @@ from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
 from hpcclear.dynamics.planar.path import followed, rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
-from hpcclear.dynamics.planar.response import bodies_and_points
+from hpcclear.dynamics.planar.response import bodies_and_points, driven
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.scene import Scene
@@ -50,15 +52,14 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
 
     period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
-    start = mechanism.body(mechanism.period.body).start_angle
-    angle = cycle * times / period
+    phase = cycle * times / period
     gravity = scene.effects.gravity
     turns, interpolation = turns_of(tables), scene.numerics.interpolation
-    turned = {
-        name: curve_at(curve, (start + angle) / turns, turns, interpolation)
+    curves = {
+        name: partial(curve_at, curve, turns=turns, interpolation=interpolation)
         for name, curve in curves_of(tables).items()
     }
-    found = prescribed_motion(mechanism, times, gravity, turned)
+    found = prescribed_motion(mechanism, times, gravity, curves)
     forest = found.assembly.loops.forest
     poses = Poses(forest, {}, 0)
     base = values(mechanism, cartesian=True, gravity=gravity)
@@ -77,7 +78,6 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
         for power in (found.power, found.loss, found.load_power)
     )
     total = kinetic + potential
-    speed = np.full_like(times, cycle / period)
     pins, places = pins_of(scene), bodies_and_points(mechanism, pose)
     acceleration = np.zeros(len(times), complex)
     if tables.followed is not None:
@@ -89,10 +89,9 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
             mechanism, tables.followed, rows, pose.angle[k], pose.spin[k]
         )
     return times, {
-        "crank_angle": angle,
-        "crank_speed": speed,
+        **driven(mechanism, places, phase),
         **places,
-        **followed(scene, angle, places, acceleration, play=False),
+        **followed(scene, phase, places, acceleration, play=False),
         "pin_force_x": np.array([found.holds[f"{pin}_x"] for pin in pins]).T,
         "pin_force_y": np.array([found.holds[f"{pin}_y"] for pin in pins]).T,
         "crank_moment": found.holds[f"{mechanism.period.name}_angle"],

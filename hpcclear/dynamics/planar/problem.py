@@ -158,9 +158,11 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     p = np.ones((get.size, linkage.parameter_rows))
     p[:, at.JOINT_BLOCKS : at.OWN] = 0.0
     period = period_of(sample)
+    turns = turns_of(tables_of(scene))
     p[:, at.PERIOD] = period
-    p[:, at.SPEED] = at.TURN * turns_of(tables_of(scene)) / period
-    p[:, at.FIRST_STEP] = 1e-3 * period / turns_of(tables_of(scene))
+    p[:, at.SPEED] = at.TURN * turns / period
+    p[:, at.FIRST_STEP] = 1e-3 * period / turns
+    p[:, at.TURN_END] = start_of_turns(sample, linkage.cartesian) + at.TURN * turns
     p[:, at.CRANK_LENGTH] = driven_length(linkage.mechanism)
     n = scene.numerics
     linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
@@ -168,6 +170,12 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
         block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
         p[:, block + at.CONTACT_STIFFNESS] = joint.stiffness
     return p
+
+
+def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
+    """Return the start of the angle that the period's body has as a coordinate, rad; of samples, (m,)."""
+    body = mechanism.period.body
+    return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 
 
 def driven_length(mechanism: Mechanism) -> float:

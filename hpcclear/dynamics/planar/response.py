@@ -45,14 +45,15 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
     strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
     stored = (kinetic, elastic, potential - strain, strain)
-    angle, speed = _turned(scene, linkage, par, seen)
+    phase = _phase(scene, linkage, par, seen)
     places = bodies_and_points(mechanism, pose, {k: one.shorter for k, one in bent.items()})
+    gained = np.array([linkage.gained(body.name) for body in mechanism.bodies])
+    places["body_angle"] = places["body_angle"] + gained * seen.revolution[:, None]
     acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
     return {
-        "crank_angle": angle,
-        "crank_speed": speed,
+        **driven(mechanism, places, phase),
         **places,
-        **followed(scene, angle, places, acceleration),
+        **followed(scene, phase, places, acceleration),
         "eccentricity_x": eccentricity[:, 0].T,
         "eccentricity_y": eccentricity[:, 1].T,
         "penetration": np.maximum(gaps, 0.0) * active,
@@ -109,14 +110,23 @@ def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
     return stored
 
 
-def _turned(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> tuple[Array, Array]:
-    """Angle of the drive of the period, since the start where it is prescribed, else of its body, and its speed; rad, rad/s."""
+def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> dict[str, Array]:
+    """Series of the body that gives the period: its angle and speed, and the progress of the drive, rad.
+
+    `places`: as `bodies_and_points` has them.
+    """
+    k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
+    angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
+    return {"crank_angle": angle, "crank_speed": speed, "drive_phase": phase}
+
+
+def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
+    """Progress of the drive since the start, 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(tables_of(scene))
-    if linkage.turning:
-        return seen.q[:, -1] + cycle * seen.revolution, seen.v[:, -1]
-    angle = cycle * (seen.revolution + seen.turn_time / named.period)
-    return angle, np.full(len(angle), named.speed)
+    if linkage.mechanism.period.prescribed:
+        return cycle * (seen.revolution + seen.turn_time / named.period)
+    return seen.q[:, -1] - (named.turn_end - cycle) + cycle * seen.revolution
 
 
 def bodies_and_points(

@@ -118,7 +118,7 @@ def flag_accepted(work, flag, i, W):
 
 
 @lane_function
-def flag_gaps(rules, work, last, tolerance, cycle, W):
+def flag_gaps(rules, work, par, last, tolerance, W):
     """Mark accepted lanes that need the scalar code before the step is committed. Returns how many lanes are marked."""
     latched = 1.0 * rules.latched
     for joint in range(rules.begin, rules.end):
@@ -127,7 +127,8 @@ def flag_gaps(rules, work, last, tolerance, cycle, W):
             flag_accepted(work, gap_flag(latched, work, p, i, W, tolerance), i, W)
     if rules.free:
         for i in range(W):
-            turned = 1.0 if work[(at.QS + last) * W + i] > cycle - 1e-6 else 0.0
+            end = par[at.TURN_END * W + i] - 1e-6
+            turned = 1.0 if work[(at.QS + last) * W + i] > end else 0.0
             stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
             flag_accepted(work, max(turned, stalled), i, W)
     special = 0.0

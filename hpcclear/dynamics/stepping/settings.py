@@ -20,7 +20,7 @@ from hpcclear.dynamics import layout as at
     EXPONENT,
     BETA,
     IMPLICIT,  # 0 never, 1 where the motion is stiff, 2 always
-    CYCLE,  # rad, by which the driven body turns in a revolution
+    CYCLE,  # rad, by which the driven body turns in a revolution; negative clockwise
     PARAMETER_ROWS,  # how many parameters a sample has
     PROFILED,  # how many rates of profiles of wear there are to integrate
     AT_REST,  # rad, within which a crank that starts from rest may turn back

@@ -160,24 +160,25 @@ def integrate_gap(lane, W, work, p):
 
 @lane_event
 def stop_free_crank(lane, W, block, settings, last):
-    """End a step where a free crank has made its turn. Returns OK or STALLED.
+    """End a step where a free crank has made its turn, counted from its start. Returns OK or STALLED.
 
     One that starts from rest may be thrown back by the first impacts, so there it stalls only away from its start, or
     after `LONG_AT_REST` periods.
     """
     work = block.work
+    end = block.par[at.TURN_END * W + lane]
     if work[(at.VS + last) * W + lane] <= 0.0:
         starting = block.book[at.REVOLUTION * W + lane] == 0.0
         starting &= work[at.TIME * W + lane] < LONG_AT_REST * block.par[at.PERIOD * W + lane]
         margin = settings[AT_REST] if starting else 0.0
-        if abs(work[(at.QS + last) * W + lane]) >= margin:
+        if abs(work[(at.QS + last) * W + lane] - (end - settings[CYCLE])) >= margin:
             return STALLED
-    beyond = work[(at.QS + last) * W + lane] - settings[CYCLE]
+    beyond = work[(at.QS + last) * W + lane] - end
     tolerance = settings[ANGLE_TOLERANCE]
     work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0
     if beyond > tolerance:
         h = work[at.STEP * W + lane]
-        before = work[(at.Q + last) * W + lane] - settings[CYCLE]
+        before = work[(at.Q + last) * W + lane] - end
         fraction = impact_fraction(
             before,
             h * work[(at.V + last) * W + lane],

@@ -250,7 +250,8 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
     for panel, title in zip(axes[0], columns, strict=True):
         panel.set_title(title)
     for panel in axes[-1]:
-        panel.set_xlabel("crank angle (rev.)")
+        label = motion.turns_label(next(iter(shown.values())))
+        panel.set_xlabel(label.replace("revolutions", "rev."))
     entries: dict[str, Any] = {}
     for panel in axes[0]:
         entries |= {w: h for h, w in zip(*panel.get_legend_handles_labels(), strict=True)}

@@ -18,13 +18,33 @@ def check_some(responses: Collection[object], remedy: str) -> None:
         raise InputError("responses", 0, "there is nothing to draw", remedy)
 
 
+def phase(response: xr.Dataset) -> Array:
+    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle."""
+    name = "drive_phase" if "drive_phase" in response else "crank_angle"
+    return response[name].to_numpy()
+
+
 def turns(response: xr.Dataset) -> Array:
-    """Crank angle in revolutions, shape (time,)."""
-    return response["crank_angle"].to_numpy() / TURN
+    """The same in revolutions, shape (time,)."""
+    return phase(response) / TURN
+
+
+def turns_label(response: xr.Dataset) -> str:
+    """The label of an axis of `turns`."""
+    return f"{'turns of the drive' if 'drive_phase' in response else 'crank angle'} (revolutions)"
+
+
+def crank_angle(response: xr.Dataset) -> tuple[Array, int]:
+    """Crank angle times its sense (time,), rad, which rises, and the sense, -1 clockwise; of a drive that swings its phase."""
+    angle = response["crank_angle"].to_numpy()
+    sense = -1 if angle[-1] < angle[0] else 1
+    if "drive_phase" in response and (sense * np.diff(angle) < 0.0).any():
+        return phase(response), 1
+    return sense * angle, sense
 
 
 def whole_turns(response: xr.Dataset) -> int:
-    """How many whole revolutions, from one passage of crank angle 0 to the last, a response holds."""
+    """How many whole revolutions, from one passage of phase 0 to the last, a response holds."""
     first, last = _passages(response)
     return last - first
 
@@ -145,7 +165,8 @@ def objective_by_turn(response: xr.Dataset) -> Array:
 
 def section(response: xr.Dataset, name: str | xr.DataArray, phase: float = 0.0) -> Array:
     """A variable, by name or itself, once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
-    angle = response["crank_angle"].to_numpy()
+    angle, sense = crank_angle(response)
+    phase = sense * phase
     first = np.ceil((angle[0] - phase) / TURN - 1e-6)
     last = np.floor((angle[-1] - phase) / TURN + 1e-6)
     at = phase + TURN * np.arange(first, last + 1)

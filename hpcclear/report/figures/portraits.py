@@ -56,7 +56,8 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
         len(joints), 1, 82.5 * len(joints), subplot_kw={"projection": "polar"}
     )
     force = labels.of(shown["contact_force"])
-    turn = motion.turns(shown)
+    angle, sense = motion.crank_angle(shown)
+    turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() for c in "xy")
         radius = shown["contact_force"].sel(joint=joint).to_numpy() * force.factor
@@ -106,7 +107,7 @@ def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
         panel.set_xlabel(x.label(labels.words(both[0])))
         panel.set_ylabel(y.label(labels.words(both[1])))
     bar = figure.colorbar(line, ax=axes[:, 0].tolist(), location="bottom", aspect=50, pad=0.02)
-    bar.set_label("crank angle (revolutions)")
+    bar.set_label(motion.turns_label(shown))
     style.settle([*axes[:, 0], bar.ax])
     return figure
 

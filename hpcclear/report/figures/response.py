@@ -60,7 +60,7 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
                 color=style.PALETTE["blue"],
             )
         panel.set_ylabel(unit.label(word))
-    axes[-1, 0].set_xlabel("crank angle (revolutions)")
+    axes[-1, 0].set_xlabel(motion.turns_label(shown))
     style.settle(axes, 4)
     figure.align_ylabels()
     return figure
@@ -84,7 +84,7 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     axes[0, 0].set_ylim(
         bottom=0.0
     )  # after both are drawn: a limit ends the automatic scale of the axis they share
-    axes[-1, 0].set_xlabel("crank angle (revolutions)")
+    axes[-1, 0].set_xlabel(motion.turns_label(shown))
     style.settle(axes)
     return figure
 
@@ -152,7 +152,7 @@ def energy_figure(response: xr.Dataset) -> "Figure":
         axes[2, 0].set_yscale("log")
         axes[2, 0].set_ylim(bottom=1e-5 * unit.factor * residual.max())
     axes[2, 0].set_ylabel(unit.label("|residual|"))
-    axes[2, 0].set_xlabel("crank angle (revolutions)")
+    axes[2, 0].set_xlabel(motion.turns_label(response))
     style.settle(axes)
     return figure
 

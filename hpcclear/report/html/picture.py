@@ -210,7 +210,7 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
 
 
 def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
-    """Curves of the last two revolutions: crank angle from 0 in revolutions, values in readable units."""
+    """Curves of the last two revolutions: turns of the drive from 0, values in readable units."""
     shown = motion.latest(response, 2)
     every = max(1, shown.sizes["time"] // most)
     shown = shown.isel(time=slice(None, None, every))
@@ -281,7 +281,9 @@ def _linkage(shown: xr.Dataset) -> Drawn:
         for body in map(str, shown["body"].to_numpy())
     ]
     points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
-    return bodies, points, shown["body_angle"].to_numpy()
+    angles = shown["body_angle"].to_numpy()
+    # without the whole turns before, which would cost digits
+    return bodies, points, angles - motion.TURN * np.floor(angles[0] / motion.TURN)
 
 
 def _pair(points: np.ndarray, e: np.ndarray) -> list[int]:
