@@ -68,6 +68,7 @@ def describe_scene(scene: Scene, cost: bool) -> None:
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
+    locked = _locked(scene)
     if scene.study is not None:
         from hpcclear.study import lives  # loads the statistics: not for every command
 
@@ -94,11 +95,11 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         ("MPI", _mpi()),
     ]
     out.print(table("What would be simulated", rows))
-    for warning in scene.warnings:
+    for warning in (*locked, *scene.warnings):
         out.print(f"[yellow]Warning:[/] {warning}")
     if scene.study is not None:
         out.print(table("Study", _study_rows(scene)))
-    if cost:
+    if cost and not locked:
         out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
 
 
@@ -112,6 +113,20 @@ def _assembly(scene: Scene) -> list[tuple[str, str]]:
     linkage_of(scene)
     lines = put_together(mechanism_of(tables_of(scene))).report()
     return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
+
+
+def _locked(scene: Scene) -> list[str]:
+    """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
+    if not scene.is_planar:
+        return []
+    from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
+
+    told = refused_of(scene)
+    if told is None:
+        return []
+    if not varies_geometry(scene):
+        raise told[1]
+    return [f"the scene's own design {told[1].reason}; its cost is not measured"]
 
 
 def _mpi() -> str:

@@ -106,7 +106,8 @@ def simulate(written: Written, output: Path) -> int:
         return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
-    click.echo(f"Error: {status.name.lower()}: {status.message}. {status.remedy}", err=True)
+    said = response.attrs.get("ended", status.message)
+    click.echo(f"Error: {status.name.lower()}: {said}. {status.remedy}", err=True)
     return Exit.FAILED
 
 
