@@ -62,8 +62,9 @@ def objective_of(content: xr.Dataset) -> tuple[str, str]:
     return labels.objective(content), str(unit)
 
 
-def describe_scene(scene: Scene, cost: bool) -> None:
-    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
+def describe_scene(scene: Scene, cost: bool) -> bool:
+    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
+    scene's own design can turn."""
     out = console()
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
@@ -101,6 +102,7 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         out.print(table("Study", _study_rows(scene)))
     if cost and not locked:
         out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
+    return not locked
 
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
@@ -222,7 +224,8 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     """Print the outcome of one response, what it took and where it went."""
     out = console()
     status = Status(int(response["status"]))
-    rows = [("status", f"{status.name.lower()}: {status.message}")]
+    said = f"{status.name.lower()}: {status.message}"
+    rows = [("status", response.attrs.get("ended", said))]
     if status is not Status.OK:
         rows.append(("remedy", status.remedy))
     f, spread = float(response["objective"]), float(response["objective_spread"])

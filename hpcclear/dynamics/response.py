@@ -145,9 +145,8 @@ def _between(
         q[:, -1] += cycle * steps.revolution
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
     h = (steps.time[k + 1] - steps.time[k])[:, None]
-    s = (times - steps.time[k])[:, None] / np.where(
-        h > 0.0, h, 1.0
-    )  # the last of a motion that stalled
+    safe = np.where(h > 0.0, h, 1.0)  # the last of a motion that stalled, or never began
+    s = (times - steps.time[k])[:, None] / safe
     d = q[k + 1] - q[k]
     v0, v1 = h * steps.v[k], h * steps.v[k + 1]
     a0, a1 = h * h * steps.a[k], h * h * steps.a[k + 1]
@@ -155,7 +154,8 @@ def _between(
     c4 = -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
     c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
     position = q[k] + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
-    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / safe
+    velocity = np.where(h > 0.0, velocity, steps.v[k])
     return position, velocity, steps.contacts[k], k, s[:, 0]
 
 

@@ -13,13 +13,14 @@ from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TableDrive, TorqueDrive, split
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
-from hpcclear.dynamics.planar.turning import refused, statuses
+from hpcclear.dynamics.planar.turning import loops_of, refused, statuses
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import Planar, turns_of
@@ -242,17 +243,29 @@ def start_states_of(scene: Scene, par: Array, points: Points | None, walk: bool 
         told = refused_of(scene) if walk else None
         found = np.full(len(par), int(Status.OK if told is None else told[0]))
     else:
-        samples = [_sample(scene, points, row) for row in range(len(par))]
+        bare = _without_study(scene)
+        samples = [_sample(bare, points, row) for row in range(len(par))]
         for row, sample in enumerate(samples):
             if sample is not None:
                 places[row], speeds[row] = coordinates(trees, sample[1])
         numbers = with_columns(tables_of(scene), linkage.mechanism, points)
         found = statuses(
-            linkage.mechanism, numbers, samples, scene.effects.gravity, _rounds(scene)
+            _twins(scene), numbers, samples, scene.effects.gravity, _rounds(scene)
         )
     _start_contacts(scene, linkage, par, start)
     start.fail(found)
     return start
+
+
+@lru_cache(maxsize=16)
+def _twins(scene: Scene) -> Loops | None:
+    return loops_of(linkage_of(scene).mechanism)
+
+
+@lru_cache(maxsize=16)
+def _without_study(scene: Scene) -> Scene:
+    """The scene of which those of samples are made in less than half the time."""
+    return scene if scene.study is None else scene.with_({"study": None})
 
 
 def _sample(scene: Scene, points: Points, row: int) -> tuple[Mechanism, Assembly] | None:

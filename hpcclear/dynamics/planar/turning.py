@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
@@ -120,18 +120,24 @@ def refused(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Status, 
     return found[1].ended.status, InputError(key, error.value, error.reason, error.remedy)
 
 
+def loops_of(structure: Mechanism) -> Loops | None:
+    """The loop-closure constraints of samples' twins, of what the samples have in common; None if they are not to be judged."""
+    twin = twin_of(structure)
+    return None if twin is None else Loops(twin, trees=True)
+
+
 def statuses(
-    structure: Mechanism, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None],
+    loops: Loops | None, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None],
     gravity: float, rounds: int,
 ) -> Integers:  # fmt: skip
     """Statuses (m,) of samples: whether each can turn.
 
     Parameters
     ----------
-    structure : Mechanism
-        What they have in common.
+    loops : Loops or None
+        Of `loops_of`; they take the samples' numbers.
     sample : Mechanism
-        The same with numbers of samples (m,).
+        With numbers of samples (m,).
     made : sequence of Mechanism and Assembly, or None
         Each sample by itself, put together; None of one that does not close.
     gravity : float
@@ -141,10 +147,9 @@ def statuses(
     found = np.full(len(made), int(Status.CANNOT_TURN))
     closed = np.array([one is not None for one in made], bool)
     found[closed] = int(Status.OK)
-    twin = twin_of(structure)
-    if twin is None or not closed.any():
+    if loops is None or not closed.any():
         return found
-    doubtful = closed & ~_clear(twin, sample, made)
+    doubtful = closed & ~_clear(loops, sample, made)
     for row in np.flatnonzero(doubtful):
         one = made[row]
         assert one is not None
@@ -157,15 +162,14 @@ def statuses(
 
 
 def _clear(
-    twin: Mechanism, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None]
-) -> np.ndarray:
+    loops: Loops, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None]
+) -> Booleans:
     """Which samples (m,) surely turn."""
-    loops = Loops(twin, trees=True)
     tables: dict[str, Any] = {
         "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
         "ground": sample.ground, "loads": (),
     }  # fmt: skip
-    numbers = with_numbers(twin, **tables)
+    numbers = with_numbers(loops.mechanism, **tables)
     loops.take(values(numbers))
     nowhere = np.full(loops.size, np.nan)
     start = [nowhere if one is None else coordinates(loops.forest, one[1])[0] for one in made]
