@@ -29,6 +29,8 @@ class Status(IntEnum):
     NEAR_SINGULAR = 6
     WORN_THROUGH = 7
     JUMP_TOO_SHORT = 8
+    CANNOT_TURN = 9
+    TORN_THROUGH = 10
 
     @property
     def valid(self) -> bool:
@@ -50,7 +52,7 @@ _TEXT = {
     Status.OK: ("finished", "nothing to do"),
     Status.STEP_CAP: (
         "numerics.max_steps was reached before the last revolution ended",
-        "raise numerics.max_steps or loosen numerics.rtol",
+        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; if all of them are meant, raise numerics.max_steps",
     ),
     Status.STEP_TOO_SMALL: (
         "the step size fell below the resolution of the time",
@@ -69,8 +71,9 @@ _TEXT = {
         "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
-        "the rod is hardly longer than the crank and no joint has play, so that at a dead centre forces grow without bound",
-        'lengthen the rod, or give a joint kind = "clearance"',
+        "the constraints of joints without clearance depend on one another at a change point (the rod is hardly longer than the "
+        "crank, a parallelogram in line), so that forces grow without bound or the motion is not determined",
+        'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
     ),
     Status.WORN_THROUGH: (
         "a clearance has grown to the radius of its bearing",
@@ -79,6 +82,14 @@ _TEXT = {
     Status.JUMP_TOO_SHORT: (
         "no jump of as many revolutions as are averaged meets wear.tolerance",
         "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
+    ),
+    Status.CANNOT_TURN: (
+        "the linkage cannot turn: without clearance it locks before its drives have gone round, or does not close at all",
+        "change lengths, points or angles so that it turns; hpcclear check of this design says where it locks",
+    ),
+    Status.TORN_THROUGH: (
+        "a journal penetrated its bearing by more than a quarter of the bearing's radius, which no contact bears",
+        "check masses, speed and loads, the stiffness of the contact and whether the mechanism can move",
     ),
 }
 

@@ -62,12 +62,14 @@ def objective_of(content: xr.Dataset) -> tuple[str, str]:
     return labels.objective(content), str(unit)
 
 
-def describe_scene(scene: Scene, cost: bool) -> None:
-    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
+def describe_scene(scene: Scene, cost: bool) -> bool:
+    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
+    scene's own design can turn."""
     out = console()
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
+    locked = _locked(scene)
     if scene.study is not None:
         from hpcclear.study import lives  # loads the statistics: not for every command
 
@@ -94,12 +96,13 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         ("MPI", _mpi()),
     ]
     out.print(table("What would be simulated", rows))
-    for warning in scene.warnings:
+    for warning in (*locked, *scene.warnings):
         out.print(f"[yellow]Warning:[/] {warning}")
     if scene.study is not None:
         out.print(table("Study", _study_rows(scene)))
-    if cost:
+    if cost and not locked:
         out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
+    return not locked
 
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
@@ -112,6 +115,20 @@ def _assembly(scene: Scene) -> list[tuple[str, str]]:
     linkage_of(scene)
     lines = put_together(mechanism_of(tables_of(scene))).report()
     return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
+
+
+def _locked(scene: Scene) -> list[str]:
+    """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
+    if not scene.is_planar:
+        return []
+    from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
+
+    told = refused_of(scene)
+    if told is None:
+        return []
+    if not varies_geometry(scene):
+        raise told[1]
+    return [f"the scene's own design {told[1].reason}; its cost is not measured"]
 
 
 def _mpi() -> str:
@@ -207,7 +224,8 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     """Print the outcome of one response, what it took and where it went."""
     out = console()
     status = Status(int(response["status"]))
-    rows = [("status", f"{status.name.lower()}: {status.message}")]
+    said = f"{status.name.lower()}: {status.message}"
+    rows = [("status", response.attrs.get("ended", said))]
     if status is not Status.OK:
         rows.append(("remedy", status.remedy))
     f, spread = float(response["objective"]), float(response["objective_spread"])

@@ -58,12 +58,14 @@ def init(file: Path, four_stroke: bool) -> int:
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
+    Exit code 1 if the file's own design cannot turn while its study varies that, 2 if none can.
+
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
     from hpcclear.cli.printing import describe_scene
 
     scene = written.scene(warn=False)
-    describe_scene(scene, cost)
+    turns = describe_scene(scene, cost)
     if sketch is not None:
         from hpcclear.report import save, sketch_figure
 
@@ -73,7 +75,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
             poses = poses_at_start(scene)
         click.echo(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
-    return Exit.DONE
+    return Exit.DONE if turns else Exit.FAILED
 
 
 @click.command(short_help="Simulate one response.")
@@ -106,7 +108,8 @@ def simulate(written: Written, output: Path) -> int:
         return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
-    click.echo(f"Error: {status.name.lower()}: {status.message}. {status.remedy}", err=True)
+    said = response.attrs.get("ended", f"{status.name.lower()}: {status.message}")
+    click.echo(f"Error: {said}. {status.remedy}", err=True)
     return Exit.FAILED
 
 

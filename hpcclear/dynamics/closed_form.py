@@ -21,6 +21,7 @@ class ClosedForm:
         self._problem = problem
         self._labels: list[Integers] = []
         self._par: list[Array] = []
+        self._starts: list[Array] = []
 
     @property
     def pending(self) -> int:
@@ -28,8 +29,9 @@ class ClosedForm:
         return sum(map(len, self._labels))
 
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
-        """Add samples: parameters (m, PARAMETERS), labels (m,); there is no start to heed."""
+        """Add samples: parameters (m, PARAMETERS), m starts, of which only failures count, labels (m,)."""
         self._par.append(par)
+        self._starts.append(start.rows)
         self._labels.append(labels)
 
     def advance(self, seconds: float) -> None:
@@ -39,16 +41,17 @@ class ClosedForm:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
         labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
         par = np.concatenate([np.zeros((0, self._problem.parameter_rows)), *self._par])
-        self._labels, self._par = [], []
-        return labels, self.run(par), par
+        start = Start(np.concatenate([Start.at_rest(0).rows, *self._starts]))
+        self._labels, self._par, self._starts = [], [], []
+        return labels, self.run(par, start), par
 
-    def run(self, par: Array, start: Start | None = None) -> Outcome:
-        """Outcomes of samples, in their order: parameters (m, PARAMETERS); there is no start to heed."""
+    def run(self, par: Array, start: Start) -> Outcome:
+        """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""
         p = self._problem
         if p.linkage is not None:
-            return Outcome(outcomes(p, par))
+            return p.marked(Outcome(outcomes(p, par)), par, start)
         rows = ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged)
-        return p.mark_near_singular(Outcome(rows), par)
+        return p.marked(Outcome(rows), par, start)
 
 
 def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:

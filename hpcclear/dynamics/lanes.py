@@ -191,7 +191,7 @@ class Lanes:
         while self.step(NO_LIMIT):
             pass
         self.counters[FINISHED] = 0
-        return self.problem.mark_near_singular(Outcome(self._queue.out), par)
+        return self.problem.marked(Outcome(self._queue.out), par, start)
 
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
         """Add samples: parameters (m, PARAMETERS), m starts, labels (m,).
@@ -273,5 +273,6 @@ class Lanes:
         slots = self._queue.finished[:count].copy()
         self.counters[FINISHED] = 0
         par = self._queue.par[slots]
-        outcome = self.problem.mark_near_singular(Outcome(self._queue.out[slots]), par)
+        start = Start(self._queue.start[slots])
+        outcome = self.problem.marked(Outcome(self._queue.out[slots]), par, start)
         return self._labels[slots], outcome, par

@@ -25,7 +25,7 @@ from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
 from hpcclear.dynamics.stepping.settings import STRICT
-from hpcclear.dynamics.views import Outcome, Parameters, Settings
+from hpcclear.dynamics.views import Outcome, Parameters, Settings, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.planar import main_drive
@@ -52,6 +52,10 @@ LEAST_RISE = {"torque": 5e-3, "speed": 1e-3}
 
 What it feels changes within so small a part of a turn that steps, or the instants that works are summed over, pass over it.
 Under a torque the energy closes to 1e-4 with 6e-3 and to 0.15 with 2e-3; at a speed to 2e-9 with 2e-3 and to 5e-3 with 2e-4."""
+
+TORN = 0.25
+"""Penetration over a bearing's radius from which on a result is none: contact laws are of small ones, the softest bearing
+(0.5 GPa) of the paper comes to 0.035, and no material takes strains of this size."""
 
 THROWN_BACK = 0.0873
 """How far (5 degrees) from its start a body that a torque drives may turn back, rad, in its first revolution from rest:
@@ -154,11 +158,16 @@ class Problem:
         module = written_by(effects) if self.linkage is None else self.linkage.module(effects)
         return motion_text(module, effects, width)
 
-    def mark_near_singular(self, outcome: Outcome, par: Array) -> Outcome:
-        """Outcomes (m) of samples (m, PARAMETERS), those marked that a slider-crank without play hardly gets through."""
+    def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
+        """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
+        their starts (m), were torn through, or that a slider-crank without clearance hardly gets through."""
+        p, failed = Parameters(par), start.failed
+        outcome.status[failed != Status.OK] = failed[failed != Status.OK]
+        torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
+        valid = np.isin(outcome.status, [status for status in Status if status.valid])
+        outcome.status[valid & torn] = Status.TORN_THROUGH
         open_joints = any(flag is not None for flag in at.open_of(self.effects))
         if self.linkage is None and not open_joints:
-            p = Parameters(par)
             least = LEAST_RISE["speed" if self.effects.torque is None else "torque"]
             flat = 1.0 - (p.crank_length / p.rod_length) ** 2 < least**2
             outcome.status[(outcome.status == Status.OK) & flat] = Status.NEAR_SINGULAR

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY
+from hpcclear.base.outcome import STEADY, failed
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
@@ -24,7 +24,7 @@ from hpcclear.dynamics.linkage.bending import Bent
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -64,10 +64,14 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
     """Integrate a scene, or a kicked copy; its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
     problem = problem_of(scene, ledger=True, series=True, single=True)
     par = parameters(scene)
-    start = start_states(scene, par)
+    start = start_states(scene, par, walk=False)
     if copy:
         start = kicked(start, scales(scene), range(copy, copy + 1))
     n = problem.coordinates
+    told = refused_of(scene) if scene.is_planar else None
+    if told is not None:
+        row = _first_row(problem, par[0], start[0], n)
+        return _steps(row, n), failed(0, told[0]), par[0]
     buffer = np.zeros((_CHUNK, rec.columns(n)))
     lanes = Lanes(problem, 1, buffer)
     lanes.queue(par, start, np.zeros(1, np.int64))
@@ -78,8 +82,18 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
     # last: what it calls was compiled beside the stepper
     rows = np.concatenate([_first_row(problem, par[0], start[0], n), *chunks])
     labels, out, finished = lanes.collect()
+    return (
+        _steps(rows, n),
+        outcome_records(labels, out, finished, responses_told(problem), bool(problem.effects.wear)),
+        par[0],
+    )
+
+
+def _steps(rows: Array, n: int) -> Steps:
+    """Rows of the record by name; a motion that ended where it began has the start twice."""
+    rows = rows if len(rows) > 1 else rows[[0, 0]]
     s = rec.STATE
-    steps = Steps(
+    return Steps(
         rows[:, rec.TIME],
         rows[:, rec.TURN_TIME],
         rows[:, rec.REVOLUTION],
@@ -88,11 +102,6 @@ def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
         rows[:, s : s + n],
         rows[:, s + n : s + 2 * n],
         rows[:, s + 2 * n :],
-    )
-    return (
-        steps,
-        outcome_records(labels, out, finished, responses_told(problem), bool(problem.effects.wear)),
-        par[0],
     )
 
 
@@ -136,9 +145,8 @@ def _between(
         q[:, -1] += cycle * steps.revolution
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
     h = (steps.time[k + 1] - steps.time[k])[:, None]
-    s = (times - steps.time[k])[:, None] / np.where(
-        h > 0.0, h, 1.0
-    )  # the last of a motion that stalled
+    safe = np.where(h > 0.0, h, 1.0)  # the last of a motion that stalled, or never began
+    s = (times - steps.time[k])[:, None] / safe
     d = q[k + 1] - q[k]
     v0, v1 = h * steps.v[k], h * steps.v[k + 1]
     a0, a1 = h * h * steps.a[k], h * h * steps.a[k + 1]
@@ -146,7 +154,8 @@ def _between(
     c4 = -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
     c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
     position = q[k] + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
-    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / safe
+    velocity = np.where(h > 0.0, velocity, steps.v[k])
     return position, velocity, steps.contacts[k], k, s[:, 0]
 
 
@@ -165,6 +174,8 @@ def instants(scene: Scene, steps: Steps) -> Array:
     count = scene.output.instants_per_revolution
     if count == 0:
         return steps.time
+    if steps.time[-1] == steps.time[0]:
+        return steps.time[:1]  # it ended where it began
     ends = np.flatnonzero(np.diff(steps.revolution) > 0)  # the rows that close a revolution
     borders = np.concatenate([[0.0], steps.time[ends]])
     if steps.time[-1] > borders[-1]:
@@ -222,7 +233,8 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
         {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
-        | {"integrator": integrator_of(scene, single=True)},
+        | {"integrator": integrator_of(scene, single=True)}
+        | _reason(scene),
         objective,
         labels,
         _dimensions(scene),
@@ -236,6 +248,12 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         return modes or None
     found = planar_labels(linkage_of(scene).mechanism) | modes
     return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
+
+
+def _reason(scene: Scene) -> dict[str, str]:
+    """Where a linkage that cannot turn locks, as an attribute."""
+    told = refused_of(scene) if scene.is_planar else None
+    return {} if told is None else {"ended": told[1].reason}
 
 
 _TOLD = (

@@ -11,10 +11,13 @@ from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.points import Points
 
 
-def start_states(scene: Scene, par: Array, points: Points | None = None) -> Start:
+def start_states(
+    scene: Scene, par: Array, points: Points | None = None, walk: bool = True
+) -> Start:
     """Start of each sample, of parameters (samples, PARAMETERS) and the points they were made from.
 
-    Journals are centred, or where ``start_eccentricity`` puts them.
+    Journals are centred, or where ``start_eccentricity`` puts them. Linkages that cannot turn fail at the start, unless `walk` is
+    off.
 
     Raises
     ------
@@ -22,7 +25,7 @@ def start_states(scene: Scene, par: Array, points: Points | None = None) -> Star
         If a linkage cannot be put together.
     """
     if scene.is_planar:
-        return start_states_of(scene, par, points)
+        return start_states_of(scene, par, points, walk)
     p = Parameters(par)
     first, second, free = topology(scene)
     count = len(par)

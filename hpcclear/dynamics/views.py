@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping import settings
 
@@ -96,6 +97,17 @@ class Start(View):
     def velocities(self, n: int) -> Array:
         """Their velocities, shape (..., n)."""
         return self.rows[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
+
+    def fail(self, statuses: Array) -> None:
+        """Let samples (m,) with another status than OK fail at the start, without a step."""
+        self.moving[np.asarray(statuses) == Status.CANNOT_TURN] = np.nan
+        self.moving[np.asarray(statuses) == Status.NEAR_SINGULAR] = np.inf
+
+    @property
+    def failed(self) -> Array:
+        """Statuses (...) of samples that fail at the start, OK of the others."""
+        turns = np.where(np.isinf(self.moving).any(axis=-1), Status.NEAR_SINGULAR, Status.OK)
+        return np.where(np.isnan(self.moving).any(axis=-1), Status.CANNOT_TURN, turns)
 
     def state(self, n: int) -> Array:
         """Coordinates, then velocities, shape (..., 2 n); a copy."""

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hpcclear.base.errors import InputError
 from hpcclear.scene.bending import Bending, check_bars
 from hpcclear.scene.driving import PlanarDrive, PlanarLoad
 from hpcclear.scene.fields import (
@@ -286,5 +287,16 @@ def turns_of(planar: Planar) -> int:
 
 
 def main_drive(planar: Planar) -> PlanarDrive:
-    """The drive that gives the period."""
+    """The drive that gives the period.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not planar.drives:
+        raise InputError(
+            "mechanism.drives", None, "nothing drives the mechanism",
+            'Add [mechanism.drives.NAME] with a kind, say "constant-speed", and a body',
+        )  # fmt: skip
     return next((drive for drive in planar.drives if drive.period), planar.drives[0])

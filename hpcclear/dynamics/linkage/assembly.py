@@ -63,13 +63,14 @@ def assemble(mechanism: Mechanism) -> Assembly:
     q, steps = _closed(loops, rough_pose(loops), wanted)
     zero = np.zeros(loops.size)
     state = loops.at(q, zero, 0.0)
-    ideal = np.array([not _open(mechanism, owner) for owner in loops.owners], bool)
+    ideal = np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
     check_rank(loops, state.jacobian, ideal, 0.0)
     v, *_ = np.linalg.lstsq(state.jacobian * loops.scales, -state.rate, rcond=1e-12)
     return Assembly(loops, q, v * loops.scales, steps)
 
 
-def _open(mechanism: Mechanism, owner: str) -> bool:
+def is_open(mechanism: Mechanism, owner: str) -> bool:
+    """Whether a constraint, by its owner, is that of a joint with clearance or of a torque."""
     table, name = owner.split(".")
     clear = {joint.name for joint in mechanism.clearances}
     free = {drive.name for drive in mechanism.drives if not drive.prescribed}
@@ -189,7 +190,7 @@ def check_rank(loops: Loops, jacobian: Array, rows: Array, time: float) -> float
     raise InputError(
         joint, smallest, f"holds nothing at {time:.4g} s that the others do not hold already: a dead centre "
         "that the drives cannot pass, or a joint too many",
-        "Move the start angles away from it, change a length, or give a joint clearance",
+        "Move the start angles away from it, change a length, or remove the joint that is too many",
     )  # fmt: skip
 
 

@@ -46,7 +46,7 @@ WORDS: dict[str, Callable[..., Any]] = {
 
 
 class State(NamedTuple):
-    """Constraints at a pose: errors (rows,), rates (rows,), Jacobian (rows, n)."""
+    """Constraints at poses: errors (rows, ...), rates (rows, ...), Jacobians (..., rows, n)."""
 
     error: Array
     rate: Array
@@ -55,25 +55,28 @@ class State(NamedTuple):
 
 class Loops:
     """Constraints of a mechanism's bodies, three coordinates each; `closed`: joints with clearance centred, torque drives at
-    their initial speed.
+    their initial speed. `trees`: those of the joints that close loops, in the coordinates of the trees.
 
     Attributes
     ----------
     owners : tuple of str
         Which joint or drive each row belongs to, "joints.NAME" or "drives.NAME".
     scales : ndarray, shape (n,)
-        What a coordinate's unit step means: a typical length for x and y, 1 for angles.
+        What a coordinate's unit step means: a typical length for x, y and along guides, 1 for angles.
+    row_scales : ndarray, shape (rows,)
+        What a constraint's unit error means, likewise.
     """
 
-    def __init__(self, mechanism: Mechanism, closed: bool = False) -> None:
+    def __init__(self, mechanism: Mechanism, closed: bool = False, trees: bool = False) -> None:
         self.mechanism = mechanism = straight(mechanism)  # what bends starts straight
-        self.forest = forest(mechanism, cartesian=True, closed=closed)
+        self.forest = forest(mechanism, cartesian=not trees, closed=closed)
         columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
         self.size = n = len(columns)
         writer = Writer({}, 0, hoist=False)
         kinematics = Kinematics(self.forest, writer, 0, n, 2 * n)
         closing = Closing(kinematics, writer)
         owners: list[str] = []
+        angles: list[bool] = []
         texts: list[str] = []
         places: list[tuple[int, int]] = []
         for one in self.forest.closures:
@@ -81,6 +84,7 @@ class Loops:
             for row in closing.rows(one):
                 r = len(owners)
                 owners.append(f"{table}.{one.name}")
+                angles.append(row.name.endswith("_angle"))
                 texts += [f"error[{r}] = {writer.text(row.error)}"]
                 texts += [f"rate[{r}] = {writer.text(row.rate)}"]
                 for column, term in row.columns.items():
@@ -92,19 +96,24 @@ class Loops:
         names: dict[str, Any] = WORDS | words_of(mechanism)
         exec(f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}", names)
         self._evaluate = names["closed"]
-        base = values(mechanism, cartesian=True)
-        self._par = {writer.rows[name]: base[name] for name in writer.read}
-        length = typical_length(mechanism)
+        self._rows = {name: writer.rows[name] for name in writer.read}
+        self.take(values(mechanism, cartesian=not trees))
+        self.length = length = typical_length(mechanism)
         self.scales = np.array([1.0 if c.kind == "angle" else length for c in columns])
+        self.row_scales = np.where(angles, 1.0, length)
 
-    def at(self, q: Array, v: Array, time: float) -> State:
-        """Constraints of coordinates and velocities (n,) at a time in s."""
-        rows = len(self.owners)
-        error, rate = np.zeros(rows), np.zeros(rows)
-        entries = np.zeros(len(self._places[0]))
+    def take(self, base: dict[str, Any]) -> None:
+        """Other numbers of the same mechanism, by names as of `numbers.values`: single ones, or arrays of samples (m,)."""
+        self._par = {row: base[name] for name, row in self._rows.items()}
+
+    def at(self, q: Array, v: Array, time: Any) -> State:
+        """Constraints of coordinates and velocities (n, ...) at times (...) in s."""
+        rows, shape = len(self.owners), np.shape(time)
+        error, rate = np.zeros((2, rows, *shape))
+        entries = np.zeros((len(self._places[0]), *shape))
         self._evaluate([*q, *v, time], self._par, error, rate, entries)
-        jacobian = np.zeros((rows, self.size))
-        jacobian[self._places] = entries
+        jacobian = np.zeros((*shape, rows, self.size))
+        jacobian[..., self._places[0], self._places[1]] = np.moveaxis(entries, 0, -1)
         return State(error, rate, jacobian)
 
 

@@ -1,30 +1,34 @@
-"""Linkages without clearance whose drives prescribe everything: the motion by Newton from the instant before, no integration.
+"""Linkages without clearance whose drives prescribe everything: the motion from a walk (`passage`), no integration.
 
-Positions and velocities from the loops, accelerations, reactions and drive moments from the generated equations in Cartesian
+Positions and velocities from the walk, accelerations, reactions and drive moments from the generated equations in Cartesian
 coordinates (feedback off), all instants at once.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_rank
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
+from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
+from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.linkage.passage import BESIDE, Node, Passage, walked
+from hpcclear.dynamics.linkage.poses import Poses, coordinates, placed
 from hpcclear.dynamics.linkage.table_drive import words_of
 
-FARTHEST = (
-    0.05  # rad, or of the typical length: how far Newton may go from where the step was to end
-)
-MOST_HALVES = 24
-_NEWTON = 12
+DIVERGING = 1e-6
+"""Force times distance from a change point, rad of the drive, over the largest force further off, from which on it has no
+bound there."""
 
 
 @dataclass(frozen=True)
@@ -69,67 +73,175 @@ def prescribed_motion(
             "drives", freedom(mechanism), "something is left free: the drives do not prescribe the motion",
             "Prescribe the angle of one body a degree of freedom, and give no joint clearance",
         )  # fmt: skip
-    assembly = assemble(mechanism)
-    found, margin = passed_through(assembly, times)
-    return _reactions(assembly, np.asarray(times), found, gravity, margin, curves or {})
+    assembly, times = assemble(mechanism), np.asarray(times, float)
+    rounds = math.ceil(times.max(initial=0.0) / mechanism.period.seconds)
+    passage = passage_of(assembly, max(rounds, 1), gravity)
+    if len(passage.passed(times)) < len(times):
+        raise refusal(assembly, passage)
+    return _motion(assembly, passage, times, gravity, curves or {})
 
 
-def passed_through(assembly: Assembly, times: Array) -> tuple[Array, Array]:
-    """Coordinates and velocities (t, 2, n) at instants (t,) that rise from 0, and how far from a dead centre each is (t,).
+def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage:
+    """How a linkage put together gets through so many revolutions of its drives, which leave nothing free.
+
+    It ends with ``NEAR_SINGULAR`` at a change point where forces of joints grow without bound.
+    """
+    mechanism = assembly.loops.mechanism
+    main, loops = mechanism.period, Loops(mechanism, trees=True)
+    start, _ = coordinates(loops.forest, assembly)
+    found = walked(loops, start, main.seconds, getattr(main, "turns", 1), rounds)
+    for change in found.changes:
+        if freedom(mechanism) == 0 and _diverges(assembly, found, change, gravity):
+            found.end(Status.NEAR_SINGULAR, change)
+            break
+    return found
+
+
+def _diverges(assembly: Assembly, passage: Passage, change: Node, gravity: float) -> bool:
+    """Whether a force grows as one over the distance from a change point; tabulated loads count as those of factor 1."""
+    near = BESIDE * passage.unit / np.array([1.0, 8.0])
+    far = np.linspace(0.1, 1.0, 10) * min(change.time, passage.unit)
+    sides = change.time + np.concatenate([-near, near])
+    times = np.concatenate([sides, change.time - far])
+    tables = [load.name for load in assembly.loops.mechanism.loads if getattr(load, "table", False)]
+    rows = cartesian(assembly, passage, *passage.at(times), times)
+    ones = dict.fromkeys(tables, np.ones_like)
+    held = _reactions(assembly, times, rows, gravity, np.zeros(len(times)), ones).holds
+    sizes = [assembly.loops.length if name.endswith("_angle") else 1.0 for name in held]
+    force = np.array(list(held.values())) / np.array(sizes)[:, None]
+    wide, close = 0.5 * (force[:, 2:4] - force[:, :2]).T
+    residue = np.abs(close - wide / 8.0).max() * BESIDE / (8.0 - 1.0 / 8.0)
+    return bool(residue > DIVERGING * np.abs(force[:, 4:]).max())
+
+
+def refusal(assembly: Assembly, passage: Passage) -> InputError:
+    """What to say of a linkage that does not get through."""
+    main = assembly.loops.mechanism.period
+    return InputError(
+        f"drives.{main.name}", main.body, why(assembly, passage),
+        "Change a length, a point or an angle so that it passes",
+    )  # fmt: skip
+
+
+def why(assembly: Assembly, passage: Passage) -> str:
+    """Where a walk ended, by the angle of the drive's body, and which bodies and joints hold one another there."""
+    assert passage.ended is not None
+    status, node = passage.ended
+    time = node.time
+    loops, mechanism = assembly.loops, assembly.loops.mechanism
+    (q, v), *_ = cartesian(assembly, passage, node.q[:, None], node.v[:, None], np.array([time]))
+    pose = replace(assembly, q=q, v=v)
+    jacobian = loops.at(q, v, time).jacobian * loops.scales / loops.row_scales[:, None]
+    left = np.linalg.svd(jacobian)[0][:, -1]  # the forces that hold one another
+    held = {
+        joint.name: float(np.linalg.norm(left[np.array(loops.owners) == f"joints.{joint.name}"]))
+        for joint in mechanism.joints
+    }
+    driven = {drive.body for drive in mechanism.drives} | {GROUND}
+    loaded = [j for j in mechanism.joints if held[j.name] > 0.05 * max(held.values())]
+    bodies = [
+        body.name
+        for body in mechanism.bodies
+        if body.name not in driven
+        and sum(body.name in map(_body, joint.places) for joint in loaded) > 1
+    ]
+    between = [j for j in loaded if set(bodies) & set(map(_body, j.places))]
+    points = np.array([[(z := placed(pose, j.places[0])[0]).real, z.imag] for j in between])
+    spread = np.linalg.svd(points - points.mean(axis=0))[1] if len(points) else np.ones(2)
+    straight = len(spread) > 1 and spread[1] < 0.02 * spread[0]
+    body = mechanism.period.body
+    where = f"{math.degrees(placed(pose, f'{body}.{CENTER}')[2]) % 360.0:.1f} deg of the {body}"
+    names = " and ".join([", ".join(bodies[:-1]), bodies[-1]] if len(bodies) > 1 else bodies)
+    state = f"{names} {'in line' if straight and len(bodies) > 1 else 'jammed'}" if bodies else "jammed"
+    joints = ", ".join(joint.name for joint in between)
+    state += f" (joints {joints})" if joints else ""
+    if status is Status.CANNOT_TURN:
+        return f"cannot turn: locks at {where}, {state}"
+    return f"near singular: at {where}, {state}, its motion or its forces are not determined"
+
+
+def _body(place: str) -> str:
+    return split(place)[0]
+
+
+def cartesian(assembly: Assembly, passage: Passage, q: Array, v: Array, times: Array) -> Array:
+    """Coordinates and velocities (t, 2, n) in the order of ``assembly.loops.forest``, of those of the trees (n, t)."""
+    mechanism, loops = assembly.loops.mechanism, assembly.loops
+    poses = Poses(passage.loops.forest, {}, 0)
+    base = values(mechanism)
+    par = np.zeros(max(poses.rows.values(), default=0) + 1)
+    for name, row in poses.rows.items():
+        par[row] = base[name]
+    pose, _ = poses.at(par, q, v, times)
+    names = [body.name for body in mechanism.bodies]
+    parts = {"x": (pose.x, pose.vx), "y": (pose.y, pose.vy), "angle": (pose.angle, pose.spin)}
+    found = np.zeros((len(times), 2, loops.size))
+    for k, one in enumerate(loops.forest.coordinates):
+        for kind in range(2):
+            found[:, kind, k] = parts[one.kind][kind][names.index(one.body)]
+    return found
+
+
+def passed_through(assembly: Assembly, times: Array) -> Array:
+    """Coordinates and velocities (t, 2, n) at instants (t,), s, that rise from 0.
 
     Raises
     ------
     InputError
         Where the mechanism comes to a dead centre.
     """
-    loops, q, here = assembly.loops, assembly.q, 0.0
-    found = np.zeros((len(times), 2, loops.size))
-    margin = np.zeros(len(times))
-    everything = np.ones(len(loops.owners), bool)
-    v = assembly.v
-    for row, time in enumerate(times):
-        if time > here:
-            q, v = _passed(loops, q, v, here, time, MOST_HALVES)
-            here = time
-        margin[row] = check_rank(loops, loops.at(q, v, time).jacobian, everything, time)
-        found[row] = q, v
-    return found, margin
+    rounds = math.ceil(times.max(initial=0.0) / assembly.loops.mechanism.period.seconds)
+    passage = passage_of(assembly, max(rounds, 1))
+    if len(passage.passed(times)) < len(times):
+        raise refusal(assembly, passage)
+    shown, filled = _beside(passage, times)
+    return filled(cartesian(assembly, passage, *passage.at(shown), shown))
 
 
-def _passed(
-    loops: Loops, q: Array, v: Array, start: float, end: float, halves: int
-) -> tuple[Array, Array]:
-    """From one instant to the next, halved where Newton would have to go far, which might lead to another assembly."""
-    guess = q + (end - start) * v
-    new = guess.copy()
-    for _ in range(_NEWTON):
-        state = loops.at(new, v, end)
-        change, *_ = np.linalg.lstsq(state.jacobian * loops.scales, -state.error, rcond=None)
-        new = new + loops.scales * change
-        if np.abs(change).max() < 1e-13:
-            break
-    far = np.abs((new - guess) / loops.scales).max()
-    turned = np.abs((end - start) * v / loops.scales).max()
-    if (
-        np.isfinite(far)
-        and far < FARTHEST
-        and turned < 5 * FARTHEST
-        and np.abs(change).max() < 1e-9
-    ):
-        state = loops.at(new, np.zeros(loops.size), end)
-        rates, *_ = np.linalg.lstsq(state.jacobian * loops.scales, -state.rate, rcond=None)
-        return new, rates * loops.scales
-    if halves == 0:
-        everything = np.ones(len(loops.owners), bool)
-        check_rank(loops, state.jacobian, everything, end)
-        worst = loops.owners[int(np.abs(state.error).argmax())]
-        raise InputError(
-            worst, end, "the mechanism cannot be moved on from here (s)",
-            "Change a length so that the drives can turn through, or give a joint clearance",
-        )  # fmt: skip
-    middle = 0.5 * (start + end)
-    q, v = _passed(loops, q, v, start, middle, halves - 1)
-    return _passed(loops, q, v, middle, end, halves - 1)
+def _beside(passage: Passage, times: Array) -> tuple[Array, Callable[[Array], Array]]:
+    """Instants to compute, and what makes values at `times` (t,) of values there, the instants first: beside a change point,
+    polynomials of the fifth degree through values on both its sides."""
+    centres = passage.beside(times)
+    inside = np.isfinite(centres)
+    places = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+    reach = BESIDE * passage.unit
+    around = centres[inside, None] + places * reach
+    s = (times[inside] - centres[inside])[:, None] / reach
+    weights = np.ones((inside.sum(), 6))
+    for k, one in enumerate(places):
+        others = np.delete(places, k)
+        weights[:, k] = ((s - others) / (one - others)).prod(axis=1)
+    shown = np.concatenate([np.where(inside, centres + reach, times), around.ravel()])
+
+    def filled(values: Array) -> Array:
+        found = values[: len(times)].copy()
+        nodes = values[len(times) :].reshape(-1, 6, *values.shape[1:])
+        found[inside] = np.einsum("tk,tk...->t...", weights, nodes)
+        return found
+
+    return shown, filled
+
+
+def _motion(
+    assembly: Assembly,
+    passage: Passage,
+    times: Array,
+    gravity: float,
+    curves: Mapping[str, Callable[[Array], Array]],
+) -> Prescribed:
+    """Motion and reactions at instants (t,)."""
+    shown, filled = _beside(passage, times)
+    rows = cartesian(assembly, passage, *passage.at(shown), shown)
+    everything = np.ones(len(assembly.loops.owners), bool)
+    margin = np.array([
+        check_rank(assembly.loops, assembly.loops.at(q, v, time).jacobian, everything, time)
+        for (q, v), time in zip(rows, shown, strict=True)
+    ])  # fmt: skip
+    found = _reactions(assembly, shown, rows, gravity, margin, curves)
+    holds = {name: filled(value) for name, value in found.holds.items()}
+    parts = (found.q, found.v, found.a, found.power, found.loss, found.load_power, found.margin)
+    q, v, a, power, loss, load_power, margin = map(filled, parts)
+    return Prescribed(assembly, times, q, v, a, holds, power, loss, load_power, margin)
 
 
 def _reactions(

@@ -10,17 +10,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import (
-    Clearance,
-    ConstantSpeed,
-    Joint,
-    Revolute,
-    TorqueDrive,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.poses import placed
 from hpcclear.dynamics.linkage.prescribed import passed_through
 from hpcclear.dynamics.planar.problem import linkage_of, tables_of
+from hpcclear.dynamics.planar.turning import without_play
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -73,7 +67,7 @@ def _path(ideal: Mechanism, place: str) -> Path:
     share = np.linspace(0.0, 1.0, INSTANTS * drive.turns + 1)
     assembly = assemble(ideal)
     times = share * drive.seconds
-    rows, _ = passed_through(assembly, times)
+    rows = passed_through(assembly, times)
     seen = [placed(replace(assembly, q=q, v=v), place)[:2] for q, v in rows]
     where, speed = np.array(seen).T
     path: Path = CubicHermiteSpline(share, where, speed * drive.seconds)
@@ -109,20 +103,3 @@ def ideal_path(mechanism: Mechanism, place: str) -> Path | None:
         return None if freedom(ideal) else _path(ideal, place)
     except InputError:
         return None
-
-
-def without_play(mechanism: Mechanism) -> Mechanism:
-    """The same with pins in place of clearances, and a drive of constant speed in place of a torque."""
-
-    def pin(joint: Joint) -> Joint:
-        if isinstance(joint, Clearance):
-            return Revolute(joint.name, joint.journal, joint.bearing)
-        return joint
-
-    drives = tuple(
-        ConstantSpeed(d.name, d.body, d.usual_speed, d.period, d.turns)
-        if isinstance(d, TorqueDrive)
-        else d
-        for d in mechanism.drives
-    )
-    return replace(mechanism, joints=tuple(map(pin, mechanism.joints)), drives=drives, loads=())

@@ -15,6 +15,7 @@ from hpcclear.dynamics.planar.path import followed, rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
 from hpcclear.dynamics.planar.response import bodies_and_points, driven
 from hpcclear.dynamics.planar.tables import curves_of
+from hpcclear.dynamics.planar.turning import passage
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -37,10 +38,7 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     ``pin_force_x`` and ``pin_force_y`` (t, pins) are the forces of the ideal pins on their journals' bodies. Works are
     sums over the instants.
 
-    Raises
-    ------
-    InputError
-        If the linkage comes to a dead centre.
+    They end before a dead centre, and before a change point at which the motion or the forces are not determined.
     """
     mechanism, tables = linkage_of(scene).mechanism, tables_of(scene)
     problem = problem_of(scene)
@@ -52,6 +50,8 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
 
     period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
+    walk = passage(mechanism, scene.effects.gravity, revolutions)
+    times = times if walk is None else walk[1].passed(times)
     phase = cycle * times / period
     gravity = scene.effects.gravity
     turns, interpolation = turns_of(tables), scene.numerics.interpolation

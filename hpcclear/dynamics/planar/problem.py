@@ -8,15 +8,19 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TableDrive, TorqueDrive, split
+from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
+from hpcclear.dynamics.planar.turning import loops_of, refused, statuses
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import Planar, turns_of
@@ -206,10 +210,29 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     )
 
 
-def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
+@lru_cache(maxsize=64)
+def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
+    """The status of a scene whose own linkage cannot turn, and what to say; None of one that can, or is not to be judged.
+
+    Raises
+    ------
+    InputError
+        If it cannot be put together.
+    """
+    return refused(mechanism_of(tables_of(scene)), scene.effects.gravity, _rounds(scene))
+
+
+def _rounds(scene: Scene) -> int:
+    """Revolutions that a linkage without clearance goes through."""
+    averaged = scene.numerics.averaged_revolutions
+    most: int = MOST_ROUNDS if averaged == "auto" else averaged  # type: ignore[assignment]
+    return scene.numerics.transient_revolutions + most
+
+
+def start_states_of(scene: Scene, par: Array, points: Points | None, walk: bool = True) -> Start:
     """Start of each sample: put together with journals at their `start_eccentricity`, velocities of ideal joints.
 
-    A sample that does not close starts at NaN, and so ends as one that failed.
+    Unless `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`).
 
     Raises
     ------
@@ -225,22 +248,52 @@ def start_states_of(scene: Scene, par: Array, points: Points | None) -> Start:
     if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
         made: Any = coordinates(trees, put_together(mechanism_of(tables_of(scene))))
         places[:], speeds[:] = made
+        told = refused_of(scene) if walk else None
+        found = np.full(len(par), int(Status.OK if told is None else told[0]))
     else:
-        for row in range(len(par)):
-            try:
-                one = scene_of(scene, points, row)
-                made = coordinates(trees, put_together(mechanism_of(tables_of(one))))
-            except InputError:
-                made = np.full((2, n), np.nan)
-            places[row], speeds[row] = made
+        bare = _without_study(scene)
+        samples = [_sample(bare, points, row) for row in range(len(par))]
+        for row, sample in enumerate(samples):
+            if sample is not None:
+                places[row], speeds[row] = coordinates(trees, sample[1])
+        numbers = with_columns(tables_of(scene), linkage.mechanism, points)
+        found = statuses(
+            _twins(scene), numbers, samples, scene.effects.gravity, _rounds(scene)
+        )
     _start_contacts(scene, linkage, par, start)
+    start.fail(found)
     return start
+
+
+@lru_cache(maxsize=16)
+def _twins(scene: Scene) -> Loops | None:
+    return loops_of(linkage_of(scene).mechanism)
+
+
+@lru_cache(maxsize=16)
+def _without_study(scene: Scene) -> Scene:
+    """The scene of which those of samples are made in less than half the time."""
+    return scene if scene.study is None else scene.with_({"study": None})
+
+
+def _sample(scene: Scene, points: Points, row: int) -> tuple[Mechanism, Assembly] | None:
+    """One sample's mechanism, and it put together; None if it does not close."""
+    try:
+        mechanism = mechanism_of(tables_of(scene_of(scene, points, row)))
+        return mechanism, put_together(mechanism)
+    except InputError:
+        return None
 
 
 def _moves_start(path: str) -> bool:
     entry = path.split(".")[-1]
     shaped = path.startswith("mechanism.") and ".out_of_round." not in path
     return shaped and entry not in NOT_GEOMETRY
+
+
+def varies_geometry(scene: Scene) -> bool:
+    """Whether a study varies what samples' starts and passages depend on."""
+    return any(map(_moves_start, _varied(scene)))
 
 
 def scene_of(scene: Scene, points: Points, row: int) -> Scene:
