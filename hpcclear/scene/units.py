@@ -9,13 +9,13 @@ nothing. A turn is a cycle. An angular speed in 1/min means revolutions, as on n
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from fractions import Fraction
 from functools import lru_cache
 from math import isfinite, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -79,6 +79,14 @@ Dimensions = dict[str, Fraction]
 """Exponents of base units, the radian among them."""
 
 
+def _rooted(unit: Any) -> tuple[Fraction, Dimensions]:
+    """Factor to base units, and their exponents."""
+    scale: Any
+    scale, base = _registry().get_root_units(unit)
+    exponents: Mapping[Any, Any] = base._units
+    return Fraction(scale), {str(name): Fraction(power) for name, power in exponents.items()}
+
+
 @lru_cache(maxsize=256)
 def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
     """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
@@ -87,12 +95,11 @@ def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
 
     plain = _RAISED.sub(lambda m: f"**{'-' if m[1] else ''}{'¹²³'.index(m[2]) + 1}", unit.strip())
     plain = _TURNS.sub("turn", plain.replace("·", "*").replace("%", "percent"))
-    registry = _registry()
     try:
-        source = registry.parse_units(f"1{plain}" if plain.startswith("/") else plain)
-        scale, base = registry.get_root_units(source)
-        names = {name: dict(registry.get_root_units(name)[1]._units) for name in source._units}
-        return Fraction(scale), dict(base._units), names
+        source = _registry().parse_units(f"1{plain}" if plain.startswith("/") else plain)
+        scale, base = _rooted(source)
+        names = {str(name): _rooted(name)[1] for name in source._units}
+        return scale, base, names
     except UndefinedUnitError:
         raise ValueError(f"{unit!r} is not a known unit") from None
     except (
