@@ -426,5 +426,5 @@ def test_ranks_and_a_kill_change_no_byte_of_profiles(tmp_path):
     assert code == 0, output
     assert out.read_bytes() == files[0]
     found = dataset.read(out, "wear")
-    assert (found.local_clearance >= found.clearance).all()
+    assert not (found.local_clearance < found.clearance).any()  # NaN where a life is over
     assert (found.lifetime < found.even_lifetime).all()

@@ -76,8 +76,8 @@ _TEXT = {
         'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
     ),
     Status.WORN_THROUGH: (
-        "a clearance has grown to the radius of its bearing",
-        "lower wear.cycles, or check wear coefficients and lengths of bearings",
+        "a clearance has grown to a quarter of its bearing's radius, beyond which no bearing is left to speak of",
+        "give wear.limit what ends a life before, or check wear coefficients and lengths of bearings",
     ),
     Status.JUMP_TOO_SHORT: (
         "no jump of as many revolutions as are averaged meets wear.tolerance",

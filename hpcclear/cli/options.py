@@ -77,13 +77,16 @@ class Written:
     overrides: tuple[str, ...]
 
     def scene(self, warn: bool = True) -> "Scene":
-        """The scene; what looks like a slip of units is said, unless the caller says it."""
+        """The scene; readings of units and likely slips of units are printed, unless the caller prints them."""
         from hpcclear.scene import load_scene
         from hpcclear.scene.plausibility import implausible
 
         scene = load_scene(self.file, self.overrides)
-        for text in implausible(scene) if warn else ():
-            say(f"Warning: {text}")
+        if warn:
+            for text in scene.readings:
+                say(f"Note: {text}")
+            for text in implausible(scene):
+                say(f"Warning: {text}")
         return scene
 
 
@@ -170,7 +173,14 @@ def on_ranks(
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
         stop.limit_time(time_limit)
-    return run_on_ranks(program, stop, ahead)
+
+    def noted(ranks: "Ranks") -> int | None:
+        from hpcclear.scene.units import noting  # here, where the others load what they need
+
+        with noting(lambda text, read: say(f"Note: {text!r} is read as {read}")):
+            return program(ranks)
+
+    return run_on_ranks(noted, stop, ahead)
 
 
 def say(text: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from hpcclear.base.errors import InputError
@@ -91,11 +92,14 @@ def describe_scene(scene: Scene, cost: bool) -> bool:
             "revolutions",
             f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
         ),
+        *_speeds(scene),
         *_assembly(scene),
         ("scene hash", scene.hash[:16]),
         ("MPI", _mpi()),
     ]
     out.print(table("What would be simulated", rows))
+    for text in scene.readings:
+        out.print(f"[yellow]Note:[/] {escape(text)}")
     for warning in (*locked, *scene.warnings):
         out.print(f"[yellow]Warning:[/] {warning}")
     if scene.study is not None:
@@ -103,6 +107,23 @@ def describe_scene(scene: Scene, cost: bool) -> bool:
     if cost and not locked:
         out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
     return not locked
+
+
+def turning(value: float, unit: str) -> str:
+    """A number with its unit; an angular speed in rpm too."""
+    if unit == "rad/s":
+        return f"{30.0 * value / np.pi:.6g} rpm ({value:.6g} rad/s)"
+    return quantity(value, unit)
+
+
+def _speeds(scene: Scene) -> list[tuple[str, str]]:
+    """Every angular speed and frequency of the mechanism, a row each."""
+    words = {"rad/s": "speed", "Hz": "frequency"}
+    return [
+        (words[unit], f"{path}: {turning(scene.number(path), unit)}")
+        for path in scene.numeric_paths()
+        if (unit := scene.unit(path)) in words
+    ]
 
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
@@ -166,7 +187,7 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     ]
     for variable in study.variables:
         if variable.range is not None:
-            lower, upper = (quantity(end, variable.unit) for end in variable.range)
+            lower, upper = (turning(end, variable.unit) for end in variable.range)
             rows.append((variable.name, f"{lower} to {upper}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(

@@ -8,9 +8,10 @@ import xarray as xr
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import _load, console, table
-from hpcclear.ensemble.lives import doubts
+from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
+from hpcclear.statistics.random.survival import quantiles
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -29,6 +30,7 @@ def describe(found: "Finished") -> int:
         count = int((codes == status).sum())
         if count and not status.valid:
             rows.append((status.name.lower(), f"{count}: {status.message}. {status.remedy}"))
+    rows += [("ended", text) for text in _endings(content)]
     rows += [("unsure", text) for text in doubts(content)]
     rows += [*_ends(content), *_lifetimes(content), *_profiles(content), *_causes(content)]
     out.print(table("Wear", rows + _load(found)))
@@ -39,16 +41,29 @@ def describe(found: "Finished") -> int:
     return Exit.FAILED
 
 
+REASONS = {
+    "cycles": "after wear.cycles, with no limit passed",
+    "clearance": "at wear.limit.clearance",
+    "peak_contact_force": "at wear.limit.peak_contact_force",
+    "objective": "at wear.limit.objective",
+}
+"""How lives end, by what the file has as their reason; failures have rows of their own."""
+
+
+def _endings(content: xr.Dataset) -> list[str]:
+    """How many lives ended in which way."""
+    reasons = content["end_reason"].to_numpy()
+    counts = {name: int((reasons == name).sum()) for name in REASONS}
+    return [f"{count} {REASONS[name]}" for name, count in counts.items() if count]
+
+
 def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
     """Clearances of new and of worn joints."""
     rows = []
-    quantiles = content["clearance_quantile"].isel(cycle=-1)
-    for name in content["joint"].to_numpy():
+    at_end = quantiles(content["end_clearance"].to_numpy(), np.array([0.05, 0.5, 0.95]))
+    for k, name in enumerate(content["joint"].to_numpy()):
         new = float(np.nanmedian(content["clearance"].isel(cycle=0).sel(joint=name)))
-        low, middle, high = (
-            quantity(float(quantiles.sel(joint=name, quantile=level)), "m")
-            for level in (0.05, 0.5, 0.95)
-        )
+        low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
         text = f"{quantity(new, 'm')} new; at the end {middle}"
         rows.append(
             (f"clearance {name}", text + (f" (5 to 95 %: {low} to {high})" if low != high else ""))
@@ -56,18 +71,30 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
     return rows
 
 
-def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
-    """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
-    given = [name for name in content.attrs if name.startswith("limit_")]
-    if not given:
-        return [("life", "no limit was given (wear.limit)")]
-    cycles = float(content["cycle"][-1])
+def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
+    """Median and nine tenths of a quantile over lives."""
     told = []
     for level in (0.05, 0.5, 0.95):
-        value = float(content["lifetime_quantile"].sel(quantile=level))
-        told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-    rows = [("life, revolutions", f"{told[1]} (5 to 95 %: {told[0]} to {told[2]})")]
-    last = content.isel(cycle=-1)
+        value = float(content[name].sel(quantile=level))
+        told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {beyond:.4g}")
+    return f"{told[1]} (5 to 95 %: {told[0]} to {told[2]})"
+
+
+def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
+    """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
+    cycles, last = float(content["cycle"][-1]), content.isel(cycle=-1)
+    each = content["revolution_time"].to_numpy() / HOUR
+    followed = content["ended"].to_numpy()
+    rows = [
+        ("followed", f"{followed.max():.4g} revolutions, {(followed * each).max():.4g} h, at most")
+    ]
+    given = [name for name in content.attrs if name.startswith("limit_")]
+    if not given:
+        return [*rows, ("life", "no limit was given (wear.limit)")]
+    rows += [
+        ("life, revolutions", _spread(content, "lifetime_quantile", cycles)),
+        ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).max()))),
+    ]
     limits = (
         f"95 % limits {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
     )
@@ -86,15 +113,15 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
     if "local_clearance" not in content:
         return []
     rows = []
-    for name in content["joint"].to_numpy():
-        last = content.isel(cycle=-1).sel(joint=name)
-        largest, even = (
-            quantity(float(np.nanmedian(last[one])), "m")
-            for one in ("local_clearance", "even_clearance")
+    for k, name in enumerate(content["joint"].to_numpy()):
+        largest = quantity(float(np.nanmedian(content["end_clearance"][:, k])), "m")
+        even = content["even_clearance"].isel(cycle=-1).sel(joint=name).to_numpy()
+        beside = (
+            f"; {quantity(float(np.median(even)), 'm')} worn evenly"
+            if np.isfinite(even).all()
+            else ""
         )
-        rows.append(
-            (f"largest around {name}", f"{largest} at the end; {even} worn evenly (medians)")
-        )
+        rows.append((f"largest around {name}", f"{largest} at the end{beside} (medians)"))
     if any(name.startswith("limit_") for name in content.attrs):
         cycles, told = float(content["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):

@@ -8,25 +8,48 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics.wear.curves import Curves, curves, lifetime
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.wear.curves import THROUGH, Curves, curves, lifetime, local_bounds
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.life import Life
+from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_limits
 
+HOUR = 3600.0
+"""s."""
+
 LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 """Quantiles that are told."""
 
 
-def ages_of(scene: Scene) -> Array:
-    """Revolutions (n,) at which curves are told: evenly over a life, and where random inputs of the study are taken."""
+def ages_of(scene: Scene, lives: list[Life]) -> Array:
+    """Revolutions (n,) of the curves: evenly to the end of the longest life, and where random inputs of the study are taken."""
     assert scene.wear is not None
-    even = np.linspace(0.0, scene.wear.cycles, scene.wear.points)
+    longest = max(one.ended for one in lives) or scene.wear.cycles
+    even = np.linspace(0.0, longest, scene.wear.points)
     asked = [] if scene.study is None else [row.cycles for row in scene.study.worn]
     return np.union1d(even, np.array(asked, float))
+
+
+def revolution_times(scene: Scene, inputs: Points | None) -> Array:
+    """Duration (n,) of a revolution of each life, s, at the nominal speed: of a torque drive, the one its entries expect."""
+    if inputs is None:
+        return Parameters(parameters(scene)).period
+    driven = [
+        (path, inputs.values[:, k])
+        for k, paths in enumerate(inputs.paths)
+        for path in paths
+        if ".wear." not in path
+    ]
+    values = (
+        np.stack([column for _, column in driven], -1) if driven else np.empty((len(inputs), 0))
+    )
+    names = tuple(path for path, _ in driven)
+    return Parameters(parameters(scene, Points(names, values, tuple((n,) for n in names)))).period
 
 
 def relief_of(scene: Scene) -> Relief:
@@ -45,7 +68,7 @@ def lives_dataset(
 ) -> xr.Dataset:
     """Lives and their statistics as a dataset of kind ``wear``; `even`: the same worn evenly, where profiles were followed."""
     assert scene.wear is not None
-    cycles, relief = ages_of(scene), relief_of(scene)
+    cycles, relief = ages_of(scene, [*lives, *(even or ())]), relief_of(scene)
     angles = np.linspace(0.0, 2.0 * np.pi, scene.wear.bins, endpoint=False)
     found = [curves(one, joints[k], cycles, relief, angles) for k, one in enumerate(lives)]
     labels = len(scene.joint_labels)
@@ -63,13 +86,20 @@ def lives_dataset(
     }
     limits = scene.wear.limit.given()
     ends = np.array([lifetime(one, joints[k], limits, relief) for k, one in enumerate(lives)])
-    local = _stacked(found, "local")
+    local, times = _stacked(found, "local"), revolution_times(scene, inputs)
+    last = [curves(one, joints[k], np.array([one.ended]), relief) for k, one in enumerate(lives)]
+    at_end = np.concatenate([one.local for one in last])
+    over = at_end >= (1.0 - 1e-9) * local_bounds(joints, limits)
     data: dict[str, Any] = {
         **values,
         "clearance_limit": np.stack([one.limit for one in lives]),
         "clearance_error": np.stack([one.error for one in lives]),
         "drift": np.array([one.drift for one in lives]),
         "lifetime": ends,
+        "lifetime_hours": ends * times / HOUR,
+        "revolution_time": times,
+        "end_reason": np.array([_reason(one) for one in lives], dtype=str),
+        "end_clearance": at_end,
         "ended": np.array([one.ended for one in lives]),
         "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
         "simulations": np.array([one.simulations for one in lives]),
@@ -77,13 +107,24 @@ def lives_dataset(
         "flags": np.array(
             [0 if one.certain else int(Flag.TARGET_MISSED) for one in lives], np.int8
         ),
-        **statistics(values, ends, lives, cycles, limits.get("clearance"), local),
+        "lifetime_hours_quantile": quantiles(ends * times / HOUR, LEVELS),
+        **statistics(
+            values,
+            ends,
+            lives,
+            cycles,
+            limits.get("clearance"),
+            local,
+            np.where(over, np.inf, at_end),
+        ),
     }
     if even is not None:
         data |= {"local_clearance": local, "sharpest": np.array([one.sharpest for one in lives])}
         data |= _profiles(relief, found, angles) | _evenly(joints, even, cycles, limits)
     names = () if inputs is None else inputs.names
-    growth = values["clearance"][:, -1] - values["clearance"][:, 0]
+    ended = np.array([one.ended if one.reason or one.status.valid else np.nan for one in lives])
+    grown = np.concatenate([one.clearance for one in last]) - joints.clearance
+    growth = grown / np.where(ended > 0.0, ended, np.nan)[:, None]
     data["rank_correlation"] = np.array(
         [[rank_correlation(inputs.column(name), one) for one in growth.T] for name in names]
         if inputs is not None
@@ -106,6 +147,15 @@ def lives_dataset(
         **{f"limit_{name}": value for name, value in limits.items()},
     }
     return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
+
+
+def _reason(one: Life) -> str:
+    """What ended a life, as in the file."""
+    if one.reason:
+        return one.reason
+    if one.status is Status.WORN_THROUGH:
+        return THROUGH
+    return "cycles" if one.status.valid else "failed"
 
 
 def _profiles(relief: Relief, found: list[Curves], angles: Array) -> dict[str, Array]:
@@ -161,24 +211,27 @@ def _stacked(found: list[Curves], name: str) -> Array:
 
 def statistics(
     values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None,
-    local: Array | None = None,
+    local: Array, at_end: Array,
 ) -> dict[str, Array]:  # fmt: skip
     """Quantiles over lives, survival and exceedance with limits; lives that failed are left out.
 
     `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit`, m, is what the
-    largest clearance around a joint, `local`, exceeds; the mean where that is not given.
+    largest clearance around a joint, `local` (lives, cycles, joints), exceeds.
+    `at_end`: the largest clearance around each joint (lives, joints) when the life ended, infinite where that was beyond what
+    ends a life.
 
-    A life whose bearing is worn through counts, with a clearance above any limit from there on.
+    A life that is over, at a limit or worn through, counts from there on: with infinite f and mean clearance, above any
+    quantile of those that go on.
     """
-    through = np.array([one.status is Status.WORN_THROUGH for one in lives])
-    beyond = np.array([one.ended for one in lives])[:, None] < cycles
-    gone = through[:, None] & beyond
+    over = np.array([bool(one.reason) for one in lives])
+    ended = np.array([one.ended for one in lives])[:, None]
+    gone = over[:, None] & (ended < cycles)
     clearance = np.where(gone[..., None], np.inf, values["clearance"])
     objective = np.where(gone, np.inf, values["objective"])
     known = ends[~np.isnan(ends)]
-    over = (known[:, None] <= cycles).sum(axis=0)
-    dead_lower, dead_upper = share_limits(over, len(known))
-    share = over / len(known) if len(known) else np.full(len(cycles), np.nan)
+    dead = (known[:, None] <= cycles).sum(axis=0)
+    dead_lower, dead_upper = share_limits(dead, len(known))
+    share = dead / len(known) if len(known) else np.full(len(cycles), np.nan)
     made = {
         "clearance_quantile": quantiles(clearance, LEVELS),
         "objective_quantile": quantiles(objective, LEVELS),
@@ -188,8 +241,8 @@ def statistics(
         "survival_upper": 1.0 - dead_lower,
     }
     if limit is not None:
-        largest = clearance if local is None else np.where(gone[..., None], np.inf, local)
-        made |= dict(_exceeded(largest, limit))
+        there = (over[:, None] & (ended <= cycles))[..., None]
+        made |= dict(_exceeded(np.where(there, at_end[:, None], local), limit))
     return made
 
 

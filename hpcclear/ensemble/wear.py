@@ -4,6 +4,7 @@ Root follows the lives (`hpcclear.dynamics.wear.life`) side by side: what all of
 simulated on all ranks and kept in the checkpoint; who goes on after a kill asks for the same once more and finds it done.
 """
 
+import contextlib
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -15,13 +16,16 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.parameters import Numbers, wave_paths
+from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Asked, Asking, Life, Plan, Seen, life
+from hpcclear.dynamics.wear.life import Asked, Asking, Plan, Seen, life
+from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import sample_points, saving
+from hpcclear.ranks.progress import LivesProgress, Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
@@ -66,12 +70,36 @@ def check_worn(scene: Scene) -> None:
             raise InputError(
                 f"study.random.{name}", name, "is the name of a result", "Rename it, and give its path"
             )  # fmt: skip
+    _check_bounds(scene)
     for entry, off in (("target_error", None), ("uncertainty", False)):
         if getattr(scene.numerics, entry) != off:
             raise InputError(
                 f"numerics.{entry}", getattr(scene.numerics, entry),
                 "lives have copies of their own for the limits of rate and f", "Remove it, and set wear.copies",
             )  # fmt: skip
+
+
+def _check_bounds(scene: Scene) -> None:
+    """Refuse lives that are over when new, and a limit that no joint can reach."""
+    assert scene.wear is not None
+    radii = []
+    for name in scene.worn_joints():
+        key = scene.joint_key(name)
+        clearance, radius = (scene.number(f"{key}.{it}") for it in ("clearance", "bearing_radius"))
+        radii.append(radius)
+        if clearance >= DEEPEST * radius:
+            raise InputError(
+                f"{key}.clearance", clearance,
+                f"a bearing counts as worn through from {DEEPEST:g} of its radius on, {DEEPEST * radius:g} m",
+                "Lower it",
+            )  # fmt: skip
+    limit = scene.wear.limit.clearance
+    if limit is not None and limit > DEEPEST * max(radii):
+        raise InputError(
+            "wear.limit.clearance", limit,
+            f"no clearance is followed beyond {DEEPEST:g} of its bearing's radius, {DEEPEST * max(radii):g} m",
+            "Lower it",
+        )  # fmt: skip
 
 
 def of_lives(scene: Scene) -> Scene:
@@ -143,12 +171,13 @@ def follow(
     ranks: Ranks,
     checkpoint: Checkpoint,
     first: int = 0,
+    style: Style = "quiet",
 ) -> list[Life]:
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
     plan = Plan(
         scene.wear.cycles, scene.wear.tolerance, float(_averaged(scene)), scene.wear.copies,
-        scene.wear.most_copies,
+        scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
     )  # fmt: skip
     relief = relief_of(scene)
     worn = [scene.joint_labels.index(name) for name in scene.worn_joints()]
@@ -157,25 +186,44 @@ def follow(
     for number in range(len(joints.clearance)):
         asking = life(joints[number], plan, relief)
         _go_on(number, asking, None, going, ended)
-    while going:
-        rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
-        design = np.concatenate(rows)
-        late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
-        records = np.empty(len(design), OUTCOME)
-        for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
-            if chosen.any():
-                points = states.points(design[chosen])
-                records[chosen] = sample_points(
-                    here, points, ranks, checkpoint, stage="wear", first=first
-                )
-                first += len(points)
-        answers = np.split(records, np.cumsum([len(part) for part in rows])[:-1])
-        waiting, going = going, {}
-        for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
-            _go_on(
-                number, asking, _seen(answer, worn, len(scene.joint_labels), relief), going, ended
-            )
+    progress = LivesProgress("wear", style)
+    with contextlib.ExitStack() as stack:
+        stack.callback(progress.finish)
+        while going:
+            parts = [asked.done for _, asked in going.values()]
+            progress.lives(len(joints.clearance), len(ended), parts)
+            answers = _simulated(scene, states, going, ranks, checkpoint, progress, first)
+            first += sum(len(one) for one in answers)
+            waiting, going = going, {}
+            for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
+                seen = _seen(answer, worn, len(scene.joint_labels), relief)
+                _go_on(number, asking, seen, going, ended)
+        progress.lives(len(joints.clearance), len(ended), [])
     return [ended[number] for number in range(len(joints.clearance))]
+
+
+def _simulated(
+    scene: Scene,
+    states: States,
+    going: dict[int, tuple[Asking, Asked]],
+    ranks: Ranks,
+    checkpoint: Checkpoint,
+    progress: LivesProgress,
+    first: int,
+) -> list[Records]:
+    """Records of what each life asks for, as one design; its first simulation has the number `first`."""
+    rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
+    design = np.concatenate(rows)
+    late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
+    records = np.empty(len(design), OUTCOME)
+    for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
+        if chosen.any():
+            points = states.points(design[chosen])
+            records[chosen] = sample_points(
+                here, points, ranks, checkpoint, progress, stage="wear", first=first
+            )
+            first += len(points)
+    return np.split(records, np.cumsum([len(part) for part in rows])[:-1])
 
 
 def waiting_longer(scene: Scene) -> Scene:
@@ -254,12 +302,13 @@ def run_wear(
             named = states.points(np.empty((0, len(states.names))))
             units = dict(zip(named.names, named.units, strict=True))
             checkpoint = session.opened(states.names, units)
-            lives = follow(scene, joints, states, ranks, checkpoint)
+            style = options.style
+            lives = follow(scene, joints, states, ranks, checkpoint, style=style)
             even = None
             if states.relief.size:  # the same lives, worn evenly, for comparison
                 done = sum(one.simulations for one in lives)
                 evenly = scene.with_({"wear.profile": "uniform"})
-                even = follow(evenly, joints, states, ranks, checkpoint, done)
+                even = follow(evenly, joints, states, ranks, checkpoint, done, style)
             with saving(checkpoint.flush):
                 content = session.write(
                     lives_dataset(scene, inputs, joints, lives, session.attributes, even)

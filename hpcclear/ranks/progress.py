@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TextIO
 
 import numpy as np
@@ -120,6 +120,51 @@ class Progress:
 
     def _draw(self) -> None:
         self._bar.update(0, completed=self._done, state=f"{self.text()}, {self._eta()}")
+        self._bar.refresh()
+
+
+class LivesProgress(Progress):
+    """How far service lives are, which need one design after the other, with a forecast of the time left.
+
+    Designs call `start` and `close`, as any do; what is shown is the state of all lives until `finish`.
+    """
+
+    _done = -1
+
+    def lives(self, total: int, over: int, parts: Sequence[float]) -> None:
+        """Of `total` lives, `over` are over; of each other one this part of the simulations is done, from 0 to 1."""
+        self._lives, self._over, self._behind = total, over, (over + sum(parts)) / total
+
+    def start(self, total: int, completed: np.ndarray) -> None:
+        """Begin with a further design."""
+        if self._done < 0:
+            super().start(self._lives, np.empty(0))
+        self._done += completed.size
+        self._failed += _failures(completed)
+
+    def close(self) -> None:
+        """Show nothing: a design is done, the lives are not."""
+
+    def finish(self) -> None:
+        """Show the final state."""
+        if self._done >= 0:
+            super().close()
+
+    def text(self) -> str:
+        """Lives that are over, part of the simulations done, their number and failures."""
+        failed = f", {self._failed} failed" if self._failed else ""
+        share = f"{self._over}/{self._lives} lives over ({100.0 * self._behind:.0f} %)"
+        return f"{share}, {self._done} simulations{failed}"
+
+    def _eta(self) -> str:
+        gone = self._clock() - self._began
+        left = gone * (1.0 - self._behind) / self._behind if self._behind > 0.0 else 0.0
+        return f"about {duration(left)} left" if left > 0.0 else "? left"
+
+    def _draw(self) -> None:
+        self._bar.update(
+            0, completed=self._behind * self._lives, state=f"{self.text()}, {self._eta()}"
+        )
         self._bar.refresh()
 
 

@@ -302,7 +302,11 @@ WEAR: Columns = {
         "largest difference of a wear rate or f between copies that waited longer and others, beyond scatter, relative",
         required=True),
     "lifetime": number(("life",), "1", "revolutions until the first limit is passed; infinite if none is", required=True),
+    "lifetime_hours": number(("life",), "h", "the same at the drive's nominal speed"),
+    "revolution_time": number(("life",), "s", "duration of a revolution at the drive's nominal speed"),
     "ended": number(("life",), "1", "revolutions that were followed", required=True),
+    "end_reason": text(("life",), "cycles, failed, worn_through, or the limit that ended the life"),
+    "end_clearance": number(("life", "joint"), "m", "largest clearance around the joint at the end of the life"),
     "jumps": count(("life",), "number of jumps", required=True),
     "simulations": count(("life",), "number of simulations", required=True),
     "ending": flag(("life",), "how the life ended", required=True),
@@ -310,6 +314,7 @@ WEAR: Columns = {
     "clearance_quantile": number(("quantile", "cycle", "joint"), "m", "quantiles of the clearance", required=True),
     "objective_quantile": number(("quantile", "cycle"), "objective", "quantiles of the objective", required=True),
     "lifetime_quantile": number(("quantile",), "1", "quantiles of the life; infinite beyond what was followed", required=True),
+    "lifetime_hours_quantile": number(("quantile",), "h", "the same at the drive's nominal speed"),
     "survival": number(("cycle",), "1", "share of lives that are not over", required=True),
     "survival_lower": number(("cycle",), "1", "lower 95 % limit of the survival", required=True),
     "survival_upper": number(("cycle",), "1", "upper 95 % limit of the survival", required=True),
@@ -317,7 +322,7 @@ WEAR: Columns = {
     "exceedance_lower": number(("cycle", "joint"), "1", "lower 95 % limit of it"),
     "exceedance_upper": number(("cycle", "joint"), "1", "upper 95 % limit of it"),
     "rank_correlation": number(("random_input", "joint"), "1",
-        "rank correlation of the growth of the clearance at the end with the random input", required=True),
+        "rank correlation of the growth of the clearance in a revolution of the life with the random input", required=True),
 }
 
 EFFECTS: Columns = {

@@ -48,7 +48,7 @@ class PlanarSpeed(Table):
     body: str
     """That turns."""
     speed: Annotated[float, Quantity("rad/s")]
-    """rad/s, counter-clockwise; negative: clockwise."""
+    """rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
     period: bool = False
     """Whether its turn is the revolution; the first drive is, where none says so."""
     turns: Annotated[int, Count(least=1, most=64)] = 1
@@ -65,8 +65,8 @@ class PlanarHarmonic(Table):
     """That swings."""
     amplitude: Angle
     """rad."""
-    frequency: Annotated[float, Quantity("1/s", above=0)]
-    """1/s: swings, not radians."""
+    frequency: Annotated[float, Quantity("Hz", above=0)]
+    """Swings a second, Hz; of an angular speed such as "1200 rpm", its turns."""
     mean: Angle = 0.0
     """rad."""
     phase: Angle = 0.0

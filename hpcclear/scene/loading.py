@@ -10,8 +10,8 @@ from typing import Any
 from hpcclear.base.errors import InputError
 from hpcclear.scene.measured import with_values
 from hpcclear.scene.paths import replace
-from hpcclear.scene.scene import Scene
-from hpcclear.scene.validation import DEEPEST, dotted, validated
+from hpcclear.scene.scene import Scene, scene_of
+from hpcclear.scene.validation import DEEPEST, dotted
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 # tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
@@ -50,7 +50,7 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
         content = replace(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     content = dict(with_values(content, folder))
-    scene = validated(Scene, content)
+    scene = scene_of(content)
     notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
     scene._text = notes + (scene.to_toml() if text is None else text)
     return scene

@@ -85,7 +85,7 @@ class ConstantSpeed(Table):
 
     kind: Literal["constant-speed"]
     speed: Annotated[float, Quantity("rad/s", above=0)]
-    """Crank speed, rad/s, counter-clockwise."""
+    """Crank speed, rad/s, counter-clockwise; "600 min^-1" means 600 revolutions a minute."""
 
     elsewhere: ClassVar = dict.fromkeys(
         ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),

@@ -1,6 +1,6 @@
 """The scene: one validated, frozen description of what is simulated."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
 import tomli_w
@@ -9,8 +9,9 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.scene import budget, citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
-from hpcclear.scene.paths import PHYSICAL, replace
+from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.tables import SceneTables, plain
+from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
 
 
@@ -21,6 +22,7 @@ class Scene(SceneTables):
     """
 
     _text: str = PrivateAttr("")
+    _readings: tuple[str, ...] = PrivateAttr(())
 
     @model_validator(mode="after")
     def _study_fits_mechanism(self) -> Self:
@@ -113,6 +115,11 @@ class Scene(SceneTables):
         return tuple(describing.warnings(self))
 
     @property
+    def readings(self) -> tuple[str, ...]:
+        """Texts whose unit left open what is meant, and how each was read, a sentence each."""
+        return self._readings
+
+    @property
     def references(self) -> str:
         """Title of the published work the mechanism is taken from, "" for one of its user's own."""
         return citation.cited_by(self)
@@ -149,7 +156,7 @@ class Scene(SceneTables):
         for path, value in altered.items():
             check_path(path)
             content = replace(content, path, value)
-        result = validated(Scene, content)
+        result = scene_of(content)
         notes = "".join(f"# changed: {path} = {value!r}\n" for path, value in altered.items())
         result._text = notes + self.text
         return result
@@ -159,3 +166,24 @@ class Scene(SceneTables):
 
     def __hash__(self) -> int:
         return hash(self.hash)
+
+
+def scene_of(content: Mapping[str, Any]) -> Scene:
+    """The scene of a file's tables, with the readings of its units; errors as `load_scene`."""
+    read: dict[str, str] = {}
+    with noting(read.__setitem__):
+        scene = validated(Scene, content)
+    scene._readings = tuple(_placed(content, read)) if read else ()
+    return scene
+
+
+def _placed(content: Mapping[str, Any], read: Mapping[str, str]) -> Iterator[str]:
+    """A sentence for each entry with text that was read as `read` says."""
+    for key, entry in flatten(content):
+        level = [entry]
+        while level and isinstance(level[0], list):
+            level = [one for inner in level if isinstance(inner, list) for one in inner]
+        for text in level:
+            if isinstance(text, str) and text.strip() in read:
+                yield f"{key}: {text.strip()!r} is read as {read[text.strip()]}"
+                break  # one of a list says it for all

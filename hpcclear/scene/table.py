@@ -14,7 +14,7 @@ from hpcclear.scene.fields import nearest
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.units import UnitError, decimal, factor, to_si
+from hpcclear.scene.units import UnitError, decimal, factor, note_turns, noting, to_si
 from hpcclear.scene.variables import SHORT_NAMES
 
 LONGEST_LINE = 100_000
@@ -117,7 +117,8 @@ class _Column:
         try:
             value = decimal(cell)
             if self.unit:
-                value = to_si(f"{cell} {self.unit}", quantity.unit)
+                with noting(lambda *_: None):  # noted once, of the heading
+                    value = to_si(f"{cell} {self.unit}", quantity.unit)
         except UnitError as error:
             raise InputError(where, cell, error.reason, error.remedy) from None
         for path in self.paths:
@@ -147,6 +148,7 @@ def _column(cell: str, scene: Scene, key: str) -> _Column:
     if unit and unit != column_unit:
         try:
             factor(unit, column_unit)
+            note_turns(f"1 {unit} in {cell}", "1", unit, column_unit)
         except UnitError as error:
             raise InputError(key, cell, error.reason, error.remedy) from None
         return column

@@ -66,7 +66,7 @@ class Wear(Table):
 
 
 class Limits(Table):
-    """What ends a life, whichever is passed first."""
+    """What ends a life, whichever is passed first; a clearance of a quarter of its bearing's radius always does."""
 
     clearance: PositiveLength | None = None
     """Of any worn joint, m."""
@@ -103,6 +103,9 @@ class Lives(Table):
     points: Annotated[int, Count(2, 10**4)] = 41
     """Revolutions that curves are told at."""
     limit: Limits = Limits()
+    """Values that end a life."""
+    beyond_limit: bool = False
+    """Whether lives go on past their limits to `cycles`, or until a clearance is a quarter of its bearing's radius."""
 
     @property
     def waves(self) -> int:

@@ -28,7 +28,7 @@ FOLDER = "lives"
 """Where those of designs are kept, in there."""
 
 AGES = 64
-"""Ages of a life that mean and deviation are taken over, evenly up to the largest that an input is taken at."""
+"""Ages of a life that mean and deviation are taken over, evenly up to the largest that an input is taken at, or to its end."""
 
 LEAST = 8
 """Clearances that a distribution is made of, at least."""
@@ -99,9 +99,13 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     timing = run.directory / "timing.nc"
     found = run_wear(own, run.directory / name, run.ranks, options, timing).content
     oldest = max(row.cycles or 0.0 for row in scene.required_study.worn)
-    ages = (np.arange(AGES) + 0.5) / AGES * oldest
-    at = found["cycle"].to_numpy()
-    values = np.array([np.interp(ages, at, one) for one in found["objective"].to_numpy()])
+    parts, at = (np.arange(AGES) + 0.5) / AGES, found["cycle"].to_numpy()
+    values = np.full((found.sizes["life"], AGES), np.nan)
+    for k, (end, f) in enumerate(
+        zip(found["ended"].values, found["objective"].values, strict=True)
+    ):
+        if found["end_reason"][k] != "failed":
+            values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
     told: list[float] = []
     for one in moments(values):
         sure = one.freedom > 0
@@ -155,7 +159,7 @@ def _values(scene: Scene, row: RandomInput, clearance: Array, endings: Array) ->
         why = Status(int(codes[counts.argmax()])).message if len(codes) else "there are so few"
         raise InputError(
             f"{key}.cycles", row.cycles, f"{len(found)} clearances of lives are known there: {why}",
-            f"Follow more lives, or ask for fewer cycles; {NAME} has what became of them",
+            f"Follow more lives, ask for fewer cycles, or set wear.beyond_limit = true; {NAME} has what became of them",
         )  # fmt: skip
     lower, upper = scene.required_study.variable(row.name).bounds
     if found.min() < lower or found.max() > upper:

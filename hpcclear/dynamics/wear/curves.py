@@ -1,5 +1,6 @@
 """A life's states as curves over revolutions, and when it is over."""
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,11 +10,17 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.life import Life
+from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import FLAT, LOOKED_AT, Relief
 
-FINE = 4000
-"""Revolutions at which a limit is looked for, between which the curves are straight."""
+FINE = 1000
+"""Parts of a jump in which the curves are straight where a limit is looked for."""
+
+THROUGH = "worn_through"
+"""The limit that every life has: the clearance at which a bearing counts as worn through."""
+
+DEEPEST = 0.25
+"""Largest clearance around a joint, over the radius of its bearing when new, at which that is."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +42,21 @@ class Curves:
 def curves(
     found: Life, joints: Joints, cycles: Array, relief: Relief = FLAT, angles: Array = LOOKED_AT
 ) -> Curves:
-    """A life at revolutions (n,): its work by cubics through the ends of jumps with their rates, the rest straight.
+    """A life at revolutions (n,), NaN beyond its end.
 
     `angles`: where the largest clearance is looked for, rad.
     """
+    made = _followed(found, joints, cycles, relief, angles)
+    beyond = (cycles > found.ended) & (cycles > 0.0)
+    for values in vars(made).values():
+        values[beyond] = np.nan
+    return made
+
+
+def _followed(
+    found: Life, joints: Joints, cycles: Array, relief: Relief, angles: Array = LOOKED_AT
+) -> Curves:
+    """The same to its last state: its work by cubics through the ends of jumps with their rates, the rest straight."""
     from scipy.interpolate import CubicHermiteSpline
 
     if not found.nodes:
@@ -53,14 +71,11 @@ def curves(
         work = np.clip(smooth, work[0], work[-1])
     else:
         work = np.repeat(work, len(cycles), axis=0)
-    beyond = (cycles > found.ended) & (cycles > 0.0)
-    work[beyond] = np.nan
     states = sorted([*found.nodes, *found.halves], key=lambda node: node.cycle)
     places = [node.cycle for node in states]
     peaks = np.stack([node.peak for node in states])
     objective = np.interp(cycles, places, [node.objective for node in states])
     peak = np.stack([np.interp(cycles, places, column) for column in peaks.T], axis=-1)
-    objective[beyond], peak[beyond] = np.nan, np.nan
     counted = joints.counted(work)
     waves = relief.waves(joints, _moments(found, joints, counted))
     clearance = joints.worn(work)[0]
@@ -77,29 +92,60 @@ def _moments(found: Life, joints: Joints, counted: Array) -> Array:
     made = np.empty((*counted.shape, every.shape[-1]))
     for joint, number in np.ndindex(*every.shape[1:]):
         made[:, joint, number] = np.interp(counted[:, joint], at[:, joint], every[:, joint, number])
-    made[np.isnan(counted)] = np.nan
     return made
+
+
+def local_bounds(joints: Joints, limits: Mapping[str, float]) -> Array:
+    """Largest clearance around each joint (..., joints) that ends a life, m."""
+    return np.minimum(DEEPEST * joints.bearing_radius, limits.get("clearance", math.inf))
+
+
+def first_passed(
+    found: Life, joints: Joints, limits: Mapping[str, float], relief: Relief = FLAT, since: int = 0
+) -> tuple[float, str]:
+    """Revolutions at which a life first passes a limit, and its name; infinite and "" where it passes none.
+
+    Parameters
+    ----------
+    found : Life
+    joints : Joints
+    limits : mapping
+        "clearance" (of the largest around any joint, m), "peak_contact_force" (N), "objective" (SI); each life has that of
+        a bearing worn through besides, `THROUGH`.
+    relief : Relief
+    since : int
+        Number of the first jump that is looked at.
+    """
+    at = [node.cycle for node in found.nodes]
+    if not at:
+        return math.inf, ""
+    bounds = {**limits, THROUGH: 1.0}
+    for ends in [(at[0], at[0])] if len(at) == 1 else itertools.pairwise(at[max(since, 0) :]):
+        fine = np.linspace(*ends, FINE + 1)
+        seen = _followed(found, joints, fine, relief)
+        values = {
+            "clearance": seen.local, "peak_contact_force": seen.peak, "objective": seen.objective[:, None],
+            THROUGH: seen.local / (DEEPEST * joints.bearing_radius),
+        }  # fmt: skip
+        passed = [
+            (_crossing(fine, column, limit), name)
+            for name, limit in bounds.items()
+            for column in values[name].T
+        ]
+        cycle, name = min(passed)
+        if math.isfinite(cycle):
+            return cycle, name
+    return math.inf, ""
 
 
 def lifetime(
     found: Life, joints: Joints, limits: Mapping[str, float], relief: Relief = FLAT
 ) -> float:
-    """Revolutions until a limit is passed ("clearance", "peak_contact_force", "objective"), or the bearing is worn through.
+    """Revolutions until a limit is passed, as of `first_passed`.
 
-    It is the largest clearance around a joint that passes its limit.
     Infinite where none is passed by the end; NaN of a life that failed before it could show.
     """
-    fine = np.linspace(0.0, found.ended, FINE) if found.ended > 0.0 else np.zeros(1)
-    seen = curves(found, joints, fine, relief)
-    values = {
-        "clearance": seen.local, "peak_contact_force": seen.peak, "objective": seen.objective[:, None],
-    }  # fmt: skip
-    ends = [
-        _crossing(fine, column, limit)
-        for name, limit in limits.items()
-        for column in values[name].T
-    ]
-    end = min(ends, default=math.inf)
+    end, _ = first_passed(found, joints, limits, relief)
     if math.isfinite(end) or found.status.valid:
         return end
     return found.ended if found.status is Status.WORN_THROUGH else math.nan

@@ -14,14 +14,16 @@ transient is not over: their difference widens the limits, and is told.
 """
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
+from hpcclear.dynamics.wear.curves import THROUGH, first_passed, local_bounds
 from hpcclear.dynamics.wear.law import Joints
+from hpcclear.dynamics.wear.record import Life, Node
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.statistics.random.replicates import student
 
@@ -30,6 +32,9 @@ FIRST_GROWTH = 0.1
 
 MOST_GROWTH = 0.5
 """By any jump."""
+
+BEYOND = 1.05
+"""Of the revolutions to the end of a life, at the rate of its state: a jump goes there, so that the end lies within it."""
 
 _SHRINK, _GROW, _SAFETY = 0.2, 4.0, 0.9
 
@@ -48,6 +53,10 @@ class Plan:
     most_copies: int
     """copies and most_copies: simulations at a state of wear: at first, and where limits are wider than the tolerance
     allows."""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """What ends a life, by name as of `curves.first_passed`, SI."""
+    beyond: bool = False
+    """Whether lives go on past their limits; none goes on once a bearing is worn through."""
 
 
 @dataclass(frozen=True)
@@ -70,56 +79,14 @@ class Seen:
 class Asked:
     """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies.
 
-    Those of odd number are to wait longer. `moments` as of `Node`.
+    Those of odd number are to wait longer. `moments` as of `Node`. `done`: about how much of the life's simulations lie
+    behind it, from 0 to 1.
     """
 
     work: Array
     copies: range
     moments: Array | None = None
-
-
-@dataclass(frozen=True)
-class Node:
-    """What is known at a state of wear; limits are 95 % half-widths.
-
-    `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
-    joint of the scene, N; `drift`: difference beyond scatter between copies that waited longer and the others, of the
-    rates and of f (joints + 1,), relative; `moments`: of what `Joints.counted` says of the work done, (joints, size), J, as of
-    `Relief`; `share` and `share_limit`: of the moments in the rate.
-    """
-
-    cycle: float
-    work: Array
-    rate: Array
-    rate_limit: Array
-    objective: float
-    objective_limit: float
-    peak: Array
-    drift: Array
-    moments: Array
-    share: Array
-    share_limit: Array
-
-
-@dataclass
-class Life:
-    """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
-
-    `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m; `error`: sum
-    over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either half, m; `drift`:
-    the largest of any rate or f at any state; `sharpest`: as of `Relief`, likewise.
-    """
-
-    nodes: list[Node]
-    halves: list[Node] = field(default_factory=list)
-    status: Status = Status.OK
-    ended: float = math.nan
-    limit: Array = field(default_factory=lambda: np.zeros(0))
-    error: Array = field(default_factory=lambda: np.zeros(0))
-    certain: bool = True
-    drift: float = 0.0
-    sharpest: float = 0.0
-    simulations: int = 0
+    done: float = 0.0
 
 
 class _EndedError(Exception):
@@ -152,9 +119,10 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
         here = yield from _look(found, joints, plan, relief, (0.0, nothing, new), None)
         found.nodes.append(here)
         asked = _growing(joints, relief, here, FIRST_GROWTH)
-        while here.cycle < plan.cycles:
+        while not _is_over(found, joints, plan, relief) and here.cycle < plan.cycles:
             asked = min(asked, _growing(joints, relief, here, MOST_GROWTH))
-            length = min(asked, plan.cycles - here.cycle)
+            end_at = max(BEYOND * _to_end(joints, plan, relief, here), plan.shortest)
+            length = min(asked, end_at, plan.cycles - here.cycle)
             if length < min(plan.shortest, plan.cycles - here.cycle):
                 raise _EndedError(Status.JUMP_TOO_SHORT)
             half, end, error = yield from _jump(found, joints, plan, relief, here, length)
@@ -171,16 +139,50 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
     except _EndedError as stop:
         found.status = stop.status
     found.limit = np.sqrt(variance)
-    found.ended = found.nodes[-1].cycle if found.nodes else 0.0
+    if not found.reason:
+        found.ended = found.nodes[-1].cycle if found.nodes else 0.0
     return found
+
+
+def _is_over(found: Life, joints: Joints, plan: Plan, relief: Relief) -> bool:
+    """Whether the last jump passed what ends the life, which then ends there."""
+    limits = {} if plan.beyond else plan.limits
+    cycle, reason = first_passed(found, joints, limits, relief, since=len(found.nodes) - 2)
+    if reason:
+        found.ended, found.reason = cycle, reason
+        found.status = Status.WORN_THROUGH if reason == THROUGH else found.status
+    return bool(reason)
+
+
+def _speed(joints: Joints, relief: Relief, here: Node) -> Array:
+    """Growth of the largest clearance around each joint in a revolution, m."""
+    crowded = 1.0 + relief.deepest(relief.waves(joints, here.share)) / np.maximum(
+        joints.slope, 1e-300
+    )
+    speed: Array = crowded * joints.speed(here.work) * here.rate
+    return speed
+
+
+def _to_end(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
+    """Revolutions until a clearance ends the life at the rates of its state; 0 or more, no end where nothing wears."""
+    local = joints.worn(here.work)[0] + relief.deepest(relief.waves(joints, here.moments))
+    bounds = local_bounds(joints, {} if plan.beyond else plan.limits)
+    speed = np.maximum(_speed(joints, relief, here), 1e-300)
+    return float((np.maximum(bounds - local, 0.0) / speed).min())
+
+
+def _done(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
+    """How much of a life's jumps lie behind a state: each grows a clearance by about the same part of itself."""
+    left = min(plan.cycles - here.cycle, _to_end(joints, plan, relief, here))
+    now, new = joints.worn(here.work)[0], joints.clearance
+    end = now + left * _speed(joints, relief, here)
+    gone, whole = float(np.log(now / new).max()), float(np.log(end / new).max())
+    return gone / whole if whole > 0.0 else here.cycle / plan.cycles
 
 
 def _growing(joints: Joints, relief: Relief, here: Node, growth: float) -> float:
     """Revolutions in which a clearance grows by that much where it does most, relative; no end where nothing wears."""
-    crowded = 1.0 + relief.deepest(relief.waves(joints, here.share)) / np.maximum(
-        joints.slope, 1e-300
-    )
-    speed = crowded * joints.speed(here.work) * here.rate / joints.worn(here.work)[0]
+    speed = _speed(joints, relief, here) / joints.worn(here.work)[0]
     return growth / float(speed.max()) if speed.max() > 0.0 else math.inf
 
 
@@ -260,7 +262,8 @@ def _look(
     seen: list[Seen] = []
     done, wanted = 0, plan.copies
     while True:
-        answer = yield Asked(work, range(done, wanted), moments if relief.size else None)
+        part = _done(joints, plan, relief, found.nodes[-1]) if found.nodes else 0.0
+        answer = yield Asked(work, range(done, wanted), moments if relief.size else None, part)
         found.simulations += wanted - done
         failed = [s for s in answer.status.tolist() if not Status(s).valid]
         if failed:

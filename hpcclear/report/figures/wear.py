@@ -55,7 +55,7 @@ def fan_figure(wear: xr.Dataset) -> "Figure":
             )
         panel.set_ylabel(scale.label(words))
         panel.legend(loc="upper left")
-    axes[-1, 0].set_xlabel("revolutions (–)")
+    axes[-1, 0].set_xlabel(_revolutions(wear))
     style.settle(axes)
     return figure
 
@@ -81,11 +81,20 @@ def survival_figure(wear: xr.Dataset) -> "Figure":
     )
     panel.plot(cycles, wear["survival"].to_numpy(), color=style.PALETTE["blue"], label="survival")
     panel.set_ylim(-0.02, 1.02)
-    panel.set_xlabel("revolutions (–)")
+    panel.set_xlabel(_revolutions(wear))
     panel.set_ylabel("lives that are not over (–)")
     panel.legend(loc="lower left")
     style.settle(axes)
     return figure
+
+
+def _revolutions(wear: xr.Dataset) -> str:
+    """The label of an axis of revolutions, with the hours they take where every life turns alike."""
+    each = wear["revolution_time"].to_numpy() if "revolution_time" in wear else np.zeros(0)
+    if not each.size or np.ptp(each) > 0.0:
+        return "revolutions (–)"
+    last = float(wear["cycle"][-1])
+    return f"revolutions (–); {last:.3g} take {last * each[0] / 3600.0:.3g} h"
 
 
 AGES = 4

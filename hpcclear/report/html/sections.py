@@ -12,6 +12,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.statistics.random.survival import quantiles
 
 _FLAGS = {
     Flag.LATCHED: "a joint stayed in contact with the impact speed frozen: f may depend on the tolerance",
@@ -47,15 +48,23 @@ def _lives_words(content: Content) -> list[str]:
         return []
     last = lives.isel(cycle=-1)
     cycles, failed = float(last["cycle"]), int((~np.isin(lives["ending"], LIVED)).sum())
+    early = int((lives["ended"] < cycles).sum()) - failed
     words = [
-        f"{lives.sizes['life']} lives of {cycles:.4g} revolutions were followed; {_none(failed)} failed."
+        f"{lives.sizes['life']} lives of {'up to ' if early > 0 else ''}{cycles:.4g} revolutions were followed; "
+        f"{_none(failed)} failed."
     ]
-    for name in lives["joint"].to_numpy():
-        levels = last["clearance_quantile"].sel(joint=name)
-        low, high = (str(quantity(float(levels.sel(quantile=q)), "m")) for q in (0.05, 0.95))
+    ends = lives["end_clearance"] if "end_clearance" in lives else lives["clearance"].isel(cycle=-1)
+    levels = quantiles(ends.to_numpy(), np.array([0.05, 0.95]))
+    for k, name in enumerate(lives["joint"].to_numpy()):
+        low, high = (str(quantity(float(value), "m")) for value in levels[:, k])
         words.append(
             f"The clearance of {name} ends between {low} and {high} in nine of ten of them."
         )
+    if "lifetime_hours_quantile" in lives:
+        median = lives.sel(quantile=0.5)
+        turns, hours = float(median["lifetime_quantile"]), float(median["lifetime_hours_quantile"])
+        if np.isfinite(turns):
+            words.append(f"Half of them are over after {turns:.4g} revolutions, {hours:.4g} h.")
     if any(name.startswith("limit_") for name in lives.attrs):
         limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
         words.append(f"{float(last['survival']):.0%} of them pass no limit (95 % limits {limits}).")
