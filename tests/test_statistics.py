@@ -227,12 +227,11 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("hpcclear.ensemble.identity.DEFAULT_LANES", 64),
         ("hpcclear.results.dataset._versions", lambda: "numba 0.1"),
         ("hpcclear.results.dataset._processor", lambda: "another one"),
     ],
 )
-def test_statistics_go_on_only_with_the_same_lanes_versions_and_processor(
+def test_statistics_go_on_only_with_the_same_versions_and_processor(
     tmp_path, monkeypatch, name, value
 ):
     scene, output = scene_of(5000), tmp_path / "statistics.nc"

@@ -18,6 +18,7 @@ from hpcclear.base.errors import (
     check_address_space,
     mendable,
 )
+from hpcclear.base.remarks import listen
 from hpcclear.cli import ensembles, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
@@ -85,6 +86,7 @@ def _refused(error: click.ClickException) -> int:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
+    listen(say)
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:

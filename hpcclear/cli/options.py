@@ -29,9 +29,29 @@ SET = click.option(
 )
 
 
+ENDINGS = ("", ".nc", ".nc4", ".cdf", ".netcdf", ".h5", ".hdf5")
+"""Endings of names of result files: what is written is NetCDF-4, which is HDF5."""
+
+
+def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
+    """Raise BadParameter where a name promises another format than the one that is written."""
+    if path is not None and path.suffix.lower() not in ENDINGS:
+        other = path.with_suffix(".nc")
+        raise click.BadParameter(
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}; "
+            f"in Python xarray.open_dataset({str(other)!r}).to_dataframe() makes a table of it"
+        )
+    return path
+
+
 def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
-    """The option that names where results go."""
-    return click.option("-o", "--output", type=PATH, required=required, help=words)
+    """The option that names the file that results go to."""
+    return click.option("-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name)
+
+
+def directory_option(words: str) -> Callable[[Any], Any]:
+    """The option that names the directory that results go to."""
+    return click.option("-o", "--output", type=PATH, required=True, help=words)
 
 
 def flag(name: str, words: str) -> Callable[[Any], Any]:
@@ -124,11 +144,9 @@ with_how = _gathering("how", How, FRESH, LIMIT, INTERVAL, PROGRESS)
 
 
 def place_of(output: Path) -> Path:
-    """The place for results, made if it lies below here or beside what is there; else a slip of the pen is likelier."""
-    parent = output.parent
-    if not output.is_absolute() or parent.parent.is_dir():
-        with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
-            parent.mkdir(parents=True, exist_ok=True)
+    """Return the place for results, with the directories above it made."""
+    with contextlib.suppress(OSError):  # reported, with a remedy, by what writes there
+        output.parent.mkdir(parents=True, exist_ok=True)
     return output
 
 

@@ -92,13 +92,18 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
-    from hpcclear.results import dataset, files, netcdf
+    from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
+    from hpcclear.ranks.boundary import alone
+    from hpcclear.results import dataset
 
     scene = written.scene()
-    files.probe(place_of(output), netcdf.SEAL)
-    began = time.perf_counter()
-    response = simulate_scene(scene)
-    dataset.write(response, output)
+    place = Place.of_response(place_of(output))
+    with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
+        if output.exists():
+            dataset.read(output, "response")  # an earlier response is replaced, and nothing else
+        began = time.perf_counter()
+        response = simulate_scene(scene)
+        dataset.write(response, output)
     describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))
     if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:

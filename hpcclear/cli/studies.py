@@ -11,9 +11,9 @@ from hpcclear.cli.options import (
     PROGRESS,
     STUDYING,
     Written,
+    directory_option,
     flag,
     on_ranks,
-    output_option,
     place_of,
     say,
     with_scene,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Carry a whole study.")
 @with_scene
-@output_option("Directory for the results.")
+@directory_option("Directory for the results.")
 @FRESH
 @LIMIT
 @PROGRESS
@@ -60,7 +60,7 @@ def run(
 
 @click.command(short_help="Show what accuracy costs in time.")
 @with_scene
-@output_option("Directory for accuracy.nc and the figures.")
+@directory_option("Directory for accuracy.nc and the figures.")
 @flag("--quick", "A look in about a minute instead of the whole picture.")
 @FRESH
 @LIMIT
