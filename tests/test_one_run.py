@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -207,12 +208,23 @@ def test_the_same_command_finds_its_results_and_another_seed_does_not(
 # -- samples that are kept beside their statistics --------------------------------------------------
 
 
-@pytest.fixture
-def kept(tmp_path):
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
     """Finished statistics, and the directory of their samples."""
-    folder, output = tmp_path / "raw", tmp_path / "sums.nc"
-    run_statistics(random_scene(), output, alone(), raw=folder, options=QUIET)
-    return output, folder
+    place = tmp_path_factory.mktemp("kept")
+    patch = pytest.MonkeyPatch()
+    patch.setattr("hpcclear.ensemble.statistics.make_evaluator", make_made_up)
+    folder = place / "raw"
+    run_statistics(random_scene(), place / "sums.nc", alone(), raw=folder, options=QUIET)
+    patch.undo()
+    return place
+
+
+@pytest.fixture
+def kept(tmp_path, finished):
+    """A copy of them, to be damaged."""
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "sums.nc", tmp_path / "raw"
 
 
 @pytest.mark.parametrize("name", ["samples-00000000.nc", "samples-00000001.nc", "samples.nc"])
@@ -232,11 +244,14 @@ def test_statistics_that_are_finished_notice_what_became_of_their_samples(kept, 
     with pytest.raises(InputError):
         run_statistics(random_scene(), output, alone(), raw=folder, options=QUIET)
     assert contents(folder) == found
-    again = Options(fresh=True, style="quiet")
-    done = run_statistics(random_scene(), output, alone(), raw=folder, options=again)
+
+
+def test_fresh_statistics_keep_their_samples_in_a_directory_of_their_own(kept):
+    output, folder = kept
+    before = contents(folder)
+    done = run_statistics(random_scene(), output, alone(), raw=folder, options=FRESH)
     assert done.output != output
-    assert contents(folder) == found
-    assert (folder.with_name("raw-2") / name).read_bytes() == before
+    assert contents(folder) == contents(folder.with_name("raw-2")) == before
 
 
 def test_finished_statistics_do_not_take_samples_of_another_seed_for_theirs(tmp_path):

@@ -3,11 +3,13 @@
 import sys
 from collections.abc import Callable
 
+from hpcclear.base.plain import plain
+
 _made: set[str] = set()
 
 
 def _on_standard_error(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
+    sys.stderr.write(f"{plain(text)}\n")
 
 
 _listeners: list[Callable[[str], object]] = [_on_standard_error]

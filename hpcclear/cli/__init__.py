@@ -6,6 +6,7 @@ known to the target error.
 
 import io
 import sys
+import warnings
 from collections.abc import Sequence
 
 import click
@@ -84,9 +85,15 @@ def _refused(error: click.ClickException) -> int:
     return Exit.BAD_INPUT
 
 
+def _show_warning(message: Warning | str, *_: object) -> None:
+    """Print a library's warning as one line: it may quote a file."""
+    say(f"Warning: {message}")
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
     listen(say)
+    warnings.showwarning = _show_warning
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:

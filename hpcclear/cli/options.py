@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.plain import plain
 from hpcclear.ranks.launcher import launched_rank
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
@@ -59,17 +61,28 @@ def flag(name: str, words: str) -> Callable[[Any], Any]:
     return click.option(name, is_flag=True, help=words)
 
 
+class Amount(click.FloatRange):
+    """A number within bounds; "nan" is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number, or raise BadParameter."""
+        number: float = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value!r} is not a number.", param, ctx)
+        return number
+
+
 FRESH = flag("--fresh", "Start anew beside earlier results, never over them.")
 LIMIT = click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Amount(min=0.0, min_open=True),
     metavar="SECONDS",
     help="Stop early, resumable, after this time.",
 )
 INTERVAL = click.option(
     "--checkpoint-interval",
     "interval",
-    type=click.FloatRange(min=0.0),
+    type=Amount(min=0.0),
     default=5.0,
     show_default=True,
     metavar="SECONDS",
@@ -191,7 +204,12 @@ def on_ranks(
     return run_on_ranks(program, stop, ahead)
 
 
+def show(text: str) -> None:
+    """Print a line on standard output."""
+    click.echo(plain(text))
+
+
 def say(text: str) -> None:
-    """A line on standard error, from root only."""
+    """Print a line on standard error, from root only."""
     if is_root():
-        click.echo(text, err=True)
+        click.echo(plain(text), err=True)

@@ -10,6 +10,7 @@ from hpcclear.cli.options import (
     LIMIT,
     PROGRESS,
     STUDYING,
+    Amount,
     Written,
     directory_option,
     flag,
@@ -51,7 +52,7 @@ def run(
             ranks,
             fresh=fresh,
             progress_style=progress,
-            tell=lambda text: click.echo(text, err=True),
+            tell=lambda text: say(text),
         )
         describe_study(place)
 
@@ -85,7 +86,7 @@ def accuracy(
         from hpcclear.ensemble.session import Options
 
         def tell(text: str) -> None:
-            click.echo(f"accuracy: {text}", err=True)
+            say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
         scene, place = written.scene(), place_of(output)
@@ -98,7 +99,7 @@ def accuracy(
 @with_scene
 @click.option(
     "--error",
-    type=click.FloatRange(0.0, 0.5, min_open=True),
+    type=Amount(0.0, 0.5, min_open=True),
     metavar="RELATIVE",
     help="Error of the objective to plan for; by default the settings of the file.",
 )

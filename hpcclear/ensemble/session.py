@@ -21,6 +21,7 @@ from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS
+from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
@@ -231,7 +232,7 @@ class Session:
         key: Mapping[str, str],
         ranks: Ranks,
         options: Options,
-        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{text}\n"),
+        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{plain(text)}\n"),
     ) -> None:
         self.place = place
         self.key = dict(key)
