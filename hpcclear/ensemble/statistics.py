@@ -122,6 +122,7 @@ def _keeping(raw: Path | None, session: Session) -> Iterator[Path | None]:
         yield None
         return
     place = Place.of_directory(raw, session.options.fresh, needed=NAMES)
+    collection.check_place(place.output)
     files.refuse_foreign(place.output / collection.NAME, netcdf.SEAL)
     if place.output != raw:
         session.tell(f"The samples themselves go to {place.output}.")

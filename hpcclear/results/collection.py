@@ -21,6 +21,21 @@ LISTED = 4096
 """The most files it shows. A millisecond and 20 kB of memory each to write, as much time to open."""
 
 
+def check_place(folder: Path) -> None:
+    """Refuse a directory in which `NAME` is something else, such as samples of another run; raises InputError."""
+    path = folder / NAME
+    if not path.exists():
+        return
+    try:
+        with h5py.File(path, "r") as file:
+            ours = bool(file["sample"].is_virtual)
+    except (OSError, KeyError, AttributeError):
+        ours = False
+    if not ours:
+        reason = f"there is another {NAME} in it, which would be lost"
+        raise InputError("--raw", str(folder), reason, "Choose a directory of its own")
+
+
 def write(folder: Path, names: Sequence[str]) -> None:
     """Write `NAME` beside files of kind ``samples``, which stand in the order of `names`.
 
