@@ -5,9 +5,11 @@ import os
 import random
 import resource
 import shutil
+import signal
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,17 @@ import pytest
 import report_data as data
 from click.testing import CliRunner, Result
 from commands import CHEAP, MPIEXEC, ROOT, SCENE, finish, overrides, run, sample, start
+from patience import crowded
 
-from hpcclear.base.errors import InputError, LimitError, mendable
+from hpcclear.base.errors import (
+    LEAST_ADDRESS_SPACE,
+    LEAST_BESIDE_OTHERS,
+    InputError,
+    LimitError,
+    mendable,
+)
 from hpcclear.cli import cli
+from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.report.html import guard
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset, files, netcdf
@@ -154,6 +164,48 @@ def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
     code, output = limited(words, resource.RLIMIT_AS, megabytes * 2**20)
     assert "Traceback" not in output, output
     assert code == 0 or (code == 1 and "memory" in output), output
+
+
+@pytest.mark.parametrize(
+    ("ranks", "megabytes"),
+    [
+        (0, LEAST_ADDRESS_SPACE),
+        pytest.param(2, LEAST_BESIDE_OTHERS, marks=pytest.mark.mpi),
+        pytest.param(4, LEAST_BESIDE_OTHERS, marks=pytest.mark.mpi),
+    ],
+)
+def test_the_address_space_that_is_said_to_be_enough_is(tmp_path, ranks, megabytes):
+    words = sample(tmp_path / "x.nc", 40)
+    assert run(words, 0)[0] == 0  # what it compiles is there
+    (tmp_path / "x.nc").unlink()
+    launch = [str(MPIEXEC), "-n", str(ranks)] if ranks else []
+    limit = ["bash", "-c", f'ulimit -v {megabytes * 1024}; exec "$@"', "bash"]
+    done = subprocess.run(
+        [*launch, *limit, sys.executable, "-m", "hpcclear", *words],
+        capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=crowded(100.0),
+    )  # fmt: skip
+    assert done.returncode == 0, done
+
+
+@pytest.mark.parametrize("word", ["inf", "1e300", "1e10"])
+def test_a_very_long_time_limit_leaves_signals_heard(word):
+    with StopSwitch() as stop:
+        stop.limit_time(float(word))
+        time.sleep(0.1)  # for the thread to look at it
+        os.kill(os.getpid(), signal.SIGTERM)
+        patience = time.monotonic() + crowded(5.0)
+        while not stop.is_set() and time.monotonic() < patience:
+            time.sleep(0.01)
+        assert stop.reason == "SIGTERM was received"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--time-limit", "nan"], ["--checkpoint-interval", "nan"]],
+    ids=lambda words: words[0],
+)
+def test_no_number_of_seconds_is_refused(tmp_path, words):
+    assert refused(run([*sample(tmp_path / "x.nc", 40), *words], 0))
 
 
 def test_too_few_file_handles_end_in_a_message(tmp_path):

@@ -96,7 +96,7 @@ def run_accuracy(
 
     style.matplotlib()  # said before the measuring, not after
     place = Place.of_directory(directory, options.fresh)
-    key = {**run_key(scene, "accuracy"), "profile": profile.name, "ranks": str(ranks.size)}
+    key = {**run_key(scene, "accuracy"), "profile": profile.name}
     drawn: dict[str, Path] = {}
     shown: dict[str, xr.DataArray] = {}
 
@@ -119,5 +119,5 @@ def run_accuracy(
             dataset.write(content, place.output / FILE)
             shown.clear()  # all say now what they were made of
         draw(content)
-        session.close()
+        session.close(session.attributes)
     return content, {"accuracy": place.output / FILE, **drawn}

@@ -5,6 +5,8 @@ import os
 import resource
 from collections.abc import Iterator
 
+from hpcclear.base.plain import plain
+
 LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 
 _NO_HANDLES = (errno.EMFILE, errno.ENFILE)
@@ -40,7 +42,7 @@ class InputError(ValueError):
             shown = shown[:77] + "..."
         elif len(shown) > LONGEST_SHOWN:
             shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
-        return f"{self.key} = {shown}: {self.reason}. {self.remedy}"
+        return plain(f"{self.key} = {shown}: {self.reason}. {self.remedy}")
 
 
 class StorageError(RuntimeError):
@@ -63,25 +65,29 @@ class StorageError(RuntimeError):
         super().__init__(path, reason, remedy)  # args, so that pickling keeps all three
 
     def __str__(self) -> str:
-        return f"cannot write {self.path}: {self.reason}. {self.remedy}"
+        return plain(f"cannot write {self.path}: {self.reason}. {self.remedy}")
 
 
 class LimitError(RuntimeError):
     """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
 
 
-LEAST_ADDRESS_SPACE = 640
-"""MB of it that it takes to load the program and a compiled kernel."""
+LEAST_ADDRESS_SPACE = 700
+"""MB of it that one process takes to load the program and a compiled kernel."""
+
+LEAST_BESIDE_OTHERS = 900
+"""MB that each takes under an MPI launcher: the library maps buffers that it shares with the ranks of its node."""
 
 
-def check_address_space() -> None:
-    """LimitError where the process may not have enough address space (``ulimit -v``) to load everything.
+def check_address_space(others: bool = False) -> None:
+    """Raise LimitError where the process may not have enough address space (``ulimit -v``) to load everything.
 
-    Asked before anything is loaded: out of memory amid an import Python 3.11 may raise the error for ever.
+    `others`: other ranks run beside it. Asked before anything is loaded: out of memory amid an import Python 3.11 may raise the error for ever.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and limit < LEAST_ADDRESS_SPACE * 2**20:
-        known = f"the limit of address space is {limit // 2**20} MB, it takes {LEAST_ADDRESS_SPACE}"
+    least = LEAST_BESIDE_OTHERS if others else LEAST_ADDRESS_SPACE
+    if limit != resource.RLIM_INFINITY and limit < least * 2**20:
+        known = f"the limit of address space is {limit // 2**20} MB, it takes {least}"
         raise _out_of_memory(known)
 
 

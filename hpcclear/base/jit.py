@@ -5,12 +5,9 @@ the folder's name holds a hash of all sources and of the versions that shape the
 so the folder must belong to the user and be closed to others.
 """
 
-import getpass
 import hashlib
 import os
 import platform
-import stat
-import tempfile
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -24,6 +21,8 @@ import numpy as np
 from numba import config, njit, types
 from numba.core.extending import intrinsic
 
+from hpcclear.base.private import private_folder, unwritable
+from hpcclear.base.remarks import remark
 from hpcclear.base.width import asked_width, features
 
 FASTMATH = {"contract", "nsz", "arcp"}
@@ -68,33 +67,27 @@ def source_key() -> str:
     return digest.hexdigest()[:16]
 
 
-def _is_private(folder: Path) -> bool:
-    info = folder.lstat()
-    mine = info.st_uid == os.getuid()
-    return mine and stat.S_ISDIR(info.st_mode) and not info.st_mode & 0o077
-
-
 def cache_folder() -> Path:
-    """Return this user's private cache folder on node-local disk, made if need be.
+    """Return this user's private folder for compiled code of these sources, made if need be.
 
-    ``HPCCLEAR_CACHE`` names another parent. A folder that somebody else owns or may write to is not used: a new one
-    is made for this process instead.
+    Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
-    parent = Path(os.environ.get("HPCCLEAR_CACHE", tempfile.gettempdir()))
-    try:
-        user = getpass.getuser()
-    except (KeyError, OSError):
-        user = str(os.getuid())
-    base = parent / f"hpcclear-{user}"
-    try:
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if _is_private(base):
-            folder = base / source_key()
-            folder.mkdir(mode=0o700, exist_ok=True)
-            return folder
-    except OSError:
-        pass  # read-only or full: compile without a shared cache
-    return Path(tempfile.mkdtemp(prefix="hpcclear-"))
+    folder = private_folder("HPCCLEAR_CACHE") / source_key()
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def _chosen_folder() -> str:
+    """Return the user's ``NUMBA_CACHE_DIR`` if it can be written to, else this package's own folder."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if not named:
+        return str(cache_folder())
+    why = unwritable(Path(named))
+    if not why:
+        return named
+    folder = str(cache_folder())
+    remark(f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}")
+    return folder
 
 
 def doubles_in_a_vector() -> int:
@@ -143,9 +136,7 @@ def narrow_vectors(typingctx):
     return types.none(), codegen
 
 
-# Decided before the first decorator runs; an explicit NUMBA_CACHE_DIR of the user's own wins.
-if not os.environ.get("NUMBA_CACHE_DIR"):
-    config.CACHE_DIR = str(cache_folder())
+config.CACHE_DIR = _chosen_folder()  # decided before the first decorator runs
 asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
 if config.ENABLE_AVX and config.CPU_NAME is None and config.CPU_FEATURES is None:
     config.CPU_FEATURES = features(Path(config.CACHE_DIR))

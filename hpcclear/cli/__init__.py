@@ -6,6 +6,7 @@ known to the target error.
 
 import io
 import sys
+import warnings
 from collections.abc import Sequence
 
 import click
@@ -18,6 +19,7 @@ from hpcclear.base.errors import (
     check_address_space,
     mendable,
 )
+from hpcclear.base.remarks import listen
 from hpcclear.cli import ensembles, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
@@ -83,8 +85,15 @@ def _refused(error: click.ClickException) -> int:
     return Exit.BAD_INPUT
 
 
+def _show_warning(message: Warning | str, *_: object) -> None:
+    """Print a library's warning as one line: it may quote a file."""
+    say(f"Warning: {message}")
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
+    listen(say)
+    warnings.showwarning = _show_warning
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop:
         try:

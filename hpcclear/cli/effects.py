@@ -11,6 +11,7 @@ from rich import box
 from rich.table import Table
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.plain import plain
 from hpcclear.cli.printing import _load, console, fitting, objective_of, table
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.effects import (
@@ -65,7 +66,7 @@ def describe(found: "Finished", scene: Scene, file: Path) -> int:
     ]
     out.print(table("Certificate", rows + _load(found)))
     out.print(f"effects  {found.output}")
-    out.file.write("\n" + recommendation(content, scene, file, tolerance, seconds))
+    out.file.write("\n" + plain(recommendation(content, scene, file, tolerance, seconds)))
     return Exit.DONE
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.plain import plain
 from hpcclear.ranks.launcher import launched_rank
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
@@ -29,9 +31,29 @@ SET = click.option(
 )
 
 
+ENDINGS = ("", ".nc", ".nc4", ".cdf", ".netcdf", ".h5", ".hdf5")
+"""Endings of names of result files: what is written is NetCDF-4, which is HDF5."""
+
+
+def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
+    """Raise BadParameter where a name promises another format than the one that is written."""
+    if path is not None and path.suffix.lower() not in ENDINGS:
+        other = path.with_suffix(".nc")
+        raise click.BadParameter(
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}; "
+            f"in Python xarray.open_dataset({str(other)!r}).to_dataframe() makes a table of it"
+        )
+    return path
+
+
 def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
-    """The option that names where results go."""
-    return click.option("-o", "--output", type=PATH, required=required, help=words)
+    """The option that names the file that results go to."""
+    return click.option("-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name)
+
+
+def directory_option(words: str) -> Callable[[Any], Any]:
+    """The option that names the directory that results go to."""
+    return click.option("-o", "--output", type=PATH, required=True, help=words)
 
 
 def flag(name: str, words: str) -> Callable[[Any], Any]:
@@ -39,17 +61,28 @@ def flag(name: str, words: str) -> Callable[[Any], Any]:
     return click.option(name, is_flag=True, help=words)
 
 
+class Amount(click.FloatRange):
+    """A number within bounds; "nan" is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number, or raise BadParameter."""
+        number: float = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value!r} is not a number.", param, ctx)
+        return number
+
+
 FRESH = flag("--fresh", "Start anew beside earlier results, never over them.")
 LIMIT = click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Amount(min=0.0, min_open=True),
     metavar="SECONDS",
     help="Stop early, resumable, after this time.",
 )
 INTERVAL = click.option(
     "--checkpoint-interval",
     "interval",
-    type=click.FloatRange(min=0.0),
+    type=Amount(min=0.0),
     default=5.0,
     show_default=True,
     metavar="SECONDS",
@@ -127,11 +160,9 @@ with_how = _gathering("how", How, FRESH, LIMIT, INTERVAL, PROGRESS)
 
 
 def place_of(output: Path) -> Path:
-    """The place for results, made if it lies below here or beside what is there; else a slip of the pen is likelier."""
-    parent = output.parent
-    if not output.is_absolute() or parent.parent.is_dir():
-        with contextlib.suppress(OSError):  # said, with a remedy, by what writes there
-            parent.mkdir(parents=True, exist_ok=True)
+    """Return the place for results, with the directories above it made."""
+    with contextlib.suppress(OSError):  # reported, with a remedy, by what writes there
+        output.parent.mkdir(parents=True, exist_ok=True)
     return output
 
 
@@ -183,7 +214,12 @@ def on_ranks(
     return run_on_ranks(noted, stop, ahead)
 
 
+def show(text: str) -> None:
+    """Print a line on standard output."""
+    click.echo(plain(text))
+
+
 def say(text: str) -> None:
-    """A line on standard error, from root only."""
+    """Print a line on standard error, from root only."""
     if is_root():
-        click.echo(text, err=True)
+        click.echo(plain(text), err=True)

@@ -3,17 +3,18 @@
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from rich import box
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
@@ -27,10 +28,24 @@ if TYPE_CHECKING:
 WIDTH = 80
 
 
+class _PlainConsole(Console):
+    """Shows texts as they are: nothing in them is markup, and nothing commands the terminal."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Make a text of a string, for lines, titles and cells alike."""
+        return super().render_str(plain(text), **{**options, "markup": False, "emoji": False})
+
+
 def console() -> Console:
     """Standard output; at most 80 columns, colours only on a terminal."""
     screen = Console(highlight=False, soft_wrap=False)
-    return Console(highlight=False, width=min(WIDTH, screen.width) if screen.is_terminal else WIDTH)
+    width = min(WIDTH, screen.width) if screen.is_terminal else WIDTH
+    return _PlainConsole(highlight=False, width=width)
+
+
+def remark(label: str, text: str) -> Text:
+    """A line that begins with a label in colour."""
+    return Text.assemble((f"{label}:", "yellow"), f" {plain(text)}")
 
 
 def table(title: str, rows: list[tuple[str, str]]) -> Table:
@@ -99,9 +114,9 @@ def describe_scene(scene: Scene, cost: bool) -> bool:
     ]
     out.print(table("What would be simulated", rows))
     for text in scene.readings:
-        out.print(f"[yellow]Note:[/] {escape(text)}")
+        out.print(remark("Note", text))
     for warning in (*locked, *scene.warnings):
-        out.print(f"[yellow]Warning:[/] {warning}")
+        out.print(remark("Warning", warning))
     if scene.study is not None:
         out.print(table("Study", _study_rows(scene)))
     if cost and not locked:
@@ -270,7 +285,7 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
         rows.append((f"{joint}", told + _at_instants(response, k)))
     out.print(table("Response", rows + _crank(response)))
     for text in flag_remarks(int(response["flags"])):
-        out.print(f"[yellow]Mind:[/] {text}")
+        out.print(remark("Mind", text))
     out.print(f"written  {output}")
 
 

@@ -13,6 +13,8 @@ from hpcclear.cli.options import (
     of_one_process,
     output_option,
     place_of,
+    say,
+    show,
     with_scene,
 )
 from hpcclear.ranks.stopping import Exit
@@ -41,7 +43,7 @@ def init(file: Path, four_stroke: bool) -> int:
     name = "four_stroke.toml" if four_stroke else "starter.toml"
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
-    click.echo(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
+    show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
     return Exit.DONE
 
 
@@ -74,7 +76,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
             from hpcclear.dynamics.planar.problem import poses_at_start
 
             poses = poses_at_start(scene)
-        click.echo(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
+        show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
     return Exit.DONE if turns else Exit.FAILED
 
 
@@ -94,22 +96,27 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
-    from hpcclear.results import dataset, files, netcdf
+    from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
+    from hpcclear.ranks.boundary import alone
+    from hpcclear.results import dataset
 
     scene = written.scene()
-    files.probe(place_of(output), netcdf.SEAL)
-    began = time.perf_counter()
-    response = simulate_scene(scene)
-    dataset.write(response, output)
+    place = Place.of_response(place_of(output))
+    with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
+        if output.exists():
+            dataset.read(output, "response")  # an earlier response is replaced, and nothing else
+        began = time.perf_counter()
+        response = simulate_scene(scene)
+        dataset.write(response, output)
     describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))
     if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
-        click.echo(f"Target missed: {why_missed(response, scene.numerics.target_error)}", err=True)
+        say(f"Target missed: {why_missed(response, scene.numerics.target_error)}")
         return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
     said = response.attrs.get("ended", f"{status.name.lower()}: {status.message}")
-    click.echo(f"Error: {said}. {status.remedy}", err=True)
+    say(f"Error: {said}. {status.remedy}")
     return Exit.FAILED
 
 
@@ -123,7 +130,7 @@ def report(directory: Path) -> int:
     """
     from hpcclear.report.html.page import write_report
 
-    click.echo(f"report  {write_report(directory)}")
+    show(f"report  {write_report(directory)}")
     return Exit.DONE
 
 
@@ -141,7 +148,7 @@ def reproduce(place: Path, samples: int) -> int:
     """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
 
     PLACE is a file or a directory of results. Versions and processors that differ from those that made them are named. Exit
-    code 1 if anything is different.
+    code 1 if anything is different or cannot be read.
 
     Example: hpcclear reproduce results/quickstart
     """
@@ -150,12 +157,12 @@ def reproduce(place: Path, samples: int) -> int:
     found = list(repeated(place, samples))
     for one in found:
         said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
-        click.echo(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))
+        show(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))
     for text in dict.fromkeys(text for one in found for text in one.changed):
-        click.echo(f"made by another {text}")
+        show(f"made by another {text}")
     if not found:
-        click.echo("no samples and no responses: nothing was simulated again")
-    return Exit.FAILED if any(one.differing for one in found) else Exit.DONE
+        show("no samples and no responses: nothing was simulated again")
+    return Exit.FAILED if any(one.differing or one.unread for one in found) else Exit.DONE
 
 
 @click.command(short_help="Describe results for an archive.")
@@ -164,12 +171,17 @@ def reproduce(place: Path, samples: int) -> int:
 def crate(directory: Path) -> int:
     """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
 
+    A file that is damaged is left out and named; the exit code is 1 then.
+
     Example: hpcclear crate results/quickstart
     """
     from hpcclear.results.crate import write_crate
 
-    click.echo(f"crate  {write_crate(directory)}")
-    return Exit.DONE
+    left_out: list[str] = []
+    show(f"crate  {write_crate(directory, left_out.append)}")
+    for text in left_out:
+        say(f"Error: {text}")
+    return Exit.FAILED if left_out else Exit.DONE
 
 
 @click.command()
@@ -182,5 +194,5 @@ def schema() -> int:
 
     from hpcclear.scene import scene_schema
 
-    click.echo(json.dumps(scene_schema(), indent=2))
+    show(json.dumps(scene_schema(), indent=2))
     return Exit.DONE

@@ -10,10 +10,11 @@ from hpcclear.cli.options import (
     LIMIT,
     PROGRESS,
     STUDYING,
+    Amount,
     Written,
+    directory_option,
     flag,
     on_ranks,
-    output_option,
     place_of,
     say,
     with_scene,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Carry a whole study.")
 @with_scene
-@output_option("Directory for the results.")
+@directory_option("Directory for the results.")
 @FRESH
 @LIMIT
 @PROGRESS
@@ -51,7 +52,7 @@ def run(
             ranks,
             fresh=fresh,
             progress_style=progress,
-            tell=lambda text: click.echo(text, err=True),
+            tell=lambda text: say(text),
         )
         describe_study(place)
 
@@ -60,7 +61,7 @@ def run(
 
 @click.command(short_help="Show what accuracy costs in time.")
 @with_scene
-@output_option("Directory for accuracy.nc and the figures.")
+@directory_option("Directory for accuracy.nc and the figures.")
 @flag("--quick", "A look in about a minute instead of the whole picture.")
 @FRESH
 @LIMIT
@@ -85,7 +86,7 @@ def accuracy(
         from hpcclear.ensemble.session import Options
 
         def tell(text: str) -> None:
-            click.echo(f"accuracy: {text}", err=True)
+            say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
         scene, place = written.scene(), place_of(output)
@@ -98,7 +99,7 @@ def accuracy(
 @with_scene
 @click.option(
     "--error",
-    type=click.FloatRange(0.0, 0.5, min_open=True),
+    type=Amount(0.0, 0.5, min_open=True),
     metavar="RELATIVE",
     help="Error of the objective to plan for; by default the settings of the file.",
 )

@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-import click
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import Status
+from hpcclear.cli.options import say
 from hpcclear.cli.printing import _load, console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
@@ -37,7 +37,7 @@ def describe(found: "Finished") -> int:
     out.print(f"wear     {found.output}")
     if good.any() or np.isfinite(content["lifetime"]).any():
         return Exit.DONE
-    click.echo("Error: every life failed", err=True)
+    say("Error: every life failed")
     return Exit.FAILED
 
 

@@ -3,7 +3,6 @@
 import hashlib
 import json
 
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.results.dataset import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import flatten
@@ -12,15 +11,15 @@ from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF
 
 
 def run_key(scene: Scene, command: str) -> dict[str, str]:
-    """What every run is made of: its scene, the versions, the processor and the lanes.
+    """Return what every run is made of: its scene, the versions and the processor.
 
     The scene entry by entry, so that a message can name those that changed; besides, all that
-    shapes the last bits of a result. The number of ranks is not among it.
+    shapes the last bits of a result. The numbers of ranks and of lanes are not among it.
     """
     origin = provenance(scene.text, scene.hash)
     entries = {path: json.dumps(value) for path, value in flatten(scene.resolved())}
     made_by = {name: origin[name] for name in ("hpcclear_version", "versions", "processor")}
-    return {"command": command, "lanes": str(DEFAULT_LANES), **made_by, **entries}
+    return {"command": command, **made_by, **entries}
 
 
 def sample_key(scene: Scene, points: Points) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """Samples themselves of a run of statistics, kept in files by whoever has all samples of a block: root, a leader, a rank."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ from hpcclear.statistics.streams.summary import BLOCK
 
 if TYPE_CHECKING:
     from hpcclear.base.objectives import Objective
+
+
+NAMES = re.compile(r"samples-\d{8}\.nc")
+"""Names of the files, a block each."""
 
 
 class RawFiles:
@@ -61,13 +66,11 @@ class RawFiles:
         )
 
     @staticmethod
-    def all_in(folder: Path, samples: int) -> bool:
-        """Whether a directory has the files of so many samples, and the one that shows them."""
-        blocks = -(-samples // BLOCK)
-        needed = {RawFiles._name(number) for number in range(blocks)}
-        if blocks <= collection.LISTED:
-            needed.add(collection.NAME)
-        return folder.is_dir() and needed <= {path.name for path in folder.iterdir()}
+    def missing(folder: Path, blocks: Iterable[int]) -> list[str]:
+        """Names of the files of some blocks that are not in a directory."""
+        return [
+            name for name in map(RawFiles._name, blocks) if not (folder / name).is_file()
+        ]
 
     @staticmethod
     def _name(number: int) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.api import as_points
@@ -29,6 +30,8 @@ class Repeated:
     """Variables that are other ones here, with the largest relative difference."""
     changed: tuple[str, ...] = ()
     """Versions and processor of the file that are not those here."""
+    unread: bool = False
+    """Whether the file is damaged, or its scene cannot be read."""
 
 
 def repeated(place: Path, count: int) -> Iterator[Repeated]:
@@ -44,22 +47,29 @@ def repeated(place: Path, count: int) -> Iterator[Repeated]:
     Yields
     ------
     Repeated
-        Of each file that was read, in order.
+        Of each file that was read, in order; of a damaged one in a directory, too.
 
     Raises
     ------
     InputError
-        There is no result file, or one is damaged or was made from no valid scene.
+        There is no result file; or `place` is a file that is damaged, or was made from no valid scene.
     """
-    paths = dataset.files_in(place) if place.is_dir() else [place]
-    for path in paths:
-        content = dataset.read(path)
-        kind, name = (
-            str(content.attrs["hpcclear_kind"]),
-            str(path.relative_to(place) if path != place else path),
-        )
-        if kind in REPEATED:
-            yield _compared(name, content, kind, count)
+    if not place.is_dir():
+        yield from _repeated(place, str(place), count)
+        return
+    for path in dataset.files_in(place):
+        name = str(path.relative_to(place))
+        try:
+            yield from _repeated(path, name, count)
+        except InputError as error:
+            yield Repeated(name, f"not simulated: {error.reason}", unread=True)
+
+
+def _repeated(path: Path, name: str, count: int) -> Iterator[Repeated]:
+    content = dataset.read(path)
+    kind = str(content.attrs["hpcclear_kind"])
+    if kind in REPEATED:
+        yield _compared(name, content, kind, count)
 
 
 def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated:

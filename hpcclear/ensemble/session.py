@@ -5,6 +5,7 @@ them, and at the end the times and the removal of what was unfinished.
 """
 
 import os
+import re
 import shlex
 import sys
 import time
@@ -17,13 +18,23 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Records
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS
+from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset, files, netcdf
-from hpcclear.results.checkpoint import INTERVAL, Checkpoint, check_key, discard, key_attribute
+from hpcclear.results.checkpoint import (
+    INTERVAL,
+    Checkpoint,
+    check_key,
+    discard,
+    key_attribute,
+    key_of,
+    unfinished,
+)
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.scene import Scene
@@ -44,6 +55,12 @@ class Options:
 
 DEFAULT_OPTIONS = Options()
 
+_IN_DIRECTORIES = ("run", "accuracy", "sample --statistics")
+"""Commands, as keys name them, that have a directory of their own."""
+
+_SIGNS = ("timing.nc", "front.nc", "accuracy.nc", "samples-00000000.nc")
+"""Files by which a directory of theirs is known, small ones."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -57,6 +74,14 @@ class Place:
     lock: Path
     folders: tuple[Path, ...]
     """Where a killed run may have left half a file."""
+    shared: bool = True
+    """Whether results of other runs may lie beside these, each with a lock of its own: not in a run's directory."""
+    guest: bool = False
+    """Whether a file may also lie in a directory of another run."""
+    apart: tuple[str, ...] = ()
+    """Files of the directory that a stage with a key of its own writes."""
+    needed: re.Pattern[str] | None = None
+    """Names of files that an earlier command left and that are not written again: a damaged one is refused."""
 
     @classmethod
     def of_file(cls, output: Path, fresh: bool) -> Self:
@@ -78,14 +103,26 @@ class Place:
         return cls(output, parts_of(output), parent / "timing.nc", lock, (parent,))
 
     @classmethod
+    def of_response(cls, output: Path) -> Self:
+        """The file of a single response, which any directory may hold, a run's as well."""
+        return replace(cls.of_file(output, fresh=False), guest=True)
+
+    @classmethod
     def of_part(cls, output: Path) -> Self:
         """The file of a part, with times of its own: others are written beside it at the same time."""
         place = cls.of_file(output, fresh=False)
         return replace(place, timing=output.with_name(f"{output.stem}.timing.nc"))
 
     @classmethod
-    def of_directory(cls, directory: Path, fresh: bool, folders: Sequence[str] = ()) -> Self:
-        """A directory, made if its parent exists; `fresh`: another one, if anything is in it.
+    def of_directory(
+        cls,
+        directory: Path,
+        fresh: bool,
+        folders: Sequence[str] = (),
+        apart: Sequence[str] = (),
+        needed: re.Pattern[str] | None = None,
+    ) -> Self:
+        """A directory of one run, made if its parent exists; `fresh`: another one, if anything is in it.
 
         Raises
         ------
@@ -101,8 +138,59 @@ class Place:
         inside = tuple(directory / name for name in folders)
         lock = directory / ".hpcclear.lock"
         return cls(
-            directory, directory / "checkpoint", directory / "timing.nc", lock, (directory, *inside)
-        )
+            directory, directory / "checkpoint", directory / "timing.nc", lock, (directory, *inside),
+            shared=False, apart=tuple(apart), needed=needed,
+        )  # fmt: skip
+
+    def refuse_others(self, key: Mapping[str, str]) -> None:
+        """Refuse a directory in which another run is at work or has left results; call it with the lock held.
+
+        A file goes into any directory but that of another run; a run's directory holds results with its own key only. Both
+        sides take their own lock before they look at those of others, so that of two at least one sees the other.
+
+        Raises
+        ------
+        InputError
+        """
+        folder = self.lock.parent
+        if self.guest:
+            return
+        if self.shared:
+            owner = Lock(folder)
+            if owner.is_ours():  # this is a stage of that run
+                return
+            owner.refuse_others()
+            why = _occupied(folder, key)
+            if why:
+                raise InputError("output", str(self.output), why, "Choose another directory")
+            return
+        for path in sorted(folder.glob(".*.lock")):
+            Lock(folder, path.name).refuse_others()
+        for path in sorted(folder.glob("*.nc")):
+            if path.name in self.apart:
+                continue
+            try:
+                content = netcdf.load(path)
+            except InputError:  # somebody else's, unless it has to be whole
+                if self.needed is not None and self.needed.fullmatch(path.name):
+                    raise
+                continue
+            if key_of(content):
+                check_key(content, key, path)
+
+
+def _occupied(folder: Path, key: Mapping[str, str]) -> str:
+    """Why a directory belongs to another run than that of a key; nothing if it does not."""
+    if unfinished(folder / "checkpoint"):
+        return "an unfinished run is in that directory"
+    for name in _SIGNS:
+        try:
+            found = key_of(netcdf.load(folder / name))
+        except InputError:
+            continue
+        if found.get("command") in _IN_DIRECTORIES and found != dict(key):
+            return f"that directory holds results of another run (hpcclear {found['command']})"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -144,7 +232,7 @@ class Session:
         key: Mapping[str, str],
         ranks: Ranks,
         options: Options,
-        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{text}\n"),
+        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{plain(text)}\n"),
     ) -> None:
         self.place = place
         self.key = dict(key)
@@ -160,6 +248,7 @@ class Session:
     def __enter__(self) -> Self:
         self._lock.acquire()
         try:
+            self.place.refuse_others(self.key)
             for folder in self.place.folders:
                 files.remove_leftovers(folder)
         except BaseException:

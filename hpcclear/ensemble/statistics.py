@@ -1,7 +1,8 @@
 """Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,13 @@ from hpcclear.ensemble.parts import (
     part_length,
     take_parts,
 )
-from hpcclear.ensemble.raw import RawFiles, raw_files
+from hpcclear.ensemble.raw import NAMES, RawFiles, raw_files
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, Points
 from hpcclear.ranks.team import Ranks, Task
-from hpcclear.results import collection, dataset, files
+from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
@@ -96,19 +97,48 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
-    if raw is not None:
-        collection.check_place(raw)
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
-    with Session(place, statistics_key(scene, len(points)), ranks, options) as session:
+    key = statistics_key(scene, len(points))
+    with Session(place, key, ranks, options) as session, _keeping(raw, session) as folder:
         content = session.found("statistics")
-        if content is not None and raw is not None and not RawFiles.all_in(raw, len(points)):
-            reason = f"the statistics are there, in {output}, and the samples were not kept"
-            raise InputError("--raw", str(raw), reason, "Choose another output, or add --fresh")
+        if content is not None and folder is not None:
+            _refuse_unkept(folder, len(points), place.output)
         if content is None:
-            content = _Streaming(scene, points, session, raw).run()
+            content = _Streaming(scene, points, session, folder).run()
         session.close()
     return session.finished(content, began)
+
+
+@contextmanager
+def _keeping(raw: Path | None, session: Session) -> Iterator[Path | None]:
+    """The directory for samples themselves, locked and without those of another run; another one beside it with ``--fresh``.
+
+    Raises
+    ------
+    InputError, StorageError
+    """
+    if raw is None:
+        yield None
+        return
+    place = Place.of_directory(raw, session.options.fresh, needed=NAMES)
+    collection.check_place(place.output)
+    files.refuse_foreign(place.output / collection.NAME, netcdf.SEAL)
+    if place.output != raw:
+        session.tell(f"The samples themselves go to {place.output}.")
+    with Session(place, session.key, session.ranks, session.options):
+        yield place.output
+
+
+def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
+    """Raise InputError where statistics are finished and samples of theirs are not in a directory."""
+    blocks = -(-samples // BLOCK)
+    missing = RawFiles.missing(folder, range(blocks))
+    if blocks <= collection.LISTED and not (folder / collection.NAME).is_file():
+        missing.append(collection.NAME)
+    if missing:
+        reason = f"the statistics are there, in {output}, and the samples were not kept ({missing[0]} is missing)"
+        raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
 
 
 class _Streaming:
@@ -137,7 +167,6 @@ class _Streaming:
         self._raw = None
         self._checkpoint = session.opened()
         if raw is not None:
-            files.make_directory(raw)
             self._raw = {
                 "folder": str(raw.absolute()),
                 "attributes": session.attributes,
@@ -147,14 +176,27 @@ class _Streaming:
         self._files = raw_files(self._raw, scene, points)
         leaders = session.ranks.mail.leaders
         self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
-        self._sums = Accumulator(len(points), on_block=self._files.write if self._files else None)
+        self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
         session.tell_problems()
         if earlier is not None and raw is not None and not earlier["kept"]:
             session.tell("what was summed up without keeping the samples is simulated again")
         elif earlier is not None:
             self._sums.restore(earlier)
+            if raw is not None and (gone := RawFiles.missing(raw, self._whole_blocks())):
+                session.tell(f"{gone[0]} is missing in {raw}: what was summed up is simulated again")
+                self._sums = self._new_sums()
         self._saved = time.monotonic()
+
+    def _new_sums(self) -> Accumulator:
+        return Accumulator(len(self._points), on_block=self._files.write if self._files else None)
+
+    def _whole_blocks(self) -> Iterator[int]:
+        """Numbers of the blocks of which all samples are summed up."""
+        for first, length, _ in self._sums.parts():
+            if length >= BLOCK:
+                last = min(first + length, self._sums.total)
+                yield from range(first // BLOCK, -(-last // BLOCK))
 
     def run(self) -> xr.Dataset:
         """Simulate, and write the statistics."""

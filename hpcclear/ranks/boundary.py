@@ -24,6 +24,7 @@ from hpcclear.base.errors import (
     check_address_space,
     mendable,
 )
+from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
 from hpcclear.ranks.stopping import GRACE, Exit, RankFailed, Stopped, StopSwitch
@@ -72,7 +73,7 @@ def run_on_ranks(
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
-        refused = _refused(mail, *_want())
+        refused = _refused(mail, *_want(mail.size > 1))
         if refused:
             return refused
         ranks = Ranks(mail, stop)
@@ -131,10 +132,10 @@ def refuse_together(complaint: str) -> int:
     return Exit.BAD_INPUT
 
 
-def _want() -> tuple[str, int]:
+def _want(others: bool) -> tuple[str, int]:
     """What this rank's process lacks for the work, and the exit code of that."""
     try:
-        check_address_space()
+        check_address_space(others)
     except LimitError as error:
         return f"Error: {error}", Exit.FAILED
     return "", Exit.DONE
@@ -324,5 +325,5 @@ def _say_and_abort(ranks: Ranks, text: str, code: int) -> None:
 
 def _say(text: str) -> None:
     with contextlib.suppress(OSError):  # a launcher that is gone reads no more
-        sys.stderr.write(text + "\n")
+        sys.stderr.write(plain(text) + "\n")
         sys.stderr.flush()

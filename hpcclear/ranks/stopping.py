@@ -19,6 +19,10 @@ GRACE = 3.8
 """Seconds a rank has to flush and leave once it was told to; the promise is 5."""
 
 
+LONGEST_WAIT = 3600.0
+"""Seconds after which the thread that listens looks at the clock again, at the latest."""
+
+
 class Exit(IntEnum):
     """Exit codes of every command."""
 
@@ -150,7 +154,8 @@ class StopSwitch:
     def _listen(self) -> None:
         while not self._closing:
             dues = [due for due in (self._leave_at, self._limit_ahead()) if due is not None]
-            wait = max(0.0, min(dues) - time.monotonic()) if dues else None
+            # the system's calls take no time limit of centuries, nor one of inf
+            wait = min(max(0.0, min(dues) - time.monotonic()), LONGEST_WAIT) if dues else None
             ready, _, _ = select.select([self._ear], [], [], wait)
             for number in self._ear.recv(4096) if ready else b"":
                 self._heard(number)

@@ -13,8 +13,12 @@ from typing import Protocol, Self
 BEATS = 6
 """Pulses in the time after which who sends none is given up."""
 
-SILENCE = 30.0
-"""That time by default, s."""
+SILENCE = 15.0
+"""That time by default, s.
+
+Where the network is cut MPICH itself ends a process with a segmentation fault, some 25 to 30 s later. Until then a rank has
+to notice (one beat more at most), to report it and, on root, to save what is finished.
+"""
 
 _LOOKS = 20  # at what came, between two beats
 _ALIVE, _BYE = 1, 2

@@ -30,6 +30,7 @@ INTERVAL = 5.0
 KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
 
+_WITHOUT_EFFECT = ("lanes", "ranks")  # in keys of earlier versions; results do not depend on them
 _FANOUT = 8
 _KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
@@ -60,7 +61,7 @@ def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
     InputError
         The keys differ; the message lists where.
     """
-    found = _parse_key(content)
+    found = key_of(content)
     differ = [name for name in sorted({*found, *key}) if found.get(name) != key.get(name)]
     if differ:
         shown = [
@@ -75,12 +76,15 @@ def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
         )
 
 
-def _parse_key(content: xr.Dataset) -> dict[str, object]:
+def key_of(content: xr.Dataset) -> dict[str, object]:
+    """The key of the run that made a dataset; empty where it carries none, as a single response."""
     try:
         found = json.loads(str(content.attrs.get(KEY, "{}")))
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    if not isinstance(found, dict):
+        return {}
+    return {name: value for name, value in found.items() if name not in _WITHOUT_EFFECT}
 
 
 def _short(value: object) -> str:

@@ -6,13 +6,14 @@ https://w3id.org/ro/wfrun/process/0.5 (S. Leo et al., PLoS ONE 19, 2024, doi:10.
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from hpcclear.base.errors import InputError
 from hpcclear.results import dataset, files
 
 NAME = "ro-crate-metadata.json"
@@ -21,10 +22,10 @@ PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 _STATED = ("source", "license", "hpcclear_version", "versions", "processor")
 
 
-def write_crate(directory: Path) -> Path:
+def write_crate(directory: Path, tell: Callable[[str], object] = lambda text: None) -> Path:
     """Write DIRECTORY/ro-crate-metadata.json from what the result files below it say of themselves.
 
-    Equal files of equal ages give equal bytes.
+    Equal files of equal ages give equal bytes. `tell` gets a sentence for each file that is damaged and left out.
 
     Returns
     -------
@@ -34,9 +35,17 @@ def write_crate(directory: Path) -> Path:
     Raises
     ------
     InputError
-        There is no result file, one is damaged, or a file of that name says something else: its user may have added to it.
+        There is no result file, all are damaged, or a file of that name says something else: its user may have added to it.
     """
-    found = {path: dataset.read(path) for path in dataset.files_in(directory)}
+    found: dict[Path, xr.Dataset] = {}
+    for path in dataset.files_in(directory):
+        try:
+            found[path] = dataset.read(path)
+        except InputError as error:
+            damage = error
+            tell(f"{path} is left out: {error.reason}")
+    if not found:
+        raise damage
     place = directory / NAME
     graph = {"@context": f"{CRATE}/context", "@graph": _graph(directory, found)}
     content = (json.dumps(graph, indent=2) + "\n").encode()

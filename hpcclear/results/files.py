@@ -189,20 +189,6 @@ def fsync_directory(descriptor: int) -> None:
             raise
 
 
-def make_directory(path: Path) -> None:
-    """Make a results directory and its parents unless it is there; a link to one is followed.
-
-    Raises
-    ------
-    InputError, StorageError
-        As `write_bytes`.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise refused(path, error) from None
-
-
 def probe(path: Path, mark: bytes = b"") -> None:
     """Refuse a place that `path` could not be written to, before hours are spent computing for it.
 

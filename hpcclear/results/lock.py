@@ -109,6 +109,16 @@ def _alive(pid: int, started: str) -> bool:
     return found[0] not in "ZX" and (started == "" or found[19] == started)
 
 
+def _is_flocked(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def _job_is_over(job: str) -> bool:
     """Whether Slurm says that the job is not waiting and not running; False without an answer."""
     if not job.isdecimal():
@@ -151,6 +161,28 @@ class Lock:
 
     def __exit__(self, *exception: object) -> None:
         self.release()
+
+    def refuse_others(self) -> None:
+        """Raise InputError while another process holds the lock, which is not taken; one that cannot be read counts as free."""
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        except OSError:
+            return
+        try:
+            holder = Holder.parse(os.read(descriptor, 4096))
+            if holder is not None and not holder.is_over() and holder != Holder.this_process():
+                raise self._refusal(holder)
+            if holder is None and _is_flocked(descriptor):  # its holder is about to write its name
+                raise self._refusal(None)
+        finally:
+            os.close(descriptor)
+
+    def is_ours(self) -> bool:
+        """Whether this process holds the lock, by this object or another one."""
+        try:
+            return Holder.parse(self.path.read_bytes()[:4096]) == Holder.this_process()
+        except OSError:
+            return False
 
     def acquire(self) -> None:
         """Take the lock or refuse; see the class."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.measured import with_values
+from hpcclear.scene.measured import files_named, with_values
 from hpcclear.scene.paths import replace
 from hpcclear.scene.scene import Scene, scene_of
 from hpcclear.scene.validation import DEEPEST, dotted
@@ -49,17 +49,34 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     for override in overrides:
         content = replace(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
+    named = files_named(content)
     content = dict(with_values(content, folder))
     scene = scene_of(content)
     notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
-    scene._text = notes + (scene.to_toml() if text is None else text)
+    if text is None or named:  # results carry the values: whoever has one need not have the file
+        scene._text = scene.to_toml()
+    else:
+        scene._text = notes + text
     return scene
 
 
 def scene_of_text(text: str, name: str) -> Scene:
-    """The scene of a text that result files carry: what was set is noted at its head; errors as `load_scene`."""
-    notes = itertools.takewhile(lambda line: line.startswith(_NOTE), text.splitlines())
-    return load_scene(parse(text, name), [line.removeprefix(_NOTE) for line in notes])
+    """Return the scene of a text that a result file carries, with the overrides noted at its head.
+
+    No file is opened, whatever the text names: it may be somebody else's.
+
+    Raises
+    ------
+    InputError
+        As `load_scene`, or if values are in a file.
+    """
+    content = parse(text, name)
+    for line in itertools.takewhile(lambda line: line.startswith(_NOTE), text.splitlines()):
+        content = replace(content, *_override(line.removeprefix(_NOTE)))
+    for key in files_named(content):
+        reason = "its scene names a file of values, which the result does not carry"
+        raise InputError(key, name, reason, "Make the result again with this version")
+    return load_scene(content)
 
 
 def _read(path: Path) -> str:

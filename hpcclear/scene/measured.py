@@ -28,16 +28,25 @@ def with_values(content: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     InputError
         If a file cannot be read, has no such column or a cell in it is no number.
     """
-    study = content.get("study")
-    if not isinstance(study, Mapping) or not isinstance(rows := study.get("random"), Mapping):
+    named = files_named(content)
+    if not named:
         return content
-    made = {
-        name: _with_values(row, f"study.random.{name}", folder)
-        if isinstance(row, Mapping) and "file" in row
-        else row
+    study = content["study"]
+    read = {key.rpartition(".")[2]: _with_values(row, key, folder) for key, row in named.items()}
+    return {**content, "study": {**study, "random": {**study["random"], **read}}}
+
+
+def files_named(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the tables of a parsed scene that name a file of values, by their dotted keys."""
+    study = content.get("study")
+    rows = study.get("random") if isinstance(study, Mapping) else None
+    if not isinstance(rows, Mapping):
+        return {}
+    return {
+        f"study.random.{name}": row
         for name, row in rows.items()
+        if isinstance(row, Mapping) and "file" in row
     }
-    return {**content, "study": {**study, "random": made}}
 
 
 def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def run_study(
     optimisation.check(scene)
     for text in unused(scene):
         tell(f"Warning: {text}")
-    place = Place.of_directory(Path(directory), fresh, ("responses",))
+    place = Place.of_directory(Path(directory), fresh, ("responses",), lives.files(scene))
     if place.output != Path(directory):
         tell(f"Results go to {place.output}.")
     options = Options(fresh, style=progress_style)

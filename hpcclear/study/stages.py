@@ -3,6 +3,7 @@
 import sys
 import time
 
+from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.study import paper
@@ -50,7 +51,7 @@ class Stages:
         again = f", round {int(round_) + 1}" if kind == "infill" else ""
         spent = duration(time.monotonic() - self._began)
         text = f"stage {number} of {len(self._steps)}: {_WORDS[kind]}{again} ({spent} so far)"
-        print(text, file=sys.stderr, flush=True)
+        print(plain(text), file=sys.stderr, flush=True)
 
     @staticmethod
     def silent(name: str) -> None:

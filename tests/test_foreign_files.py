@@ -1,0 +1,307 @@
+"""Files of other people: what they name is not opened, what they hold commands no terminal, and no cache of theirs is loaded."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unicodedata
+from pathlib import Path
+
+import pytest
+import report_data as data
+from click.testing import CliRunner
+from patience import crowded
+
+from hpcclear.base import private, remarks
+from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.plain import plain
+from hpcclear.base.private import private_folder
+from hpcclear.cli import cli
+from hpcclear.cli.printing import console, remark, table
+from hpcclear.results import dataset, netcdf
+from hpcclear.results.crate import NAME, write_crate
+from hpcclear.scene import load_scene
+from hpcclear.scene.loading import scene_of_text
+
+ROOT = Path(__file__).parent.parent
+QUICKSTART = ROOT / "jobs" / "quickstart.toml"
+SECRET = "mallory,of,the,secret,line"
+
+
+def forged(path: Path, scene: str) -> Path:
+    """A response that says it was made of such a scene."""
+    content = data.response(3)
+    content.attrs["scene"] = scene
+    netcdf.save(content, path)
+    return path
+
+
+def naming(path: Path) -> str:
+    """A scene whose random clearance has its values in a file."""
+    content = QUICKSTART.read_text().partition("[study.random]")[0]
+    return f'{content}\n[study.random]\nC = {{ distribution = "samples", file = "{path}" }}\n'
+
+
+@pytest.fixture
+def secret(tmp_path) -> Path:
+    path = tmp_path / "passwd"
+    path.write_text(f"{SECRET}\n" * 3)
+    return path
+
+
+# -- files that a result names ----------------------------------------------------------------------
+
+
+def test_no_file_that_the_scene_of_a_result_names_is_opened(tmp_path, secret, monkeypatch):
+    place = tmp_path / "results"
+    place.mkdir()
+    by_override = f"# set: study.random.C.file={secret}\n{QUICKSTART.read_text()}"
+    for name, text in (("a", naming(secret)), ("b", by_override), ("c", "no scene"), ("d", "")):
+        forged(place / f"{name}.nc", text)
+    (place / "e.nc").write_bytes((place / "a.nc").read_bytes()[:-500])
+    opened: list[str] = []
+    open_path = Path.open
+    monkeypatch.setattr(
+        Path, "open", lambda self, *a, **k: opened.append(str(self)) or open_path(self, *a, **k)
+    )
+    done = CliRunner().invoke(cli, ["reproduce", str(place)], standalone_mode=False)
+    assert done.exception is None
+    assert done.return_value == 1
+    assert SECRET not in done.output
+    assert str(secret) not in opened
+    said = [line.split(": ") for line in done.output.splitlines()]
+    assert [words[0] for words in said] == [f"{name}.nc" for name in "abcde"]  # none stops the others
+    assert all(words[1] == "not simulated" for words in said)
+    assert "names a file" in said[0][2]
+    assert "names a file" in said[1][2]
+
+
+def test_a_result_carries_the_values_of_measured_files(tmp_path):
+    (tmp_path / "measured.csv").write_text("C [mm]\n0.44\n0.31\n0.36\n")
+    (tmp_path / "scene.toml").write_text(naming(Path("measured.csv")))
+    scene = load_scene(tmp_path / "scene.toml", ["study.samples=40"])
+    (tmp_path / "measured.csv").unlink()
+    again = scene_of_text(scene.text, "samples.nc")
+    assert again.hash == scene.hash
+    assert again.required_study.samples == 40
+
+
+@pytest.mark.parametrize("command", ["crate", "reproduce"])
+def test_one_damaged_file_does_not_hide_the_others(tmp_path, command):
+    data.write_study(tmp_path)
+    good = len(dataset.files_in(tmp_path))
+    for name in ("aa.nc", "zz.nc"):
+        (tmp_path / name).write_bytes(netcdf.encode(data.timing()))  # without a seal
+    done = CliRunner().invoke(cli, [command, str(tmp_path)], standalone_mode=False)
+    assert done.return_value == 1
+    assert done.output.count("aa.nc") == done.output.count("zz.nc") == 1
+    if command == "crate":
+        listed = json.loads((tmp_path / NAME).read_text())["@graph"]
+        assert sum(one["@type"] == "File" for one in listed) == good
+
+
+def test_a_directory_of_damaged_files_makes_no_crate(tmp_path):
+    (tmp_path / "a.nc").write_text("nothing")
+    with pytest.raises(InputError, match="cut off"):
+        write_crate(tmp_path)
+
+
+# -- what reaches the terminal ----------------------------------------------------------------------
+
+EVIL = "\x1b]0;owned\x07\x9b31m\r\u202eabc\x7f"
+
+
+def controls(text: str) -> list[str]:
+    """Characters of a text that may command a terminal."""
+    kinds = ("Cc", "Cf", "Cs", "Zl", "Zp")
+    return [c for c in text if c not in "\n\t" and unicodedata.category(c) in kinds]
+
+
+def test_control_characters_are_written_out():
+    assert not controls(plain(EVIL))
+    assert "owned" in plain(EVIL)
+    assert plain("\x1b[0m") == "\\x1b[0m"
+    kept = "0.3 \u00b5m\n\t\u00fcber 20 \u00b0"
+    assert plain(kept) == kept
+
+
+def test_no_message_and_no_table_holds_control_characters(capsys):
+    for error in (InputError(EVIL, EVIL, EVIL, EVIL), StorageError(EVIL, EVIL, EVIL)):
+        assert not controls(str(error))
+    out = console()
+    out.print(table(EVIL, [(EVIL, EVIL)]))
+    out.print(EVIL)
+    out.print(remark("Mind", EVIL))
+    out.print("[study] and [/] and :smile: are no markup")
+    shown = capsys.readouterr().out
+    assert not controls(shown)
+    assert "[study] and [/] and :smile:" in shown
+
+
+@pytest.fixture(scope="module")
+def evil(tmp_path_factory) -> Path:
+    """A directory of results in whose attributes, names of variables, and units there are escape sequences."""
+    place = data.write_study(tmp_path_factory.mktemp("evil"))
+    for path in place.glob("*.nc"):
+        content = netcdf.load(path)
+        for name in content.attrs:
+            if isinstance(content.attrs[name], str) and name != "hpcclear_kind":
+                content.attrs[name] = f"{content.attrs[name]}{EVIL}"
+        for variable in content.variables.values():
+            if isinstance(variable.attrs.get("long_name"), str):
+                variable.attrs["long_name"] += EVIL
+        netcdf.save(content, path)
+    return place
+
+
+@pytest.mark.parametrize("command", ["reproduce", "report", "crate"])
+def test_escape_sequences_of_results_stay_in_them(evil, command):
+    done = subprocess.run(
+        [sys.executable, "-m", "hpcclear", command, str(evil)],
+        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=crowded(120.0),
+    )  # fmt: skip
+    assert done.stdout + done.stderr
+    assert not controls(done.stdout + done.stderr)
+
+
+SPELLINGS = {
+    "a key": f'format_version = 1\n"{EVIL.encode("unicode_escape").decode()}" = 1\n',
+    "a table": f'["{EVIL.encode("unicode_escape").decode()}"]\nx = 1\n',
+    "a value": f'format_version = "{EVIL.encode("unicode_escape").decode()}"\n',
+    "raw": f"format_version = {EVIL}\n",
+    "a joint": 'format_version = 1\n[mechanism]\nkind = "linkage"\n[joints."\\u001b]0;x"]\nkind = "ideal"\n',
+}
+
+
+@pytest.mark.parametrize("command", ["check", "simulate", "sample"])
+@pytest.mark.parametrize("text", SPELLINGS.values(), ids=SPELLINGS)
+def test_escape_sequences_of_scenes_stay_in_them(tmp_path, command, text):
+    text = text.replace("\\x", "\\u00")  # as TOML writes them
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8", newline="")
+    words = [command, str(tmp_path / "scene.toml")]
+    words += [] if command == "check" else ["-o", str(tmp_path / "x.nc")]
+    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert not controls(done.output + str(done.exception))
+    assert isinstance(done.exception, InputError) or done.return_value == 2
+
+
+# -- the cache --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def said(monkeypatch) -> list[str]:
+    """What is remarked."""
+    heard: list[str] = []
+    monkeypatch.setattr(remarks, "_made", set())
+    monkeypatch.setattr(remarks, "_listeners", [heard.append])
+    return heard
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch) -> Path:
+    """Where the user's own cache is."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.delenv("HPCCLEAR_CACHE", raising=False)
+    return tmp_path / "home" / "hpcclear"
+
+
+def test_a_folder_of_ones_own_is_used_without_a_word(tmp_path, monkeypatch, said, home):
+    monkeypatch.setenv("HPCCLEAR_CACHE", str(tmp_path / "deep" / "below"))
+    folder = private_folder("HPCCLEAR_CACHE")
+    assert folder == tmp_path / "deep" / "below" / f"hpcclear-{private.user_name()}"
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert said == []
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o707, 0o703, 0o1777, 0o755, 0o711])
+@pytest.mark.parametrize("levels", [1, 2])
+def test_a_folder_that_others_can_exchange_is_not_used(
+    tmp_path, monkeypatch, said, home, mode, levels
+):
+    parent = tmp_path / "shared" / "/".join(f"level{k}" for k in range(levels))
+    parent.mkdir(parents=True)
+    (tmp_path / "shared").chmod(mode)
+    monkeypatch.setenv("HPCCLEAR_CACHE", str(parent))
+    folders = {private_folder("HPCCLEAR_CACHE") for _ in range(3)}
+    if mode & 0o002 and not mode & 0o1000:  # sticky: only owners rename there
+        assert folders == {home}
+        assert len(said) == 1
+        assert str(tmp_path / "shared") in said[0]
+    else:
+        assert folders == {parent / f"hpcclear-{private.user_name()}"}
+        assert said == []
+
+
+@pytest.mark.parametrize("made", ["a file", "a link", "open to others", "somebody else's"])
+def test_what_somebody_made_before_is_not_used_and_that_is_said_once(
+    tmp_path, monkeypatch, said, home, made
+):
+    monkeypatch.setenv("HPCCLEAR_CACHE", str(tmp_path))
+    place = tmp_path / f"hpcclear-{private.user_name()}"
+    if made == "a file":
+        place.write_text("mine")
+    elif made == "a link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        place.symlink_to(tmp_path / "elsewhere")
+    else:
+        place.mkdir(mode=0o700)
+        place.chmod(0o750 if made == "open to others" else 0o700)
+    if made == "somebody else's":
+        lstat = Path.lstat
+        other = os.stat_result([*lstat(place)[:4], os.getuid() + 1, *lstat(place)[5:]])
+        monkeypatch.setattr(Path, "lstat", lambda self: other if self == place else lstat(self))
+    before = set(Path(tempfile.gettempdir()).iterdir())
+    assert {private_folder("HPCCLEAR_CACHE") for _ in range(3)} == {home}  # one that is found again
+    assert len(said) == 1
+    assert str(place) in said[0]
+    assert set(Path(tempfile.gettempdir()).iterdir()) == before
+
+
+def test_a_named_cache_needs_no_directory_for_temporary_files(tmp_path, monkeypatch, said, home):
+    """With /tmp and /var/tmp full or read-only."""
+
+    def nowhere() -> str:
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "gettempdir", nowhere)
+    monkeypatch.setenv("HPCCLEAR_CACHE", str(tmp_path))
+    assert private_folder("HPCCLEAR_CACHE").parent == tmp_path
+    monkeypatch.delenv("HPCCLEAR_CACHE")
+    assert private_folder("HPCCLEAR_CACHE") == home
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nowhere")
+    with pytest.raises(InputError, match="HPCCLEAR_CACHE"):
+        private_folder("HPCCLEAR_CACHE")
+
+
+def test_where_nothing_can_be_kept_a_temporary_folder_goes_at_the_end(tmp_path):
+    code = "from hpcclear.base.private import private_folder; print(private_folder('HPCCLEAR_CACHE').is_dir())"
+    known = {"HPCCLEAR_CACHE": "/proc/nowhere", "XDG_CACHE_HOME": "/proc/nowhere", "TMPDIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=crowded(60.0),
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | known,
+    )  # fmt: skip
+    assert done.stdout == "True\n"
+    assert "compiles anew" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"NUMBA_CACHE_DIR": "/proc/nowhere"},
+        {"HPCCLEAR_CACHE": "/proc/nowhere"},
+        {"TMPDIR": "/proc/nowhere"},
+    ],
+    ids=lambda settings: next(iter(settings)),
+)
+def test_a_place_that_cannot_be_written_to_ends_no_command(tmp_path, settings):
+    code = "import hpcclear.base.jit as one; print(one.config.CACHE_DIR)"
+    known = {"HPCCLEAR_CACHE": str(tmp_path / "own"), "XDG_CACHE_HOME": str(tmp_path / "home")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=crowded(60.0),
+        env=os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": ""} | known | settings,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert Path(done.stdout.strip()).is_relative_to(tmp_path)
+    assert done.stderr.count("Warning:") == (0 if "TMPDIR" in settings else 1), done.stderr
