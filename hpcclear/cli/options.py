@@ -163,14 +163,15 @@ def on_ranks(
     program: "Callable[[Ranks], int | None]",
     time_limit: float | None = None,
     ahead: tuple[str, ...] = SIMULATING,
+    resumes: bool = True,
 ) -> int:
-    """Run a command that uses every rank; `ahead`: what the others load meanwhile."""
+    """Run a command that uses every rank; `ahead`: what the others load meanwhile; `resumes`: what it finishes is kept."""
     from hpcclear.ranks.boundary import run_on_ranks
 
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
         stop.limit_time(time_limit)
-    return run_on_ranks(program, stop, ahead)
+    return run_on_ranks(program, stop, ahead, resumes=resumes)
 
 
 def say(text: str) -> None:

@@ -22,6 +22,7 @@ from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
+    from hpcclear.ranks.team import Ranks
 
 WIDTH = 80
 
@@ -62,7 +63,7 @@ def objective_of(content: xr.Dataset) -> tuple[str, str]:
     return labels.objective(content), str(unit)
 
 
-def describe_scene(scene: Scene, cost: bool) -> None:
+def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> None:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample."""
     out = console()
     from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
@@ -91,7 +92,7 @@ def describe_scene(scene: Scene, cost: bool) -> None:
         ),
         *_assembly(scene),
         ("scene hash", scene.hash[:16]),
-        ("MPI", _mpi()),
+        ("MPI", _mpi(ranks)),
     ]
     out.print(table("What would be simulated", rows))
     for warning in scene.warnings:
@@ -114,30 +115,22 @@ def _assembly(scene: Scene) -> list[tuple[str, str]]:
     return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
 
-def _mpi() -> str:
-    from hpcclear.ranks.boundary import describe_mpi
-    from hpcclear.ranks.launcher import launched_size
+def _mpi(ranks: "Ranks | None") -> str:
+    """The MPI library; the ranks that met in it, where a launcher started them; cores of this node."""
+    from hpcclear.ranks.boundary import alone, describe_mpi
 
     try:
         library = describe_mpi()
     except InputError:
         return "none found: one process"
-    cores = _cores()
-    copies = launched_size()[1]
+    mail = (ranks or alone()).mail
+    met = f"; {mail.size} ranks reached each other" if mail.size > 1 else ""
     crowded = (
-        f"; {copies} ranks on {cores} cores: more ranks than cores are slower"
-        if copies > cores
+        f"; {mail.node_size} ranks on {mail.node_cores} cores: more ranks than cores are slower"
+        if mail.node_size > mail.node_cores
         else ""
     )
-    return f"{library}; {cores} cores here{crowded}"
-
-
-def _cores() -> int:
-    import os
-
-    return (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    )
+    return f"{library}{met}; {mail.node_cores} cores here{crowded}"
 
 
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -252,20 +245,19 @@ def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _at_instants(response: xr.Dataset, joint: int) -> str:
-    """The largest force that the time series shows, where the true peak lies between its instants."""
-    peak = float(response["peak_contact_force"][joint])
-    shown = float(response["contact_force"][:, joint].max())
-    if not peak > shown * 1.001:
+    """The largest stored force of the averaged revolutions, which the peak is of, where the true peak lies between instants."""
+    if "transient_revolutions" not in response.attrs:
         return ""
-    return f" (between instants of the series, which shows {quantity(shown, 'N')})"
+    angle, peak = response["crank_angle"].to_numpy(), float(response["peak_contact_force"][joint])
+    turned = np.abs(angle - angle[:1]) / (2.0 * np.pi)
+    averaged = turned > int(response.attrs["transient_revolutions"]) - 1e-6
+    shown = float(response["contact_force"].to_numpy()[averaged, joint].max(initial=0.0))
+    if not peak > shown * 1.001 or not averaged.any():
+        return ""
+    return f" (between instants; largest stored value of the averaged revolutions {quantity(shown, 'N')})"
 
 
-REMARKS = {
-    Flag.LATCHED: "a joint never left contact: its damping kept an old impact speed, f may depend on the tolerance",
-    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
-    Flag.STIFF: "the implicit method was used for part of the run",
-    Flag.TARGET_MISSED: "f is not known to numerics.target_error",
-}
+REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
 
 
 def flag_remarks(flags: int) -> list[str]:
@@ -301,7 +293,7 @@ def describe_statistics(found: "Finished") -> None:
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the original, the answer of a finished study in ten lines, what it took, and
     where its files are."""
-    kinds = ("samples", "sensitivity", "verification", "chaos", "timing")
+    kinds = ("samples", "sensitivity", "kriging", "verification", "chaos", "timing")
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
@@ -355,7 +347,9 @@ def describe_samples(found: "Finished") -> None:
     if "target_error_reached" in samples.attrs:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
-    rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
+    rows.append(
+        ("latched", f"{latched} samples in which a joint did not lift off for a whole revolution")
+    )
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:

@@ -124,4 +124,4 @@ def plan(written: Written, error: float | None, workers: int | None) -> int:
         made = measure(scene, ranks, ladder(scene, error), planned, say)
         describe(made, str(written.file), error, planned)
 
-    return on_ranks(program)
+    return on_ranks(program, resumes=False)

@@ -222,7 +222,8 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
         {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
-        | {"integrator": integrator_of(scene, single=True)},
+        | {"integrator": integrator_of(scene, single=True)}
+        | {"transient_revolutions": scene.numerics.transient_revolutions},
         objective,
         labels,
         _dimensions(scene),

@@ -1,5 +1,6 @@
 """From a TOML file, or a mapping, to a `Scene`: reading and overrides."""
 
+import ast
 import itertools
 import re
 import tomllib
@@ -22,6 +23,7 @@ _DOTTED = re.compile(
 
 
 _NOTE = "# set: "  # before each override, at the head of a scene's text
+_CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
 def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Scene:
@@ -57,9 +59,24 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
 
 
 def scene_of_text(text: str, name: str) -> Scene:
-    """The scene of a text that result files carry: what was set is noted at its head; errors as `load_scene`."""
-    notes = itertools.takewhile(lambda line: line.startswith(_NOTE), text.splitlines())
-    return load_scene(parse(text, name), [line.removeprefix(_NOTE) for line in notes])
+    """The scene of a text that result files carry: what was set or changed is noted at its head; errors as `load_scene`."""
+    notes = list(
+        itertools.takewhile(lambda line: line.startswith((_NOTE, _CHANGE)), text.splitlines())
+    )
+    overrides = [line.removeprefix(_NOTE) for line in notes if line.startswith(_NOTE)]
+    scene = load_scene(parse(text, name), overrides)
+    changes = dict(_change(line) for line in reversed(notes) if line.startswith(_CHANGE))
+    return scene.with_(changes) if changes else scene
+
+
+def _change(line: str) -> tuple[str, Any]:
+    """Path and value of a note that `Scene.with_` left."""
+    path, _, value = line.removeprefix(_CHANGE).partition(" = ")
+    try:
+        return path, ast.literal_eval(value)
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
+        reason = "the note of a change cannot be read"
+        raise InputError("scene", line, reason, "Mend the line, or remove it") from None
 
 
 def _read(path: Path) -> str:
