@@ -13,7 +13,7 @@ _NO_HANDLES = (errno.EMFILE, errno.ENFILE)
 _BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
 
 
-_BOXED = re.compile(r"\bnp\.\w+\(([^()]*)\)")
+_BOXED = re.compile(r"\bnp\.(?:\w+\(([^()]*)\)|(True|False)_)")
 
 
 def unboxed(value: Any) -> Any:
@@ -55,7 +55,7 @@ class InputError(ValueError):
         elif len(shown) > LONGEST_SHOWN:
             shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
         # texts that were made of sequences of NumPy's numbers
-        return _BOXED.sub(r"\1", f"{self.key} = {shown}: {self.reason}. {self.remedy}")
+        return _BOXED.sub(r"\1\2", f"{self.key} = {shown}: {self.reason}. {self.remedy}")
 
 
 class StorageError(RuntimeError):

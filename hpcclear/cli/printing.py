@@ -16,6 +16,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -328,10 +329,7 @@ def describe_samples(found: "Finished") -> None:
     good = f[status == Status.OK]
     made = f"{len(good)} of {len(f)}"
     rows = [("simulated", f"{made} without failure")]
-    for code in Status:
-        count = int((status == code).sum())
-        if count and code is not Status.OK:
-            rows.append((f"  {code.name.lower()}", f"{count}: {code.message}; {code.remedy}"))
+    rows += [("failed", fitting(text)) for text in explained(samples)]
     if len(good):
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))

@@ -74,6 +74,10 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
         scene = written.scene(warn=False)
         describe_scene(scene, cost, ranks)
+        if scene.study is not None and scene.study.variables:
+            from hpcclear.cli.corners import describe
+
+            describe(scene, cost)
         if sketch is not None:
             _draw(scene, sketch)
         return Exit.DONE

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
-from hpcclear.base.outcome import Flag, Status
-from hpcclear.report import alike
+from hpcclear.base.outcome import Flag
+from hpcclear.report import alike, failures
 from hpcclear.report.figures import fits, labels
 
 SPAN = 2.0
@@ -76,6 +76,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("theory", _left(files, best)),
+        *(Line("failed", text) for text in _failed(files)),
         *([Line("chaos", scatter)] if scatter else []),
         Line("how sure", _sure(best, verified)),
         Line("next", "; ".join(_next(files, ours, best, place))),
@@ -293,7 +294,7 @@ def _bounds(best: xr.Dataset) -> str:
 
 
 def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
-    """Share of simulations that left the range of Hertz's theory, or failed."""
+    """Share of simulations that left the range of Hertz's theory."""
     parts = []
     if "beyond_hertz" in best:
         share = int(best["beyond_hertz"]) / int(best["samples"])
@@ -301,8 +302,7 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     samples = files.get("samples")
     if samples is not None and "flags" in samples:
         beyond = (samples["flags"].to_numpy() & int(Flag.BEYOND_HERTZ)) != 0
-        failed = int((samples["status"].to_numpy() != Status.OK).sum())
-        parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples, {failed} failed")
+        parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples")
     return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
 
 
@@ -345,6 +345,12 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     if any(HALF_WIDTH * float(np.nanmax(error)) > COARSE for _, error in indices.values()):
         text = f"Sobol indices are known to ± {COARSE:.0%} or worse: raise study.sensitivity.sobol_samples"
         yield Line("warning", text)
+
+
+def _failed(files: Mapping[str, xr.Dataset]) -> list[str]:
+    """Why samples failed, where, and what to do; none where all succeeded."""
+    samples = files.get("samples")
+    return failures.explained(samples) if samples is not None and "status" in samples else []
 
 
 def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:

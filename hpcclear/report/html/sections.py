@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.base.outcome import Status
+from hpcclear.report import failures
 from hpcclear.report.answer import is_plain
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
@@ -365,10 +366,17 @@ def trust(content: Content) -> list[object] | None:
         hit = numbers[status == code]
         if code is not Status.OK and hit.size:
             rows.append(
-                [code.name.lower(), Number(len(hit)), code.message, code.remedy, _listed(hit)]
+                [
+                    code.name.lower(),
+                    Number(len(hit)),
+                    code.message,
+                    failures.where(status == code, failures.variables(samples)),
+                    code.remedy,
+                    _listed(hit),
+                ]
             )
     if rows:
-        header = ["outcome", "samples", "what happened", "what to change", "which"]
+        header = ["outcome", "samples", "what happened", "where", "what to change", "which"]
         parts.append(Table(header, rows, "Samples that failed; their numbers are missing, never 0"))
     else:
         parts.append("No sample failed.")
