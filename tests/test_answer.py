@@ -92,17 +92,16 @@ def test_the_same_design_under_other_names_is_no_choice():
 
 
 @pytest.mark.parametrize(
-    ("total", "error", "words"),
+    ("total", "error", "words", "negligible"),
     [
-        ((0.59, 2e-4, 0.4), 1e-4,
-         "m2 59%, m3 40% of the variance of f over the study's ranges; C hardly matters there"),
-        ((2e-4, 2e-4, 1.0), 1e-4, "m3 100% of the variance of f over the study's ranges; m2, C hardly matter there"),
-        ((0.59, 2e-4, 0.4), 0.01, "m2 59%, m3 40%, C 0% of the variance of f over the study's ranges"),
-        ((0.59, np.nan, 0.4), 0.01, None),
+        ((0.59, 2e-4, 0.4), 1e-4, "m2 59% ± 0.0%, m3 40% ± 0.0%", "C"),
+        ((2e-4, 2e-4, 1.0), 1e-4, "m3 100% ± 0.0%", "m2, C"),
+        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2.0%, m3 40% ± 2.0%, C 0% ± 2.0%", None),
+        ((0.59, np.nan, 0.4), 0.01, None, None),
     ],
-)  # fmt: skip
-def test_what_matters_is_told_and_what_hardly_does(total, error, words):
-    """Of limits that reach a hundredth nothing is said to matter hardly."""
+)
+def test_total_indices_are_printed_and_what_is_negligible(total, error, words, negligible):
+    """Where the interval reaches a hundredth nothing is called negligible."""
     found = xr.Dataset(
         {
             "sobol_total": ("parameter", list(total)),
@@ -111,7 +110,9 @@ def test_what_matters_is_told_and_what_hardly_does(total, error, words):
         {"parameter": ["m2", "C", "m3"]},
     )
     files = {"verification": verified(MEAN, DEVIATION), "sensitivity": found}
-    assert dict(answer(files, "")).get("what matters") == words
+    lines = dict(answer(files, ""))
+    assert lines.get("interactions", "").partition("%): ")[2] == (words or "")
+    assert lines.get("negligible", "").partition(" (total")[0] == (negligible or "")
 
 
 def test_of_designs_whose_variables_are_not_known_none_is_called_the_same():

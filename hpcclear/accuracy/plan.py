@@ -18,6 +18,7 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.steady import telling
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
@@ -118,6 +119,8 @@ def measure(
     errors: tuple[float, ...] = TARGETS,
     workers: int = 1,
     tell: Callable[[str], object] = lambda text: None,
+    show: Callable[["Plan"], object] = lambda plan: None,
+    progress_style: Style = "quiet",
 ) -> Plan:
     """Measure what samples cost at the settings of the file and at those chosen for each error; on root.
 
@@ -133,6 +136,10 @@ def measure(
         clock are slower together.
     tell : callable
         Gets what is measured, line by line, as it begins.
+    show : callable
+        Gets the plan as far as it is measured, after each of its rows but the last.
+    progress_style : {"auto", "bar", "log", "quiet"}
+        How the samples of a measurement are counted on standard error.
 
     Raises
     ------
@@ -147,38 +154,55 @@ def measure(
     assert study is not None  # refused by `design`
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
     rows: list[Row] = []
-    with _company(scene, points, workers if ranks.size == 1 else 1):
+    whole = sum(extent.samples_of(scene).values()) if study.cases else None
+    alone = extent.responses_of(scene) if study.cases else 0
+
+    def made() -> Plan:
+        peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        startup = process_age_at_start()
+        known = next(
+            (row.simulations for row in rows if row.error is None and row.simulations), whole
+        )
+        return Plan(tuple(rows), study.samples, known, startup, peak, len(study.variables), alone)
+
+    with _company(scene, points, workers if ranks.size == 1 else 1, tell):
         if study.accuracy is not None:
-            rows, wanted = splits(scene, points, ranks, tell), []
+            wanted = []
+            for row in splits(scene, points, ranks, tell, progress_style):
+                rows.append(row)
+                show(made())
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
             told = "the settings of the file" if error is None else f"a target error of {error:g}"
             tell(f"measuring {k + 1} of {len(wanted)}: {told}")
-            seconds, records = cost(one, points, ranks, limit, str(k))
+            seconds, records = cost(one, points, ranks, limit, str(k), progress_style)
             rows.append(Row(error, one, seconds, telling.in_short(one, records)))
-    peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    startup = process_age_at_start()
-    whole = sum(extent.samples_of(scene).values()) if study.cases else None
-    whole = next((row.simulations for row in rows if row.error is None and row.simulations), whole)
-    alone = extent.responses_of(scene) if study.cases else 0
-    return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
+            if k + 1 < len(wanted):
+                show(made())
+    return made()
 
 
 FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Accuracies of the ladder of a study that asks for one, over that."""
 
 
-def splits(scene: Scene, points: Points, ranks: Ranks, tell: Callable[[str], object]) -> list[Row]:
+def splits(
+    scene: Scene,
+    points: Points,
+    ranks: Ranks,
+    tell: Callable[[str], object],
+    style: Style = "quiet",
+) -> Iterator[Row]:
     """The ladder of a study of which an accuracy is asked: how each would be shared out, its pilot among its simulations."""
     known: dict[tuple[float, bytes], tuple[Array, float]] = {}
 
     def simulate(label: str, one: Scene, few: Points) -> tuple[Array, float]:
         key = one.numerics.rtol, few.values.tobytes()  # pilots share what they begin with
         if key not in known:
-            known[key] = budget.simulated(ranks, one, few)
+            known[key] = budget.simulated(ranks, one, few, Progress("plan: pilot", style))
         return known[key]
 
-    wanted, rows = budget.asked(scene), []
+    wanted = budget.asked(scene)
     for k, factor in enumerate(FACTORS):
         mean, deviation = np.minimum(factor * wanted, 0.99).tolist()
         asked_for = _percent(mean, deviation)
@@ -193,10 +217,9 @@ def splits(scene: Scene, points: Points, ranks: Ranks, tell: Callable[[str], obj
         # simulations at other tolerances count by their price
         each = made.found.evaluations[split.rung]
         count = round((split.evaluations + made.pilot) / each)
-        seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}")
+        seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}", style)
         label = asked_for + ("" if split.sure else " ?")
-        rows.append(Row(None if factor == 1.0 else factor, final, seconds, "", count, label))
-    return rows
+        yield Row(None if factor == 1.0 else factor, final, seconds, "", count, label)
 
 
 def _percent(mean: float, deviation: float) -> str:
@@ -206,14 +229,15 @@ def _percent(mean: float, deviation: float) -> str:
 
 
 def cost(
-    scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str
+    scene: Scene, points: Points, ranks: Ranks, seconds: float, label: str, style: Style = "quiet"
 ) -> tuple[float, Records]:
     """Core-seconds of one sample in a long batch, measured for about `seconds` on every rank; and the samples."""
 
     def busy(count: int, stage: str) -> tuple[float, Records]:
         spread = np.linspace(0, len(points), count, endpoint=False).astype(int)
         rows = spread if count <= len(points) else np.arange(count) % len(points)
-        records = sample_points(scene, points.take(rows), ranks, stage=stage)
+        progress = Progress("plan", style)
+        records = sample_points(scene, points.take(rows), ranks, progress=progress, stage=stage)
         spent = float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum())
         return spent / count, records
 
@@ -227,7 +251,9 @@ def cost(
 
 
 @contextmanager
-def _company(scene: Scene, points: Points, workers: int) -> Iterator[None]:
+def _company(
+    scene: Scene, points: Points, workers: int, tell: Callable[[str], object] = lambda text: None
+) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
     cores = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -240,6 +266,10 @@ def _company(scene: Scene, points: Points, workers: int) -> Iterator[None]:
         context.Process(target=_keep_busy, args=(content, points, stop, ready), daemon=True)
         for _ in range(others)
     ]
+    if processes:
+        tell(
+            f"starting {others} more processes, to measure on cores that are as busy as those of the job"
+        )
     for process in processes:
         process.start()
     try:

@@ -2,8 +2,10 @@
 
 import errno
 import os
+import re
 import resource
 from collections.abc import Iterator
+from typing import Any
 
 from hpcclear.base.plain import plain
 
@@ -11,6 +13,18 @@ LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 
 _NO_HANDLES = (errno.EMFILE, errno.ENFILE)
 _BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errno.EPERM)
+
+
+_BOXED = re.compile(r"\bnp\.(?:\w+\(([^()]*)\)|(True|False)_)")
+
+
+def unboxed(value: Any) -> Any:
+    """Return a value with plain numbers for NumPy's, whose `repr` names their type, also inside lists, tuples and dicts."""
+    if hasattr(value, "tolist"):  # NumPy need not be loaded
+        return value.tolist()
+    if isinstance(value, dict):
+        return {unboxed(key): unboxed(entry) for key, entry in value.items()}
+    return type(value)(map(unboxed, value)) if type(value) in (list, tuple) else value
 
 
 class InputError(ValueError):
@@ -36,13 +50,14 @@ class InputError(ValueError):
         super().__init__(key, value, reason, remedy)  # args, so that pickling keeps all four
 
     def __str__(self) -> str:
-        shown = repr(self.value)
+        shown = repr(unboxed(self.value))
         # a file's place is of use only whole
         if len(shown) > 80 and os.sep not in shown:
             shown = shown[:77] + "..."
         elif len(shown) > LONGEST_SHOWN:
             shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
-        return plain(f"{self.key} = {shown}: {self.reason}. {self.remedy}")
+        # texts that were made of sequences of NumPy's numbers
+        return plain(_BOXED.sub(r"\1\2", f"{self.key} = {shown}: {self.reason}. {self.remedy}"))
 
 
 class StorageError(RuntimeError):

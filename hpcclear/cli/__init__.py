@@ -4,10 +4,11 @@ Exit codes: 0 done, 1 failed, 2 bad input, 3 stopped early (the same command goe
 known to the target error.
 """
 
+import contextlib
 import io
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -27,7 +28,6 @@ from hpcclear.ranks.stopping import Exit, StopSwitch
 
 _ROOT_ALONE = (
     scenes.init,
-    scenes.check,
     scenes.simulate,
     ensembles.merge,
     scenes.report,
@@ -38,6 +38,7 @@ _ROOT_ALONE = (
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 
 _ON_RANKS = (
+    scenes.check,
     ensembles.sample,
     ensembles.map_command,
     ensembles.wear,
@@ -90,12 +91,21 @@ def _show_warning(message: Warning | str, *_: object) -> None:
     say(f"Warning: {message}")
 
 
+@contextlib.contextmanager
+def _numbers_in_silence() -> Iterator[None]:
+    """Without NumPy's warnings of divisions and overflows: a number that cannot be had is NaN, and a status says why."""
+    with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore", RuntimeWarning)
+        yield
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
     listen(say)
     warnings.showwarning = _show_warning
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
-    with StopSwitch(ends_process=True) as stop:
+    with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
         try:
             if (
                 not is_launched()

@@ -197,8 +197,9 @@ def on_ranks(
     program: "Callable[[Ranks], int | None]",
     time_limit: float | None = None,
     ahead: tuple[str, ...] = SIMULATING,
+    resumes: bool = True,
 ) -> int:
-    """Run a command that uses every rank; `ahead`: what the others load meanwhile."""
+    """Run a command that uses every rank; `ahead`: what the others load meanwhile; `resumes`: what it finishes is kept."""
     from hpcclear.ranks.boundary import run_on_ranks
 
     stop: StopSwitch = click.get_current_context().obj
@@ -211,7 +212,7 @@ def on_ranks(
         with noting(lambda text, read: say(f"Note: {text!r} is read as {read}")):
             return program(ranks)
 
-    return run_on_ranks(noted, stop, ahead)
+    return run_on_ranks(noted, stop, ahead, resumes=resumes)
 
 
 def show(text: str) -> None:

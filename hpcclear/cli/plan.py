@@ -13,6 +13,17 @@ RESERVE = 1.5
 """Wall time asked for over wall time expected."""
 
 
+def preview(plan: Plan, ranks: int) -> str:
+    """Return what the latest row means for the job, in a line: the answer so far, while the next row is measured."""
+    row = plan.rows[-1]
+    simulations = plan.simulations(row)
+    name = row.label or ("settings of the file" if row.error is None else f"error {row.error:g}")
+    return (
+        f"{name}: {1e3 * row.seconds:.3g} ms a sample, {simulations} simulations take "
+        f"{duration(plan.wall_seconds(row, simulations, ranks))} on {ranks} ranks"
+    )
+
+
 def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
     out = console()

@@ -18,12 +18,14 @@ from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels, motion
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
+    from hpcclear.ranks.team import Ranks
 
 WIDTH = 80
 
@@ -78,7 +80,7 @@ def objective_of(content: xr.Dataset) -> tuple[str, str]:
     return labels.objective(content), str(unit)
 
 
-def describe_scene(scene: Scene, cost: bool) -> bool:
+def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
     out = console()
@@ -110,7 +112,7 @@ def describe_scene(scene: Scene, cost: bool) -> bool:
         *_speeds(scene),
         *_assembly(scene),
         ("scene hash", scene.hash[:16]),
-        ("MPI", _mpi()),
+        ("MPI", _mpi(ranks)),
     ]
     out.print(table("What would be simulated", rows))
     for text in scene.readings:
@@ -167,30 +169,22 @@ def _locked(scene: Scene) -> list[str]:
     return [f"the scene's own design {told[1].reason}; its cost is not measured"]
 
 
-def _mpi() -> str:
-    from hpcclear.ranks.boundary import describe_mpi
-    from hpcclear.ranks.launcher import launched_size
+def _mpi(ranks: "Ranks | None") -> str:
+    """The MPI library; the ranks that met in it, where a launcher started them; cores of this node."""
+    from hpcclear.ranks.boundary import alone, describe_mpi
 
     try:
         library = describe_mpi()
     except InputError:
         return "none found: one process"
-    cores = _cores()
-    copies = launched_size()[1]
+    mail = (ranks or alone()).mail
+    met = f"; {mail.size} ranks reached each other" if mail.size > 1 else ""
     crowded = (
-        f"; {copies} ranks on {cores} cores: more ranks than cores are slower"
-        if copies > cores
+        f"; {mail.node_size} ranks on {mail.node_cores} cores: more ranks than cores are slower"
+        if mail.node_size > mail.node_cores
         else ""
     )
-    return f"{library}; {cores} cores here{crowded}"
-
-
-def _cores() -> int:
-    import os
-
-    return (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    )
+    return f"{library}{met}; {mail.node_cores} cores here{crowded}"
 
 
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -306,20 +300,19 @@ def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _at_instants(response: xr.Dataset, joint: int) -> str:
-    """The largest force that the time series shows, where the true peak lies between its instants."""
-    peak = float(response["peak_contact_force"][joint])
-    shown = float(response["contact_force"][:, joint].max())
-    if not peak > shown * 1.001:
+    """The largest stored force of the averaged revolutions, which the peak is of, where the true peak lies between instants."""
+    if "transient_revolutions" not in response.attrs:
         return ""
-    return f" (between instants of the series, which shows {quantity(shown, 'N')})"
+    angle, peak = response["crank_angle"].to_numpy(), float(response["peak_contact_force"][joint])
+    turned = np.abs(angle - angle[:1]) / (2.0 * np.pi)
+    averaged = turned > int(response.attrs["transient_revolutions"]) - 1e-6
+    shown = float(response["contact_force"].to_numpy()[averaged, joint].max(initial=0.0))
+    if not peak > shown * 1.001 or not averaged.any():
+        return ""
+    return f" (between instants; largest stored value of the averaged revolutions {quantity(shown, 'N')})"
 
 
-REMARKS = {
-    Flag.LATCHED: "a joint never left contact: its damping kept an old impact speed, f may depend on the tolerance",
-    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
-    Flag.STIFF: "the implicit method was used for part of the run",
-    Flag.TARGET_MISSED: "f is not known to numerics.target_error",
-}
+REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
 
 
 def flag_remarks(flags: int) -> list[str]:
@@ -355,7 +348,7 @@ def describe_statistics(found: "Finished") -> None:
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the original, the answer of a finished study in ten lines, what it took, and
     where its files are."""
-    kinds = ("samples", "sensitivity", "verification", "chaos", "timing")
+    kinds = ("samples", "sensitivity", "kriging", "verification", "chaos", "timing")
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
@@ -390,10 +383,7 @@ def describe_samples(found: "Finished") -> None:
     good = f[status == Status.OK]
     made = f"{len(good)} of {len(f)}"
     rows = [("simulated", f"{made} without failure")]
-    for code in Status:
-        count = int((status == code).sum())
-        if count and code is not Status.OK:
-            rows.append((f"  {code.name.lower()}", f"{count}: {code.message}; {code.remedy}"))
+    rows += [("failed", fitting(text)) for text in explained(samples)]
     if len(good):
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
@@ -409,7 +399,9 @@ def describe_samples(found: "Finished") -> None:
     if "target_error_reached" in samples.attrs:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
-    rows.append(("latched", f"{latched} samples with a joint in permanent contact"))
+    rows.append(
+        ("latched", f"{latched} samples in which a joint did not lift off for a whole revolution")
+    )
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:

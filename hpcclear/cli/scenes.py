@@ -1,7 +1,8 @@
-"""Commands about one scene, of one process: `init`, `check`, `simulate`, `schema`; and `report`, of what is there."""
+"""Commands about one scene: `init`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
 
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,13 +12,19 @@ from hpcclear.cli.options import (
     check_free,
     flag,
     of_one_process,
+    on_ranks,
     output_option,
     place_of,
     say,
     show,
     with_scene,
 )
+from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.team import Ranks
+    from hpcclear.scene import Scene
 
 
 @click.command(short_help="Write a starter scene.")
@@ -56,28 +63,45 @@ def init(file: Path, four_stroke: bool) -> int:
     metavar="FIGURE",
     help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
 )
-@of_one_process
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate a scene or study and say what would be simulated.
 
     Exit code 1 if the file's own design cannot turn while its study varies that, 2 if none can.
+    Under mpiexec or srun all ranks meet in MPI first: a launcher that does not belong to the MPI library ends with exit code 2.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
-    from hpcclear.cli.printing import describe_scene
 
-    scene = written.scene(warn=False)
-    turns = describe_scene(scene, cost)
-    if sketch is not None:
-        from hpcclear.report import save, sketch_figure
+    def program(ranks: "Ranks") -> int:
+        from hpcclear.cli.printing import describe_scene
 
-        poses = None
-        if scene.is_planar:
-            from hpcclear.dynamics.planar.problem import poses_at_start
+        scene = written.scene(warn=False)
+        turns = describe_scene(scene, cost, ranks)
+        if scene.study is not None and scene.study.variables:
+            from hpcclear.cli.corners import describe
 
-            poses = poses_at_start(scene)
-        show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
-    return Exit.DONE if turns else Exit.FAILED
+            describe(scene, cost)
+        if sketch is not None:
+            _draw(scene, sketch)
+        return Exit.DONE if turns else Exit.FAILED
+
+    if is_launched():
+        return on_ranks(program, ahead=(), resumes=False)
+    from hpcclear.ranks.boundary import alone
+
+    return program(alone())
+
+
+def _draw(scene: "Scene", sketch: Path) -> None:
+    """Draw the mechanism to a file and print where it is."""
+    from hpcclear.report import save, sketch_figure
+
+    poses = None
+    if scene.is_planar:
+        from hpcclear.dynamics.planar.problem import poses_at_start
+
+        poses = poses_at_start(scene)
+    show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
 @click.command(short_help="Simulate one response.")

@@ -118,11 +118,14 @@ def plan(written: Written, error: float | None, workers: int | None) -> int:
 
     def program(ranks: "Ranks") -> None:
         from hpcclear.accuracy.plan import ladder, measure
-        from hpcclear.cli.plan import describe
+        from hpcclear.cli.plan import describe, preview
 
         planned = ranks.size if workers is None else workers
         scene = written.scene()
-        made = measure(scene, ranks, ladder(scene, error), planned, say)
+        made = measure(
+            scene, ranks, ladder(scene, error), planned, say,
+            lambda plan: say(preview(plan, planned)), "auto",
+        )  # fmt: skip
         describe(made, str(written.file), error, planned)
 
-    return on_ranks(program)
+    return on_ranks(program, resumes=False)

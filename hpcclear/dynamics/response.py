@@ -234,6 +234,7 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene, single=True)}
+        | {"transient_revolutions": scene.numerics.transient_revolutions}
         | _reason(scene),
         objective,
         labels,

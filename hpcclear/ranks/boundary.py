@@ -27,7 +27,15 @@ from hpcclear.base.errors import (
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
-from hpcclear.ranks.stopping import GRACE, Exit, RankFailed, Stopped, StopSwitch
+from hpcclear.ranks.stopping import (
+    ANEW,
+    GRACE,
+    RESUMES,
+    Exit,
+    RankFailed,
+    Stopped,
+    StopSwitch,
+)
 from hpcclear.ranks.team import Ranks
 from hpcclear.ranks.watch import Watch, silence
 
@@ -45,6 +53,8 @@ def run_on_ranks(
     program: Callable[[Ranks], int | None],
     stop: StopSwitch | None = None,
     ahead: Sequence[str] = (),
+    *,
+    resumes: bool = True,
 ) -> int:
     """Run `program` on root while the other ranks work for it: the boundary no error crosses.
 
@@ -56,6 +66,8 @@ def run_on_ranks(
         Entered already, to hear signals from early on; by default one without a time limit.
     ahead : sequence of str
         Modules that the other ranks load while root reads what is to be done.
+    resumes : bool
+        The same program goes on from what this one saved when it was stopped early.
 
     Returns
     -------
@@ -66,6 +78,7 @@ def run_on_ranks(
     launcher.pin_threads()
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopSwitch()) if stop is None else stop
+        stop.outlook = RESUMES if resumes else ANEW
         try:
             mail = _open_mail()
         except InputError as error:
@@ -228,7 +241,7 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     try:
         code = program(ranks) or Exit.DONE
     except Stopped as error:
-        code, text = Exit.STOPPED, f"Stopped early: {error}. The same command goes on from here."
+        code, text = Exit.STOPPED, f"Stopped early: {error}. {ranks.stop_switch.outlook}."
     except InputError as error:
         code, text = Exit.BAD_INPUT, f"Error: {error}"
     except StorageError as error:

@@ -52,6 +52,11 @@ class RankFailed(Exception):
         self.code = code
 
 
+RESUMES = "The same command goes on from here"
+ANEW = "Nothing is kept: the same command starts anew"
+"""RESUMES and ANEW: what the same command does after an early stop, by whether the stopped one saves what it finishes."""
+
+
 class StopSwitch:
     """Collects the signals and the time limit of one process; loops poll `is_set`.
 
@@ -67,6 +72,11 @@ class StopSwitch:
     ends_process : bool, optional
         Nothing but the end of the process follows: signals are ignored afterwards, since all is
         said and done, rather than left to kill it. By default, the old handlers come back.
+
+    Attributes
+    ----------
+    outlook : str
+        What the same command does after an early stop: `RESUMES`, or `ANEW` where nothing is saved.
     """
 
     def __init__(self, ends_process: bool = False) -> None:
@@ -81,6 +91,7 @@ class StopSwitch:
         self._previous: dict[int, object] = {}
         self._mouth: socket.socket | None = None
         self.last_resort: Callable[[int], object] = os._exit
+        self.outlook = ANEW
         self._is_first = launched_rank() in (0, None)  # one of all copies tells how it ended
         self.told = not self._is_first
 
@@ -180,7 +191,7 @@ class StopSwitch:
     def _end(self, code: int) -> None:
         if code == Exit.STOPPED and not self.told:
             self.told = True
-            text = f"Stopped early: {self.reason}, in the midst of something. The same command goes on from what is saved.\n"
+            text = f"Stopped early: {self.reason}, in the midst of something. {self.outlook}.\n"
             os.write(2, text.encode())  # the main thread may hold what sys.stderr needs
             time.sleep(0.2)  # the launcher passes it on
         threading.Thread(target=self.last_resort, args=(code,), daemon=True).start()

@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
-from hpcclear.base.outcome import Flag, Status
-from hpcclear.report import alike
-from hpcclear.report.figures import labels
+from hpcclear.base.outcome import Flag
+from hpcclear.report import alike, failures
+from hpcclear.report.figures import fits, labels
 
 SPAN = 2.0
 """Deviations above the mean that a design is judged by: some 98 of 100 machines that are made stay below."""
@@ -30,7 +30,13 @@ LARGE = 0.1
 """Share of the variance from which chaos is worth more revolutions."""
 
 LITTLE = 0.01
-"""Share of the variance of f, with two standard errors, below which a variable is said to matter hardly."""
+"""Share of the variance of f, with its half-width, below which a variable is called negligible."""
+
+HALF_WIDTH = 1.96
+"""Half-width of a 95 % confidence interval, standard errors."""
+
+COARSE = 0.1
+"""Half-width of a Sobol index above which more samples are advised."""
 
 
 class Line(NamedTuple):
@@ -67,8 +73,10 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *(Line("asked for", text) for text in _goals(best)),
         Line("as good as it", alike.words(ours, best)),
         Line("on a bound", _bounds(best)),
-        *(Line("what matters", text) for text in _shares(files)),
+        *_shares(files),
+        *(Line("warning", text) for text in _poor_fits(files)),
         Line("theory", _left(files, best)),
+        *(Line("failed", text) for text in _failed(files)),
         *([Line("chaos", scatter)] if scatter else []),
         Line("how sure", _sure(best, verified)),
         Line("next", "; ".join(_next(files, ours, best, place))),
@@ -154,6 +162,14 @@ def _asked(one: xr.Dataset) -> list[str]:
 def goals_of(one: xr.Dataset) -> list[str]:
     """What the case of a design makes small, where that is told: "first", "second", and further ones."""
     return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
+
+
+def leading_goals(verified: xr.Dataset) -> list[str]:
+    """What the case that the answer is about makes small, in words; none where no design was verified or files do not say."""
+    if not any(_counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
+        return []
+    first = _ours(verified).isel(design=0)
+    return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
 
 
 def _goals(best: xr.Dataset) -> Iterator[str]:
@@ -278,7 +294,7 @@ def _bounds(best: xr.Dataset) -> str:
 
 
 def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
-    """Share of simulations that left the range of Hertz's theory, or failed."""
+    """Share of simulations that left the range of Hertz's theory."""
     parts = []
     if "beyond_hertz" in best:
         share = int(best["beyond_hertz"]) / int(best["samples"])
@@ -286,32 +302,65 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     samples = files.get("samples")
     if samples is not None and "flags" in samples:
         beyond = (samples["flags"].to_numpy() & int(Flag.BEYOND_HERTZ)) != 0
-        failed = int((samples["status"].to_numpy() != Status.OK).sum())
-        parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples, {failed} failed")
+        parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples")
     return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
 
 
-def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
-    """Total share of each variable of the variance of f over the ranges of the study, the largest first; none where the study
-    did not look, or did not find out."""
+def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
+    """First-order and total Sobol indices with their errors, the largest total first; none where they are not known."""
     found = files.get("sensitivity")
     if found is None or "sobol_total" not in found:
         return
-    total, error = (found[f"sobol_total{end}"].to_numpy() for end in ("", "_error"))
+    indices = {
+        kind: [found[f"sobol_{kind}{end}"].to_numpy() for end in ("", "_error")]
+        for kind in ("first", "total")
+        if f"sobol_{kind}" in found
+    }
+    total, error = indices["total"]
     if not total.size or not np.isfinite([total, error]).all():
         return
     names = [str(name) for name in found["parameter"].to_numpy()]
     order = np.argsort(-total, kind="stable")
-    little = total + 2.0 * error < LITTLE
-    told = ", ".join(f"{names[k]} {max(total[k], 0.0):.0%}" for k in order if not little[k])
-    hardly = [names[k] for k in order if little[k]]
-    yield "; ".join(
-        [
-            *([f"{told} of the variance of f over the study's ranges"] if told else []),
-            *([f"{' and '.join(hardly)} hardly matters there"] if len(hardly) == 1 else []),
-            *([f"{', '.join(hardly)} hardly matter there"] if len(hardly) > 1 else []),
-        ]
+    little = total + HALF_WIDTH * error < LITTLE
+    texts = {
+        kind: ", ".join(
+            f"{names[k]} {value[k]:.0%} ± {HALF_WIDTH * error[k]:.1%}"
+            for k in order
+            if not little[k]
+        )
+        for kind, (value, error) in indices.items()
+    }
+    own = (
+        "first-order Sobol indices, the share of the variance of f over the study's ranges that a variable makes by itself "
+        "(± 95 % half-width)"
     )
+    if texts["total"] and "first" in texts:
+        yield Line("sensitivity", f"{own}: {texts['first']}")
+    if texts["total"]:
+        words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
+        yield Line("interactions", f"{words}: {texts['total']}")
+    if little.any():
+        hardly = ", ".join(names[k] for k in order if little[k])
+        yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
+    if any(HALF_WIDTH * float(np.nanmax(error)) > COARSE for _, error in indices.values()):
+        text = f"Sobol indices are known to ± {COARSE:.0%} or worse: raise study.sensitivity.sobol_samples"
+        yield Line("warning", text)
+
+
+def _failed(files: Mapping[str, xr.Dataset]) -> list[str]:
+    """Why samples failed, where, and what to do; none where all succeeded."""
+    samples = files.get("samples")
+    return failures.explained(samples) if samples is not None and "status" in samples else []
+
+
+def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
+    """Surrogates that do not fit, a sentence for each kind of them."""
+    for kind, what in (
+        ("sensitivity", "sensitivities by slopes"),
+        ("kriging", "the search began there"),
+    ):
+        if found := fits.warnings(kind, files.get(kind)):
+            yield f"{'; '.join(found)} ({what}); the simulated values do not depend on it"
 
 
 def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:

@@ -1,5 +1,6 @@
 """From a TOML file, or a mapping, to a `Scene`: reading and overrides."""
 
+import ast
 import itertools
 import re
 import tomllib
@@ -22,6 +23,7 @@ _DOTTED = re.compile(
 
 
 _NOTE = "# set: "  # before each override, at the head of a scene's text
+_CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
 def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Scene:
@@ -61,7 +63,7 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
 
 
 def scene_of_text(text: str, name: str) -> Scene:
-    """Return the scene of a text that a result file carries, with the overrides noted at its head.
+    """Return the scene of a text that a result file carries, with what was set or changed noted at its head.
 
     No file is opened, whatever the text names: it may be somebody else's.
 
@@ -71,12 +73,29 @@ def scene_of_text(text: str, name: str) -> Scene:
         As `load_scene`, or if values are in a file.
     """
     content = parse(text, name)
-    for line in itertools.takewhile(lambda line: line.startswith(_NOTE), text.splitlines()):
-        content = replace(content, *_override(line.removeprefix(_NOTE)))
-    for key in files_named(content):
+    notes = list(
+        itertools.takewhile(lambda line: line.startswith((_NOTE, _CHANGE)), text.splitlines())
+    )
+    for line in notes:
+        if line.startswith(_NOTE):
+            content = replace(content, *_override(line.removeprefix(_NOTE)))
+    changes = dict(_change(line) for line in reversed(notes) if line.startswith(_CHANGE))
+    files = [path for path in changes if path.rpartition(".")[2] == "file"]
+    for key in (*files_named(content), *files):
         reason = "its scene names a file of values, which the result does not carry"
         raise InputError(key, name, reason, "Make the result again with this version")
-    return load_scene(content)
+    scene = load_scene(content)
+    return scene.with_(changes) if changes else scene
+
+
+def _change(line: str) -> tuple[str, Any]:
+    """Path and value of a note that `Scene.with_` left."""
+    path, _, value = line.removeprefix(_CHANGE).partition(" = ")
+    try:
+        return path, ast.literal_eval(value)
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
+        reason = "the note of a change cannot be read"
+        raise InputError("scene", line, reason, "Mend the line, or remove it") from None
 
 
 def _read(path: Path) -> str:

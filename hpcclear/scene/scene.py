@@ -6,7 +6,7 @@ from typing import Any, Self
 import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, unboxed
 from hpcclear.scene import budget, citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
@@ -152,7 +152,7 @@ class Scene(SceneTables):
             As `load_scene`.
         """
         content = self.resolved()
-        altered = {**(changes or {}), **more}
+        altered = unboxed({**(changes or {}), **more})
         for path, value in altered.items():
             check_path(path)
             content = replace(content, path, value)

@@ -16,6 +16,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -225,9 +226,12 @@ def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:
     return {"objective": values, "evaluations": np.asarray(evaluations)}
 
 
-def simulated(ranks: Ranks, scene: Scene, points: Points) -> tuple[Array, float]:
+def simulated(
+    ranks: Ranks, scene: Scene, points: Points, progress: Progress | None = None
+) -> tuple[Array, float]:
     """Objectives of points on all ranks, (n,), NaN where failed, and evaluations of the equations of motion a simulation."""
-    records = sample_points(scene, points, ranks, stage="budget: simulations")
+    stage = "budget: simulations"
+    records = sample_points(scene, points, ranks, progress=progress, stage=stage)
     values = np.where(records["status"] == Status.OK, records["objective"], np.nan)
     return values, float(records["rhs_evaluations"].mean())
 

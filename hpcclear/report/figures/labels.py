@@ -8,9 +8,19 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.base.outcome import Flag
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+FLAGS = {
+    Flag.LATCHED: "a joint did not lift off for at least one averaged revolution: its damping still uses the velocity "
+    "of the last impact, so f may depend on the tolerance",
+    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
+    Flag.STIFF: "the implicit method was used for part of the run",
+}
+"""What flags of a sample say."""
 
 
 class Scale(NamedTuple):

@@ -141,6 +141,18 @@ def clearances(response: xr.Dataset) -> Array:
     return found
 
 
+def contact(response: xr.Dataset, joint: str) -> str:
+    """Return how long a joint is in contact, in words: a share of the time, never rounded to all or none of it."""
+    touching = response["penetration"].sel(joint=joint).to_numpy() > 0.0
+    if touching.all() or not touching.any():
+        return f"in {'contact' if touching.all() else 'flight'} at all instants stored"
+    time = response["time"].to_numpy()
+    weight = np.gradient(time) if len(time) > 1 else np.ones(1)
+    share = float(weight @ touching / weight.sum())
+    shown = "> 99.9" if share > 0.999 else "< 0.1" if share < 0.001 else f"{100.0 * share:.1f}"
+    return f"in contact {shown} % of the time"
+
+
 def eccentricity(response: xr.Dataset) -> Array:
     """Distance of journal centre and bearing centre, m, shape (time, 2)."""
     return np.hypot(response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy())

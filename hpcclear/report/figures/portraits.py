@@ -35,11 +35,15 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
     for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() * unit.factor for c in "xy")
         contact = shown["penetration"].sel(joint=joint).to_numpy() > 0.0
-        panel.plot(x, y, color=_FLIGHT, lw=0.7, label="free flight")
-        panel.plot(*_only(x, y, contact), color=_CONTACT, lw=0.7, label="contact")
+        radius, angle = np.hypot(x, y), np.arctan2(y, x)
+        panel.plot(
+            *_flight(x, y, _rolls(angle, contact)), color=_FLIGHT, lw=0.7, label="free flight"
+        )
+        panel.plot(*_along(radius, angle, contact), color=_CONTACT, lw=0.7, label="contact")
         _circle(panel, clearances[row])
-        _arcs(panel, clearances[row], x, y, contact)
-        panel.set_title(f"{joints[joint]}: in contact {contact.mean():.0%} of the time")
+        arc = _along(np.full_like(angle, clearances[row]), angle, contact)
+        panel.plot(*arc, color=style.PALETTE["black"], lw=2.4, label="contact arc")
+        panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
         _equal(panel, unit)
     handles, words = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, words, loc="outside lower center", ncols=2)
@@ -173,9 +177,43 @@ def poincare_figure(
     return figure
 
 
-def _only(x: Array, y: Array, shown: Booleans) -> tuple[Array, Array]:
-    """A line with gaps where it is not shown."""
-    return np.where(shown, x, np.nan), np.where(shown, y, np.nan)
+WIDEST = np.pi / 2.0
+"""Angle between two instants in contact beyond which the journal is taken to have flown between them, rad."""
+
+_STEP = np.radians(2.0)
+
+
+def _turned(angle: Array) -> Array:
+    """By how much an angle changes from instant to instant, the shorter way round, rad, shape (n - 1,)."""
+    return np.mod(np.diff(angle) + np.pi, 2.0 * np.pi) - np.pi
+
+
+def _rolls(angle: Array, contact: Booleans) -> Booleans:
+    """Whether the journal stays on the bearing from each instant to the next, shape (n - 1,)."""
+    found: Booleans = contact[:-1] & contact[1:] & (np.abs(_turned(angle)) <= WIDEST)
+    return found
+
+
+def _flight(x: Array, y: Array, rolls: Booleans) -> tuple[Array, Array]:
+    """The path between instants where the journal does not roll, in pieces."""
+    pieces = [np.column_stack([c[:-1], c[1:], np.full(len(c) - 1, np.nan)])[~rolls] for c in (x, y)]
+    return pieces[0].ravel(), pieces[1].ravel()
+
+
+def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array]:
+    """The path in contact, along the bore from instant to instant and never across it; single instants are dots."""
+    rolls, turned = _rolls(angle, contact), _turned(angle)
+    alone = contact & ~np.append(rolls, False) & ~np.insert(rolls, 0, False)
+    pieces = [np.full((1, 2), np.nan)]
+    for k in np.flatnonzero(np.append(rolls, False) | alone):
+        ahead = int(not alone[k])
+        part = np.linspace(0.0, ahead, 2 + int(abs(turned[k] if ahead else 0.0) / _STEP))
+        r = radius[k] + part * (radius[k + ahead] - radius[k])
+        phi = angle[k] + part * (turned[k] if ahead else 0.0)
+        gap = [] if ahead and rolls[k + 1 : k + 2].any() else [[np.nan, np.nan]]
+        pieces += [np.column_stack([r * np.cos(phi), r * np.sin(phi)]), *map(np.atleast_2d, gap)]
+    path = np.concatenate(pieces)
+    return path[:, 0], path[:, 1]
 
 
 def _circle(axes: "Axes", radius: float) -> None:
@@ -185,13 +223,6 @@ def _circle(axes: "Axes", radius: float) -> None:
         axes.plot(
             radius * np.cos(angle), radius * np.sin(angle), "k--", lw=0.7, label="clearance circle"
         )
-
-
-def _arcs(axes: "Axes", radius: float, x: Array, y: Array, contact: Booleans) -> None:
-    """Where on the circle there was contact."""
-    angle = np.arctan2(y, x)
-    shown = _only(radius * np.cos(angle), radius * np.sin(angle), contact)
-    axes.plot(*shown, color=style.PALETTE["black"], lw=2.4, label="contact arc")
 
 
 def _cyclic() -> Any:

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.figures.varied import varied
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,8 +79,7 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
         depth = shown["penetration"].sel(joint=joint).to_numpy() * unit.factor
         panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
-        share = float((depth > 0.0).mean())
-        panel.set_title(f"{joints[joint]}: in contact {share:.0%} of the time")
+        panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
         panel.set_ylabel(unit.label("penetration"))
     axes[0, 0].set_ylim(
         bottom=0.0
@@ -159,26 +159,27 @@ def energy_figure(response: xr.Dataset) -> "Figure":
 
 @style.drawn
 def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None = None) -> "Figure":
-    """Objective of every revolution, and slider velocity once a revolution, against clearance.
+    """Objective of every revolution, and slider velocity once a revolution, against the entry in which the scenes differ.
 
-    A motion that repeats every revolution is one dot over its clearance, one that repeats every n is n dots.
+    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
 
     Parameters
     ----------
     responses : sequence of xarray.Dataset
-        Kind ``response``, each of another clearance and with many revolutions.
+        Kind ``response``, of scenes that differ in one physical entry (or in several that have the same value), and with many
+        revolutions. Of files that do not say so, the clearance is found from the motion.
     revolutions : int, optional
         The last ones of each are drawn; half of all by default.
 
     Raises
     ------
     InputError
-        No response at all, or one with fewer revolutions.
+        No response at all, one with fewer revolutions, or scenes that differ in several entries.
     """
-    motion.check_some(responses, "Give one response for each clearance")
+    motion.check_some(responses, "Give one response for each value")
     figure, axes = style.grid(2, 1, 110.0, sharex=True)
     steady = [motion.steady(response, revolutions) for response in responses]
-    clearances = np.array([np.nanmax(motion.clearances(response)) for response in steady])
+    entry = varied(responses)
     rows = (
         ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
         (
@@ -187,14 +188,13 @@ def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None 
             [motion.section(r, motion.followed(r)[1]) for r in steady],
         ),
     )
-    across = labels.scale("m", clearances)
     for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
         unit = labels.scale(units, np.concatenate(values))
-        x = np.repeat(clearances, [len(v) for v in values]) * across.factor
+        x = np.repeat(entry.values, [len(v) for v in values]) * entry.scale.factor
         size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
         y = np.concatenate(values) * unit.factor
         panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"])
         panel.set_ylabel(unit.label(words))
-    axes[1, 0].set_xlabel(across.label("clearance $C$"))
+    axes[1, 0].set_xlabel(entry.scale.label(entry.words))
     style.settle(axes)
     return figure

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.report.figures import labels, style
+from hpcclear.report.figures import fits, labels, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,9 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
     figure, axes = style.grid(rows, 2, 14.0 + 48.0 * rows, sharex=True, sharey=True)
     unit = labels.of(sensitivity["sensitivity"])
     across = labels.of(sensitivity["clearance"])
+    known = fits.of_surfaces(sensitivity)
     for panel, surface in zip(axes.flat, surfaces, strict=False):
+        fits.mark(panel, known[surface], 0.12)
         _sensitivity_panel(panel, sensitivity.sel(surface=surface), across, unit)
         panel.set_title(f"surface in {_surface(surface)}")
     for panel in axes[:, 0]:
@@ -92,9 +94,11 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
         lowest = float(sensitivity["r2"].sel(surface=surface).min())
-        line[0].set_ylim(
-            max(-0.25, min(lowest, 0.75)) - 0.02, 1.03
-        )  # below 0 a mean is the better fit
+        bottom = max(-0.25, min(lowest, 0.75)) - 0.02
+        line[0].set_ylim(bottom, 1.03)
+        if lowest < 0.0:
+            line[0].axhspan(bottom, 0.0, color=style.PALETTE["vermilion"], alpha=0.15, lw=0.0)
+            fits.mark(line[0], lowest, 0.3)
         line[1].set_ylim(0.0, min(2.0, line[1].get_ylim()[1]))
     for panel in axes[-1]:
         panel.set_xlabel(across.label(_held(sensitivity)))
@@ -183,7 +187,10 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     limits = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
     across = labels.of(by_path[name])
-    for line, model, (x, y, z, clearances) in zip(axes, shown.values(), fields, strict=True):
+    known = fits.of_models(kriging)
+    for line, (family, model), (x, y, z, clearances) in zip(
+        axes, shown.items(), fields, strict=True
+    ):
         first, second = (by_path[i] for i in model.names if i != name)
         scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
         for k, panel in enumerate(line):
@@ -194,7 +201,9 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
             panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
             panel.tick_params(labelleft=k == 0)
             panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
+            fits.mark(panel, known[family])
         line[0].set_ylabel(scales[1].label(symbol(str(second.attrs["scene_path"]))))
+        line[0].set_title(f"{line[0].get_title(loc='left')}, $R^2$ = {known[family]:.2g}")
     bar = figure.colorbar(drawn, ax=axes.ravel().tolist(), location="bottom", aspect=45, pad=0.01)
     bar.set_label(unit.label("objective $f$"))
     style.settle([*axes.flat, bar.ax], 4)
@@ -234,16 +243,16 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     rows = (len(found) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
     unit = labels.of(kriging["training_output"])
-    family = kriging["family"].to_numpy()
+    known = fits.of_models(kriging)
     for panel, (name, model) in zip(axes.flat, found.items(), strict=False):
         for k, leaf in enumerate(model.leaves):
             true, guess = leaf.values * unit.factor, leaf.leave_one_out() * unit.factor
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
-        worst = float(kriging["r2"].to_numpy()[family == name].min())
+        fits.mark(panel, known[name], 0.12)
         kernels = {leaf.kernel for leaf in model.leaves} - {SQUARED_EXPONENTIAL}
         told = "".join(f", {kernel}" for kernel in sorted(kernels))
-        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {worst:.3f}{told}")
+        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{told}")
     limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(limits)[0], max(high for _, high in limits))
     for panel in axes.flat:

@@ -14,6 +14,7 @@ from hpcclear.report.figures import (
     accuracy,
     designs,
     effects,
+    fits,
     labels,
     motion,
     portraits,
@@ -47,7 +48,8 @@ _RESULTS: tuple[Drawing, ...] = (
     (
         "sensitivity",
         surrogates.sobol_figure,
-        "Global sensitivities: Sobol indices with two standard errors.",
+        "Global sensitivities: first-order Sobol indices (a variable by itself) and total ones (with interactions, "
+        "so that their sum may exceed 1), with two standard errors.",
     ),
     (
         "sensitivity",
@@ -83,6 +85,14 @@ _RESULTS: tuple[Drawing, ...] = (
 )
 """Kind of file, figure, caption."""
 
+_FITS = (
+    surrogates.sensitivity_figure,
+    surrogates.fit_figure,
+    surrogates.surfaces_figure,
+    surrogates.parity_figure,
+)
+"""Figures of surrogates: the captions name those that do not fit."""
+
 _RESPONSE = (
     (portraits.orbit_figure, "journal-centre orbits in the clearance circle"),
     (portraits.force_polar_figure, "contact force by its direction"),
@@ -106,6 +116,7 @@ Maker = Callable[[], dict[str, str] | None]
 def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     """Every figure that there may be: what it shows, and what makes its picture and caption."""
     for kind, draw, caption in _RESULTS:
+        caption += _warnings(kind, content.get(kind)) if draw in _FITS else ""
         yield from _of_file(draw, content.get(kind), caption)
     certificate, times = content.get("effects"), content.get("timing")
     if certificate is not None:
@@ -156,6 +167,12 @@ def _of_file(
     """A figure of one file, unless that is missing."""
     if found is not None:
         yield caption, functools.partial(_tried, draw, found, caption)
+
+
+def _warnings(kind: str, content: xr.Dataset | None) -> str:
+    """Which surrogates do not fit, behind a caption."""
+    found = fits.warnings(kind, content)
+    return f" Warning: {'; '.join(found)}." if found else ""
 
 
 def _plays(*responses: xr.Dataset) -> str:

@@ -1,12 +1,13 @@
 """What the page's script draws: the front with its designs, responses, and the moving mechanism, as plain content."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
-from hpcclear.report.answer import goals_of
+from hpcclear.report.answer import goals_of, leading_goals
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
@@ -30,32 +31,26 @@ def picture(content: Content) -> dict[str, Any]:
 
 
 def front(content: Content) -> dict[str, Any]:
-    """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them."""
+    """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them.
+
+    At first the axes are the two objectives of the case that the answer is about; where any case has others than mean and
+    deviation of f, the reader may choose, and points stand nowhere along what their case does not ask for.
+    """
     fronts, verified = content.get("front"), content.get("verification")
     points: list[dict[str, Any]] = []
     if fronts is not None:
         points += _solutions(fronts, verified)
     if verified is not None:
         points += [_design(verified.isel(design=k)) for k in range(verified.sizes["design"])]
-    points = [p for p in points if np.isfinite(p["x"]) and np.isfinite(p["y"])]
+    points = [p for p in points if all(np.isfinite(p["goals"][word][1]) for word in _USUAL)]
     if not points:
         return {"points": []}
-    source = fronts if fronts is not None else verified
-    assert source is not None
-    ending = "" if fronts is not None else "_true"
-    units = [str(source[word + ending].attrs["units"]) for word in ("mean", "deviation")]
-    axes = [labels.scale(u, [p[k] for p in points]) for u, k in zip(units, "xy", strict=True)]
-    for point in points:
-        point["x"], point["y"] = (
-            float(f"{point[k] * a.factor:.6g}") for k, a in zip("xy", axes, strict=True)
-        )
-    points.sort(key=lambda point: (point["x"], point["y"]))
-    further = _further(points)
-    x, y = axes[0].label("mean of f"), axes[1].label("deviation of f")
+    axes = _placed(points, _leading(fronts, verified))
+    points.sort(key=lambda point: [np.inf if point[k] is None else point[k] for k in "xy"])
     return {
-        "x": x,
-        "y": y,
-        **({"axes": [x, y, *further]} if further else {}),
+        "x": axes[0],
+        "y": axes[1],
+        **({"axes": axes} if len(axes) > 2 else {}),
         "cases": sorted({point["case"] for point in points}),
         "points": points,
         "legend": {
@@ -64,23 +59,39 @@ def front(content: Content) -> dict[str, Any]:
     }
 
 
-def _further(points: list[dict[str, Any]]) -> list[str]:
-    """Labels of what cases make small besides, where one makes more than two things small; then points know where they are
-    along each as ``at``, None where their case does not ask for it."""
-    asked = [point.pop("goals") for point in points]
-    if max(map(len, asked)) < 3:
-        return []
-    units = {words: unit for own in asked for words, (unit, _) in own.items()}
-    names = [words for words in units if words not in _USUAL]
-    scales = {
-        words: labels.scale(units[words], [own[words][1] for own in asked if words in own])
+def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence[str]:
+    """The first two objectives of the case that the answer is about, else of the first case; mean and deviation by default."""
+    asked = leading_goals(verified) if verified is not None else []
+    if not asked and fronts is not None and "searched" in fronts:
+        asked = str(fronts["searched"][0].item()).split(", ")
+    return asked[:2] if len(asked) > 1 else _USUAL
+
+
+def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
+    """Labels of all axes, the leading two first; then points know where they are along each as ``at``, along the first two as
+    ``x`` and ``y``, None where their case does not ask for it."""
+    goals = [point.pop("goals") for point in points]
+    units = {words: unit for own in goals for words, (unit, _) in own.items()}
+    names = list(dict.fromkeys([*(words for words in leading if words in units), *units]))
+    scales = [
+        labels.scale(units[words], [own[words][1] for own in goals if words in own])
         for words in names
-    }
-    for point, own in zip(points, asked, strict=True):
-        found = [own[w][1] * scales[w].factor if w in own else np.nan for w in names]
-        known = [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
-        point["at"] = [point["x"], point["y"], *known]
-    return [scales[w].label(w) if scales[w].unit != "–" else w for w in names]
+    ]
+    for point, own in zip(points, goals, strict=True):
+        found = [
+            own[w][1] * s.factor if w in own else np.nan for w, s in zip(names, scales, strict=True)
+        ]
+        at = [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
+        point["x"], point["y"] = at[:2]
+        if len(names) > 2:
+            point["at"] = at
+    return [s.label(w) if s.unit != "–" else w for w, s in zip(names, scales, strict=True)]
+
+
+def _usual(one: xr.Dataset, ending: str) -> dict[str, tuple[str, float]]:
+    """Mean and deviation of f, which every design has, likewise by words."""
+    moments = [one[f"{word}{ending}"] for word in ("mean", "deviation")]
+    return {w: (str(m.attrs["units"]), float(m)) for w, m in zip(_USUAL, moments, strict=True)}
 
 
 def _searched(one: xr.Dataset) -> dict[str, tuple[str, float]]:
@@ -118,13 +129,11 @@ def _solutions(fronts: xr.Dataset, verified: xr.Dataset | None) -> list[dict[str
                 "kind": "solution",
                 "name": f"run {int(one['run'])}, solution {int(one['solution'])}",
                 "case": case,
-                "x": float(one["mean"]),
-                "y": float(one["deviation"]),
                 "design": _values(one),
                 "surrogate": _moments(one, "mean", "deviation"),
                 "direct": [] if direct is None else _direct(direct),
                 "response": "",
-                "goals": _searched(one),
+                "goals": _usual(one, "") | _searched(one),
             }
         )
     return found
@@ -156,13 +165,11 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
         "kind": "printed" if labels.is_printed(one) else "original" if is_original else "design",
         "name": name,
         "case": str(one["case"].item()) if "case" in one else "",
-        "x": float(one["mean_true"]),
-        "y": float(one["deviation_true"]),
         "design": _values(one),
         "surrogate": surrogate,
         "direct": _direct(one),
         "response": "original" if is_original else name,
-        "goals": _verified(one),
+        "goals": _usual(one, "_true") | _verified(one),
     }
 
 
@@ -192,8 +199,7 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
             low, high = (float(one[f"{word}_{end}"]) for end in ("lower", "upper"))
             shown += f" ({labels.between(low, high, units)})"
         rows.append([word, shown])
-    asked = goals_of(one)
-    for name in asked if len(asked) > 2 else ():
+    for name in goals_of(one):
         words, unit = (str(one[f"{name}_{what}"].item()) for what in ("goal", "unit"))
         low, high = (float(one[f"{name}_{end}"]) for end in ("lower", "upper"))
         if words not in _USUAL:

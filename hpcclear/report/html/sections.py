@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
-from hpcclear.base.outcome import Flag, Status
+from hpcclear.base.outcome import Status
+from hpcclear.report import failures
 from hpcclear.report.answer import is_plain
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
@@ -14,11 +15,6 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 from hpcclear.statistics.random.survival import quantiles
 
-_FLAGS = {
-    Flag.LATCHED: "a joint stayed in contact with the impact speed frozen: f may depend on the tolerance",
-    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
-    Flag.STIFF: "the implicit method was used for part of the run",
-}
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
 LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
 """Endings of lives that count."""
@@ -379,16 +375,23 @@ def trust(content: Content) -> list[object] | None:
         hit = numbers[status == code]
         if code is not Status.OK and hit.size:
             rows.append(
-                [code.name.lower(), Number(len(hit)), code.message, code.remedy, _listed(hit)]
+                [
+                    code.name.lower(),
+                    Number(len(hit)),
+                    code.message,
+                    failures.where(status == code, failures.variables(samples)),
+                    code.remedy,
+                    _listed(hit),
+                ]
             )
     if rows:
-        header = ["outcome", "samples", "what happened", "what to change", "which"]
+        header = ["outcome", "samples", "what happened", "where", "what to change", "which"]
         parts.append(Table(header, rows, "Samples that failed; their numbers are missing, never 0"))
     else:
         parts.append("No sample failed.")
     rows = []
     flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(numbers), int)
-    for flag, words in _FLAGS.items():
+    for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]
         if hit.size:
             rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit)])

@@ -1,0 +1,36 @@
+"""What `check` prints of the corners of a study's ranges."""
+
+import numpy as np
+
+from hpcclear.cli.printing import console, fitting, table
+from hpcclear.ensemble.corners import MOST, Tried, tried
+from hpcclear.report.failures import Column, sentences, where
+from hpcclear.scene import Scene
+
+
+def describe(scene: Scene, simulate: bool) -> None:
+    """Print which corners of the ranges make no mechanism, and which fail in two revolutions, where, and what to do."""
+    found = tried(scene, simulate)
+    rows = [(label, fitting(text)) for label, text in lines(found, simulate)]
+    console().print(table("Corners of the study's ranges", rows))
+
+
+def lines(found: Tried, simulate: bool) -> list[tuple[str, str]]:
+    """Return label and text of each line."""
+    points, total = found.points, len(found.points)
+    columns = [
+        Column(name, unit or "1", values)
+        for name, unit, values in zip(points.names, points.units, points.values.T, strict=True)
+    ]
+    failed = list(sentences(found.status, columns, "corners")) if simulate else []
+    bad = len(found.refused) + int((found.status > 0).sum())
+    does = "make a mechanism and run two revolutions" if simulate else "make a mechanism"
+    which = "all corners" if total < MOST or total == 2 ** len(columns) else "a balanced selection"
+    rows = [("tried", f"{total} ({which}): {total - bad} {does}")]
+    for reason in dict.fromkeys(found.refused.values()):
+        hit = np.array([found.refused.get(row) == reason for row in range(total)])
+        place = where(hit, columns)
+        rows.append(
+            ("refused", f"{int(hit.sum())} of {total} corners: {place and f'{place}: '}{reason}")
+        )
+    return rows + [("failed", text) for text in failed]

@@ -1,0 +1,97 @@
+"""The corners of a study's ranges: which make no mechanism, and which fail in a few revolutions."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.scene import Scene
+from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.sampling import generator
+
+MOST = 64
+"""Corners that are tried; of studies with more variables a selection in which each bound comes as often as the other."""
+
+_BITS = 62
+
+STEPS = 20_000
+"""Steps of a corner at most: some hundred times what two revolutions take."""
+
+
+class Tried(NamedTuple):
+    """What came of the corners."""
+
+    points: Points
+    refused: dict[int, str]
+    """Why a corner makes no mechanism, by its row."""
+    status: Array
+    """Outcome of each corner (n,); -1 where it was not simulated."""
+
+
+def corners(scene: Scene) -> Points:
+    """Return the corners of the ranges of a study, all of them or `MOST`, SI."""
+    region = box(scene)
+    count = len(region.names)
+    others = 2 ** min(count - 1, _BITS)  # corners at the lower bound of the last variable
+    codes = np.arange(min(others, MOST // 2))
+    if others > MOST // 2:  # all lower bounds, and some others
+        rng = generator(scene.required_study.seed, "corners")
+        codes[1:] = 1 + rng.choice(others - 1, len(codes) - 1, replace=False)
+    half: Booleans = (codes[:, None] >> (np.arange(count) % _BITS)) & 1 == 1
+    half[:, -1] = False
+    upper = np.concatenate([half, ~half])
+    coordinates = np.where(upper, region.upper, region.lower)
+    paths = tuple(scene.required_study.variable(name).paths for name in region.names)
+    return Points(region.names, to_physical(scene, region.names, coordinates), paths)
+
+
+def tried(scene: Scene, simulate: bool) -> Tried:
+    """Return what the corners of a study's ranges come to.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    simulate : bool
+        Simulate those that make a mechanism, over two revolutions.
+    """
+    points = corners(scene)
+    plain = scene.with_({"study": None})
+    refused = {
+        row: why
+        for row in range(len(points))
+        if (why := _refusal(plain, points.take(slice(row, row + 1))))
+    }
+    status = np.full(len(points), -1)
+    good = np.array([row for row in range(len(points)) if row not in refused], int)
+    if simulate and good.size:
+        brief = {
+            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None, "uncertainty": False,
+            "max_steps": min(STEPS, scene.numerics.max_steps),
+        }  # fmt: skip
+        short = scene.with_({f"numerics.{name}": value for name, value in brief.items()})
+        status[good] = evaluate_records(short, points.take(good))["status"]
+    return Tried(points, refused, status)
+
+
+def _refusal(scene: Scene, corner: Points) -> str:
+    """Why one corner (1 row) makes no mechanism; "" if it does."""
+    changes = {
+        path: float(value)
+        for value, paths in zip(corner.values[0], corner.paths, strict=True)
+        for path in paths
+    }
+    try:
+        check_points(scene, corner)
+        one = scene.with_(changes)
+        if one.is_planar:
+            from hpcclear.dynamics.planar.problem import put_together, tables_of
+            from hpcclear.dynamics.planar.tables import mechanism_of
+
+            put_together(mechanism_of(tables_of(one)))
+    except InputError as error:
+        return f"{error.reason}. {error.remedy}"
+    return ""

@@ -1,0 +1,94 @@
+"""Why simulations failed, and where in the ranges of the study variables: words from numbers alone."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.outcome import Status
+from hpcclear.report.figures import labels
+
+CLEAR = 0.3
+"""Largest distance of two distributions (Kolmogorov's) below which a variable is not named at all."""
+
+SURE = 1.63
+"""The same of two samples by chance, times sqrt(1/n + 1/m), in 1 of 100 cases (Smirnov 1948, doi:10.1214/aoms/1177730256)."""
+
+NAMED = 2
+"""Variables that are named for each status."""
+
+
+class Column(NamedTuple):
+    """A variable: its name, SI unit, and value in each sample, shape (n,)."""
+
+    name: str
+    unit: str
+    values: Array
+
+
+def explained(samples: xr.Dataset) -> list[str]:
+    """Return a sentence for each status of failed samples: how many, why, in which ranges of which variables, what to do.
+
+    Parameters
+    ----------
+    samples : xarray.Dataset
+        Kind ``samples``.
+    """
+    return list(sentences(samples["status"].to_numpy(), variables(samples)))
+
+
+def variables(samples: xr.Dataset) -> list[Column]:
+    """Return the design variables of samples (kind ``samples``)."""
+    return [
+        Column(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
+        for one in labels.design_variables(samples)
+    ]
+
+
+def sentences(status: Array, columns: Sequence[Column], what: str = "samples") -> Iterator[str]:
+    """Return the same of outcomes (n,) and the variables of what was simulated."""
+    for code in Status:
+        failed = status == code
+        if code is Status.OK or not failed.any():
+            continue
+        place = where(failed, columns)
+        count = f"{int(failed.sum())} of {failed.size} {what}"
+        yield f"{count} {code.name.lower()}: {code.message}{place and f'; {place}'}. Remedy: {code.remedy}"
+
+
+def where(failed: Booleans, columns: Sequence[Column]) -> str:
+    """Return in which ranges of which variables failures (n,) lie; "" where all failed, as ranges then explain nothing.
+
+    A variable is named if its values in failures are distributed unlike those in the others.
+    """
+    if failed.all():
+        return ""
+    named = sorted(
+        ((_distance(one.values, failed), one) for one in columns), key=lambda row: -row[0]
+    )
+    least = max(CLEAR, SURE * np.sqrt(1.0 / failed.sum() + 1.0 / (~failed).sum()))
+    shown = [one for distance, one in named if distance > min(least, 0.99)][:NAMED]
+    if not shown:
+        return "spread over the ranges of all variables"
+    inside, ranges = np.ones(len(failed), bool), []
+    for one in shown:
+        low, high = (float(end(one.values[failed])) for end in (np.min, np.max))
+        inside &= (one.values >= low) & (one.values <= high)
+        whole = labels.between(float(one.values.min()), float(one.values.max()), one.unit)
+        ends = (
+            labels.quantity(low, one.unit) if low == high else labels.between(low, high, one.unit)
+        )
+        ranges.append(f"{one.name} {ends} (range {whole})")
+    return f"all at {', '.join(ranges)}, where {int(failed.sum())} of {int(inside.sum())} failed"
+
+
+def _distance(values: Array, failed: Booleans) -> float:
+    """Kolmogorov's distance of the distributions of failures and of the others; 0 where a variable does not vary."""
+    at = np.unique(values)
+    shares = [
+        np.searchsorted(np.sort(values[part]), at, "right") / part.sum()
+        for part in (failed, ~failed)
+    ]
+    return float(np.abs(shares[0] - shares[1]).max())

@@ -1,0 +1,61 @@
+"""How well surrogates fit: R2 on test points, and words for those that do not."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LOW = 0.9
+"""R2 on test points below which a surrogate is called indicative, as `study.sensitivity.r2` has it by default."""
+
+
+def of_surfaces(sensitivity: xr.Dataset) -> dict[str, float]:
+    """Return R2 of each response surface over the whole interval, at the clearance where it is least (kind ``sensitivity``)."""
+    widest = sensitivity["r2"].isel(interval=int(np.argmax(sensitivity["interval"].to_numpy())))
+    return {str(one["surface"].item()): float(one.min()) for one in widest}
+
+
+def of_models(kriging: xr.Dataset) -> dict[str, float]:
+    """Return R2 of each Kriging model, of its worst part (kind ``kriging``)."""
+    family = [str(name) for name in kriging["family"].to_numpy()]
+    r2 = kriging["r2"].to_numpy()
+    return {name: float(np.min(r2[np.array(family) == name])) for name in dict.fromkeys(family)}
+
+
+def verdict(r2: float) -> str:
+    """Return what is wrong with a fit; "" where nothing is."""
+    if not np.isfinite(r2):
+        return "R² not known"
+    if r2 < 0.0:
+        return f"R² = {r2:.2g}: worse than a constant"
+    return f"R² = {r2:.2f}: indicative only" if r2 < LOW else ""
+
+
+def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
+    """Return a sentence for each surrogate of a file (kind ``sensitivity`` or ``kriging``) that does not fit."""
+    if content is None or "r2" not in content:
+        return []
+    word, known = (
+        ("response surface", of_surfaces) if kind == "sensitivity" else ("Kriging model", of_models)
+    )
+    return [
+        f"{word} in {', '.join(name.split())}: {text}"
+        for name, r2 in known(content).items()
+        if (text := verdict(r2))
+    ]
+
+
+def mark(axes: "Axes", r2: float, height: float = 0.5) -> None:
+    """Write across a panel what is wrong with the fit that it shows, at this height of it."""
+    if text := verdict(r2):
+        box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5}
+        words = text.replace(": ", ":\n").replace("R²", "$R^2$")
+        axes.text(
+            0.5, height, words, transform=axes.transAxes, ha="center", va="center", zorder=6,
+            color=style.PALETTE["vermilion"], fontsize=style.NORMAL, bbox=box,
+        )  # fmt: skip

@@ -1,0 +1,235 @@
+"""Failures are explained: by which status, in which ranges, what to do; corners are tried; plans answer in stages."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_data as data
+from click.testing import CliRunner
+
+from hpcclear.accuracy import plan as planning
+from hpcclear.accuracy.plan import Plan, Row
+from hpcclear.base.outcome import OUTCOME, Status
+from hpcclear.cli import cli
+from hpcclear.cli.corners import lines
+from hpcclear.cli.plan import preview
+from hpcclear.ensemble import corners as trying
+from hpcclear.ensemble.corners import MOST, corners, tried
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.answer import answer
+from hpcclear.report.failures import Column, explained, where
+from hpcclear.report.html import sections
+from hpcclear.report.html.content import Content
+from hpcclear.scene import load_scene
+
+JOBS = Path(__file__).parent.parent / "jobs"
+
+
+def columns(count: int, variables: int, seed: int) -> list[Column]:
+    rng = np.random.default_rng(seed)
+    return [Column(f"x{k}", "kg", 1.0 + rng.random(count)) for k in range(variables)]
+
+
+# -- samples ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_range_in_which_samples_fail_is_named(seed):
+    """A band of one of five variables, another one each time: it is named, with its ends, and how many fail there."""
+    made, guilty = columns(500, 5, seed), seed % 5
+    low = 1.0 + 0.1 * seed
+    failed = (made[guilty].values > low) & (made[guilty].values < low + 0.2)
+    told = where(failed, made)
+    inside = made[guilty].values[failed]
+    assert told.startswith(
+        f"all at x{guilty} {inside.min():.4g} kg to {inside.max():.4g} kg (range 1"
+    )
+    assert told.endswith(f"where {failed.sum()} of {failed.sum()} failed")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_corner_of_two_variables_is_named_and_no_third(seed):
+    made = columns(800, 5, seed)
+    failed = (made[1].values < 1.3) & (made[3].values > 1.7)
+    told = where(failed, made)
+    assert "x1 " in told
+    assert "x3 " in told
+    assert not any(f"x{k} " in told for k in (0, 2, 4))
+    assert told.endswith(f"where {failed.sum()} of {failed.sum()} failed")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_failures_without_a_place_are_not_given_one(seed):
+    """By chance one case in 100 variables passes the limit; a third of 500 samples is far from the least distance of 0.3."""
+    failed = np.random.default_rng(100 + seed).random(500) < 0.3
+    assert where(failed, columns(500, 5, seed)) == "spread over the ranges of all variables"
+
+
+def test_all_that_failed_and_one_that_failed_are_told_without_a_range():
+    assert where(np.ones(50, bool), columns(50, 2, 0)) == ""
+    assert where(np.arange(50) == 3, columns(50, 2, 0)).startswith("spread")
+
+
+def failing_samples():
+    """60 samples of which those with the lightest rods reached max_steps."""
+    samples = data.samples(60, failed=1)
+    light = samples["m2"] < 0.2
+    samples["status"][:] = np.where(light, int(Status.STEP_CAP), 0)
+    return samples, int(light.sum())
+
+
+def test_samples_say_by_which_status_where_and_what_to_do():
+    samples, count = failing_samples()
+    (text,) = explained(samples)
+    assert text.startswith(f"{count} of 60 samples step_cap: {Status.STEP_CAP.message}; all at m2 ")
+    assert "(range " in text
+    assert text.endswith(f"Remedy: {Status.STEP_CAP.remedy}")
+
+
+def test_the_answer_explains_failures_in_lines_of_their_own():
+    samples, count = failing_samples()
+    told = answer({"verification": data.verification(), "samples": samples}, "")
+    (text,) = [line.text for line in told if line.label == "failed"]
+    assert text.startswith(f"{count} of 60 samples step_cap")
+    assert "failed" not in dict(told)["theory"]
+    plain = answer({"verification": data.verification(), "samples": data.samples(failed=0 + 1)}, "")
+    assert len([line for line in plain if line.label == "failed"]) == 1
+
+
+def test_the_page_says_where_samples_failed():
+    samples, _ = failing_samples()
+    parts = sections.trust(Content(Path("out"), {"samples": samples}, {}))
+    assert parts is not None
+    rows = parts[0].rows
+    assert any("all at m2 " in str(cell) for cell in rows[0])
+
+
+# -- corners ---------------------------------------------------------------------------------------------
+
+
+def crank_and_rod(**study):
+    """Each bound by itself makes a mechanism; the longest crank with the shortest rod does not."""
+    variables = {
+        "r": {"path": "mechanism.crank.length", "range": [0.04, 0.07]},
+        "l": {"path": "mechanism.rod.length", "range": [0.06, 0.12]},
+    }
+    return load_scene(JOBS / "hunt_crossley.toml").with_(
+        {"study": {"samples": 8, "variables": variables, **study}}
+    )
+
+
+def test_all_corners_are_tried_and_those_that_make_no_mechanism_named():
+    found = tried(crank_and_rod(), simulate=False)
+    assert len(found.points) == 4
+    assert list(map(tuple, found.points.values[list(found.refused)])) == [(0.07, 0.06)]
+    told = dict(lines(found, simulate=False))
+    assert told["tried"] == "4 (all corners): 3 make a mechanism"
+    assert told["refused"].startswith("1 of 4 corners: ")
+    assert "rod" in told["refused"]
+
+
+def test_check_prints_the_corners(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(crank_and_rod().to_toml())
+    done = CliRunner().invoke(cli, ["check", str(path), "--no-cost"])
+    shown = " ".join(done.output.split())
+    assert done.exit_code == 0
+    assert "Corners of the study's ranges" in shown
+    assert "3 make a mechanism" in shown
+
+
+def test_a_linkage_that_closes_at_no_corner_of_short_couplers_is_named():
+    scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
+    path = "mechanism.bodies.coupler.length"
+    study = {"samples": 8, "variables": {"L": {"path": path, "range": [0.01, 0.12]}}}
+    found = tried(scene.with_({"study": study}), simulate=False)
+    assert list(found.refused) == [0]
+
+
+@pytest.mark.parametrize("count", [1, 3, 6, 7, 12])
+def test_corners_of_many_variables_are_a_balanced_selection(count):
+    scene = load_scene(JOBS / "hunt_crossley.toml")
+    paths = [path for path in scene.numeric_paths() if path.startswith(("mechanism.", "joints."))][
+        :count
+    ]
+    variables = {
+        f"v{k}": {"path": path, "range": [scene.number(path), 1.001 * scene.number(path) + 1e-9]}
+        for k, path in enumerate(paths)
+    }
+    scene = load_scene(JOBS / "hunt_crossley.toml").with_(
+        {"study": {"samples": 8, "variables": variables}}
+    )
+    found = corners(scene).values
+    assert len(found) == min(2**count, MOST)
+    assert len(np.unique(found, axis=0)) == len(found)
+    upper = found > found.min(axis=0)
+    np.testing.assert_array_equal(upper.sum(axis=0), len(found) // 2)
+    assert upper.all(axis=1).any()
+    assert (~upper).all(axis=1).any()
+
+
+def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
+    """Of what is simulated, over two revolutions, long cranks stall."""
+    seen = []
+
+    def outcomes(scene, points):
+        seen.append(scene.numerics)
+        records = np.zeros(len(points), OUTCOME)
+        records["status"] = np.where(points.values[:, 0] > 0.05, int(Status.STALLED), 0)
+        return records
+
+    monkeypatch.setattr(trying, "evaluate_records", outcomes)
+    found = tried(crank_and_rod(), simulate=True)
+    assert seen[0].transient_revolutions + seen[0].averaged_revolutions == 2
+    told = dict(lines(found, simulate=True))
+    assert told["tried"] == "4 (all corners): 2 make a mechanism and run two revolutions"
+    assert told["failed"].startswith(f"1 of 4 corners stalled: {Status.STALLED.message}")
+    assert told["failed"].endswith(Status.STALLED.remedy)
+
+
+# -- plans in stages -------------------------------------------------------------------------------------
+
+
+def test_a_plan_answers_row_by_row(monkeypatch, capsys):
+    """Each rung as it is measured, and its samples counted meanwhile."""
+    monkeypatch.setattr(planning, "cost", lambda scene, *others: (2e-3, np.zeros(1, OUTCOME)))
+    monkeypatch.setattr(planning.telling, "in_short", lambda *given: "")
+    seen: list[str] = []
+    variables = {"m3": {"range": [0.07, 0.28]}}
+    scene = load_scene(JOBS / "hunt_crossley.toml").with_(
+        {"study": {"samples": 10_000, "variables": variables}}
+    )
+    found = planning.measure(
+        scene, alone(), (1e-2, 1e-3), show=lambda made: seen.append(preview(made, 2))
+    )
+    assert len(found.rows) == 3
+    assert len(seen) == 2
+    assert seen[0].startswith("settings of the file: 2 ms a sample, 10000 simulations take ")
+    assert seen[1].startswith("error 0.01: ")
+
+
+def test_samples_of_a_plan_are_counted_as_they_come(monkeypatch):
+    styles = []
+
+    class Counting:
+        def __init__(self, label, style):
+            styles.append((label, style))
+
+    def simulated(scene, points, ranks, *, progress, stage):
+        assert isinstance(progress, Counting)
+        ranks.stage_seconds[stage] = np.ones((1, len(planning.COLUMNS)))
+        return np.zeros(len(points), OUTCOME)
+
+    monkeypatch.setattr(planning, "Progress", Counting)
+    monkeypatch.setattr(planning, "sample_points", simulated)
+    scene = crank_and_rod()
+    planning.cost(scene, corners(scene), alone(), 1.0, "0", "log")
+    assert set(styles) == {("plan", "log")}
+
+
+def test_a_preview_says_how_long_the_job_takes():
+    scene = crank_and_rod()
+    text = preview(Plan((Row(None, scene, 0.5, ""),), 1000, None, 3.0, 1e8, 2), 1)
+    assert (
+        text == "settings of the file: 500 ms a sample, 1000 simulations take 8:23 min on 1 ranks"
+    )

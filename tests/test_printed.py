@@ -1,0 +1,366 @@
+"""What is printed and drawn is what it is called: launchers, early stops, indices, peaks, contact, fronts, fits."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_data as data
+import xarray as xr
+from click.testing import CliRunner
+from commands import finish, start
+from test_figures import _other_goals
+
+from hpcclear import load_scene, report
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag
+from hpcclear.cli import cli
+from hpcclear.cli.printing import describe_response, flag_remarks
+from hpcclear.ranks.stopping import Stopped
+from hpcclear.report.answer import answer
+from hpcclear.report.figures import fits, labels, motion
+from hpcclear.report.html import gallery, picture
+from hpcclear.report.html.content import Content
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
+import plot_bifurcation
+import plot_map
+
+ROOT = Path(__file__).parent.parent
+SLIDER_CRANK = ROOT / "jobs" / "slider_crank.toml"
+FOUR_BAR = ROOT / "jobs" / "linkages" / "crank_rocker.toml"
+
+
+# -- launchers, and early stops -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rank", ["0", "3"])
+def test_check_under_a_launcher_of_another_library_ends_with_exit_code_2(rank):
+    """What each of eight copies sees that a foreign launcher has started: its own rank, and nobody else in MPI."""
+    foreign = {"OMPI_COMM_WORLD_SIZE": "8", "OMPI_COMM_WORLD_RANK": rank}
+    job = start(["check", "jobs/quickstart.toml", "--no-cost"], 0, **foreign)
+    code, output = finish(job)
+    assert code == 2
+    assert ("the launcher started 8 processes" in output) == (rank == "0")
+    assert "would be simulated" not in output
+
+
+def test_check_counts_the_ranks_that_reached_each_other():
+    code, output = finish(start(["check", "jobs/quickstart.toml", "--no-cost"], 2))
+    assert code == 0, output
+    assert "2 ranks reached each other" in " ".join(output.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "where", "resumes"),
+    [
+        (["plan", "jobs/quickstart.toml"], "hpcclear.accuracy.plan.measure", False),
+        (["run", "jobs/quickstart.toml", "-o", "x"], "hpcclear.study.run_study", True),
+    ],
+)
+def test_a_command_that_keeps_nothing_says_so_when_it_is_stopped(
+    words, where, resumes, monkeypatch
+):
+    def stop(*arguments, **named):
+        raise Stopped("SIGTERM was received")
+
+    monkeypatch.setattr(where, stop)
+    monkeypatch.chdir(ROOT)
+    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert ("goes on from here" in done.output) == resumes
+    assert ("starts anew" in done.output) != resumes
+
+
+# -- sensitivity, and surrogates that do not fit ------------------------------------------------------
+
+
+def content(files: dict[str, xr.Dataset]) -> Content:
+    return Content(Path("out"), files, {})
+
+
+def indices(first, total, error=0.01):
+    names = [f"x{k}" for k in range(len(total))]
+    columns = {"sobol_first": first, "sobol_total": total}
+    columns |= {f"{name}_error": np.full(len(total), error) for name in columns}
+    return xr.Dataset({k: ("parameter", v) for k, v in columns.items()}, {"parameter": names})
+
+
+def lines_of(**files):
+    told = answer({"verification": data.verification(), **files}, "")
+    return {label: [text for name, text in told if name == label] for label, _ in told}
+
+
+def test_first_order_and_total_indices_stand_apart_with_their_errors():
+    """Five inputs of which totals add up to 197 %, as interactions count for each."""
+    first, total = [0.35, 0.1, 0.05, 0.04, 0.02], [0.84, 0.48, 0.26, 0.22, 0.17]
+    (own,), (whole,) = (
+        lines_of(sensitivity=indices(first, total))[name]
+        for name in ("sensitivity", "interactions")
+    )
+    assert own.endswith("x0 35% ± 2.0%, x1 10% ± 2.0%, x2 5% ± 2.0%, x3 4% ± 2.0%, x4 2% ± 2.0%")
+    assert "first-order Sobol indices" in own
+    assert whole.endswith(
+        "x0 84% ± 2.0%, x1 48% ± 2.0%, x2 26% ± 2.0%, x3 22% ± 2.0%, x4 17% ± 2.0%"
+    )
+    assert "may exceed 100 %" in whole
+
+
+def test_indices_that_are_hardly_known_say_what_to_raise():
+    vague = lines_of(sensitivity=indices([0.3, 0.2], [0.6, 0.7], error=0.2))
+    assert any("study.sensitivity.sobol_samples" in text for text in vague["warning"])
+    assert "warning" not in lines_of(sensitivity=indices([0.3, 0.2], [0.6, 0.7]))
+
+
+def badly_fitted() -> tuple[xr.Dataset, xr.Dataset]:
+    surfaces, models = data.sensitivity(), data.kriging()
+    surfaces["r2"][0, 0, 2] = -0.31
+    models["r2"][0] = 0.69
+    return surfaces, models
+
+
+@pytest.mark.parametrize(
+    ("r2", "words"),
+    [
+        (0.95, ""),
+        (0.69, "indicative only"),
+        (-0.31, "worse than a constant"),
+        (np.nan, "not known"),
+    ],
+)
+def test_a_fit_has_a_verdict(r2, words):
+    assert words in fits.verdict(r2)
+    assert bool(fits.verdict(r2)) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("draw", "which", "words"),
+    [
+        (report.sensitivity_figure, 0, "worse than a constant"),
+        (report.fit_figure, 0, "worse than a constant"),
+        (report.surfaces_figure, 1, "indicative only"),
+        (report.parity_figure, 1, "indicative only"),
+    ],
+)
+def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
+    poor, good = badly_fitted()[which], (data.sensitivity(), data.kriging())[which]
+    told = [text.get_text() for panel in draw(poor).axes for text in panel.texts]
+    assert any(words in text for text in told)
+    told = [text.get_text() for panel in draw(good).axes for text in panel.texts]
+    assert not any("constant" in text or "indicative" in text for text in told)
+
+
+def test_captions_and_the_answer_name_surrogates_that_do_not_fit():
+    surfaces, models = badly_fitted()
+    files = {"sensitivity": surfaces, "kriging": models}
+    drawn = [what for what, _ in gallery._drawings(content(files))]
+    assert sum("worse than a constant" in text for text in drawn) == 2
+    assert sum("R² = 0.69" in text for text in drawn) == 2
+    told = " ".join(lines_of(**files)["warning"])
+    assert "response surface in m2, m3: R² = -0.31: worse than a constant" in told
+    assert "Kriging model in m2, m3, C: R² = 0.69" in told
+
+
+# -- the front on the page -----------------------------------------------------------------------------
+
+
+def with_goals(verified: xr.Dataset, words: dict[str, tuple[str, ...]]) -> xr.Dataset:
+    """The same with what each case makes small, as the study writes it."""
+    cases = [str(case) for case in verified["case"].to_numpy()]
+    for k, name in enumerate(("first", "second")):
+        verified[f"{name}_goal"] = ("design", np.array([words[case][k] for case in cases]))
+        units = ["m" if words[case][k].endswith(" of f") else "" for case in cases]
+        verified[f"{name}_unit"] = ("design", np.array(units))
+    verified["constraints"] = ("design", np.array([""] * len(cases)))
+    return verified
+
+
+def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
+    """One case, a quantile against a formula: no mean, no deviation at first."""
+    front, verified = _other_goals()
+    case = str(front["case"][0].item())
+    front = front.isel(case=[0])
+    own = verified.isel(design=np.flatnonzero(verified["case"].to_numpy() == case))
+    goals = ("95th percentile of f", "m2 + m3")
+    shown = picture.front(content({"front": front, "verification": with_goals(own, {case: goals})}))
+    assert (shown["x"], shown["y"]) == ("95th percentile of f (mm)", "m2 + m3")
+    assert [label.partition(" (")[0] for label in shown["axes"][2:]] == [
+        "mean of f",
+        "deviation of f",
+    ]
+    solutions = [p for p in shown["points"] if p["kind"] == "solution"]
+    masses = (front["m2"] + front["m3"]).to_numpy()
+    assert sorted(p["y"] for p in solutions) == pytest.approx(
+        np.sort(masses[np.isfinite(masses)]), rel=1e-5
+    )
+    beta = next(p for p in shown["points"] if p["name"] == f"{case} beta")
+    one = own.sel(design=f"{case} beta")
+    assert beta["x"] == pytest.approx(1e3 * float(one["first_true"]), rel=1e-5)
+    assert ["m2 + m3", labels.quantity(float(one["second_true"]), "")] in beta["direct"]
+
+
+def test_a_plain_front_shows_mean_and_deviation():
+    shown = picture.front(content({"front": data.front(), "verification": data.verification()}))
+    assert shown["x"].startswith("mean of f")
+    assert shown["y"].startswith("deviation of f")
+    assert "axes" not in shown
+
+
+# -- one response --------------------------------------------------------------------------------------
+
+
+def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
+    """The start transient is twice as hard; the peak is of the last two of four revolutions."""
+    response = data.response()
+    turn = response["crank_angle"].to_numpy() / (2.0 * np.pi)
+    force = np.where(turn < 1.0, 2000.0, 1000.0)
+    response["contact_force"][:] = force[:, None]
+    response["peak_contact_force"][:] = 1500.0
+    response.attrs["transient_revolutions"] = 2
+    describe_response(response, tmp_path / "a.nc")
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "largest stored value of the averaged revolutions 1 kN" in shown
+    assert "2 kN" not in shown
+
+
+def test_a_joint_that_flew_is_not_said_to_have_never_left_contact():
+    (text,) = flag_remarks(Flag.LATCHED)
+    assert "never" not in text
+    assert "at least one averaged revolution" in text
+
+
+@pytest.mark.parametrize("flights", [0, 1, 2, 5, 100, 400, 1999, 2000])
+def test_shares_of_contact_are_never_rounded_to_all_or_none(flights):
+    response = data.response(10, instants=200).isel(time=slice(0, 2000))
+    depth = np.where(np.arange(2000) < flights, 0.0, 1e-6)
+    response["penetration"][:] = depth[:, None]
+    told = motion.contact(response, "crank_rod")
+    assert ("all instants" in told) == (flights in (0, 2000))
+    assert " 100" not in told
+    assert " 0 %" not in told
+    assert " 0.0 %" not in told
+    if flights in (100, 400):
+        assert f"{100 - flights / 20:.1f} %" in told
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_contact_is_drawn_along_the_bore_and_never_across_it(seed):
+    """Bounces from side to side between two instants of the file: chords would cut the circle."""
+    response, rng = data.response(), np.random.default_rng(seed)
+    count, clearance = response.sizes["time"], 3e-4
+    angle = np.cumsum(rng.normal(0.0, 0.2, count)) + np.pi * np.cumsum(rng.random(count) < 0.05)
+    flies = rng.random(count) < 0.1
+    reach = clearance * np.where(flies, 0.5, 1.002)
+    response["eccentricity_x"][:] = (reach * np.cos(angle))[:, None]
+    response["eccentricity_y"][:] = (reach * np.sin(angle))[:, None]
+    response["penetration"][:] = np.maximum(reach - clearance, 0.0)[:, None]
+    shown = motion.steady(response)
+    for panel in report.orbit_figure(response).axes:
+        drawn = {line.get_label(): line.get_xydata() for line in panel.lines}
+        for name in ("contact", "contact arc"):
+            path = drawn[name]
+            middles = 0.5 * (path[1:] + path[:-1])
+            depth = np.hypot(*middles.T)
+            assert np.nanmin(depth) > 0.3 * (1.0 - 2e-4)  # steps of 2 degrees sag by 1.5e-4
+        joined = np.isfinite(drawn["contact arc"]).all(axis=1)
+        assert joined.sum() >= (shown["penetration"].to_numpy()[:, 0] > 0.0).sum()
+
+
+VARIED = {
+    "drive.speed": ([100.0, 200.0, 300.0], "speed of the drive (rpm)", 30.0 / np.pi),
+    "mechanism.rod.mass": ([0.1, 0.2, 0.3], "mass of the rod (kg)", 1.0),
+    "mechanism.rod.length": ([0.12, 0.14, 0.16], "length of the rod (mm)", 1e3),
+    "effects.contact.restitution": ([0.5, 0.6, 0.7], "restitution of the contact (–)", 1.0),
+    "joints.crank_rod.clearance": (
+        [1e-4, 2e-4, 4e-4],
+        "radial clearance of the joint crank_rod (mm)",
+        1e3,
+    ),
+    "clearances": ([1e-4, 2e-4, 4e-4], "clearance $C$ (mm)", 1e3),
+}
+
+
+def of_scenes(scene, paths, values) -> list[xr.Dataset]:
+    found = []
+    for value in values:
+        response = data.response()
+        response.attrs["scene"] = scene.with_(dict.fromkeys(paths, value)).text
+        found.append(response)
+    return found
+
+
+@pytest.mark.parametrize("path", VARIED)
+def test_a_bifurcation_is_drawn_over_what_was_varied(path):
+    values, label, factor = VARIED[path]
+    paths = (
+        ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
+        if path == "clearances"
+        else (path,)
+    )
+    figure = report.bifurcation_figure(of_scenes(load_scene(SLIDER_CRANK), paths, values))
+    assert figure.axes[1].get_xlabel() == label
+    across = np.unique(figure.axes[0].lines[0].get_xdata())
+    assert across == pytest.approx(factor * np.array(values))
+
+
+def test_responses_that_differ_in_two_entries_make_no_bifurcation():
+    scene = load_scene(SLIDER_CRANK)
+    several = of_scenes(scene, ("drive.speed",), [100.0]) + of_scenes(
+        scene, ("mechanism.rod.mass",), [0.1]
+    )
+    with pytest.raises(InputError, match="differ in several entries"):
+        report.bifurcation_figure(several)
+
+
+# -- programs that draw ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "more",
+    [(), ("--path", "mechanism.drives.motor.speed", "--first", "60 rpm", "--last", "90 rpm")],
+)
+def test_the_bifurcation_program_takes_a_four_bar(more, monkeypatch, tmp_path):
+    asked = []
+
+    def simulated(scene):
+        asked.append(scene)
+        response = data.response(4)
+        response.attrs["scene"] = scene.text
+        return response
+
+    monkeypatch.setattr(plot_bifurcation, "simulate", simulated)
+    place = tmp_path / "a.png"
+    words = [str(FOUR_BAR), "--count", "3", "--revolutions", "2", "-o", str(place), *more]
+    monkeypatch.setattr(sys, "argv", ["plot_bifurcation.py", *words])
+    plot_bifurcation.main()
+    assert place.stat().st_size > 1000
+    path = more[1] if more else "mechanism.joints.o3.clearance"
+    ends = np.array([60.0, 75.0, 90.0]) * np.pi / 30 if more else [5e-5, 5.25e-4, 1e-3]
+    assert [scene.number(path) for scene in asked] == pytest.approx(ends)
+
+
+@pytest.mark.parametrize(
+    ("file", "path", "values"),
+    [
+        (SLIDER_CRANK, "drive.speed", [100.0, 200.0]),
+        (FOUR_BAR, "mechanism.bodies.coupler.mass", [0.3, 0.4]),
+    ],
+)
+def test_the_map_program_draws_over_any_dotted_path(file, path, values, monkeypatch, tmp_path):
+    monkeypatch.setattr(plot_map, "TRANSIENT", 1)
+    monkeypatch.setattr(plot_map, "SHOWN", 2)
+    scene = load_scene(file)
+    names = ("kick_growth", "kick_growth_limit", "objective", "objective_limit")
+    attributes = {"scene_path": path, "units": "rad/s" if "speed" in path else "kg"}
+    name = path.replace(".", "_")
+    cells = xr.Dataset(
+        {one: (name, [0.1, 0.2]) for one in names},
+        {name: (name, values, attributes)},
+        {"scene": scene.text},
+    )
+    figure = plot_map.line(cells, name)
+    assert path in figure.axes[2].get_xlabel()
+    assert np.isfinite(figure.axes[2].lines[0].get_ydata()).all()
+    across = xr.concat([cells.expand_dims(C=[c]) for c in (1e-4, 2e-4)], "C")
+    across["period"] = across["objective"]
+    figure = plot_map.plane(across, [name, "C"])
+    assert path.rpartition(".")[2] in figure.axes[0].get_xlabel()
