@@ -89,11 +89,13 @@ class Evaluator:
     Parameters
     ----------
     scene : Scene
-        With ``numerics.uncertainty`` each sample runs with kicked and stricter copies beside it.
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
         Samples in lockstep.
+    checked : bool, optional
+        Whether each sample runs beside perturbed replicas of tighter tolerance, which give its objective a half-width; by
+        default as ``numerics.uncertainty`` says.
 
     Raises
     ------
@@ -101,11 +103,19 @@ class Evaluator:
         If the scene asks for what the kernel cannot do.
     """
 
-    def __init__(self, scene: Scene, columns: Points, lanes: int = DEFAULT_LANES) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        columns: Points,
+        lanes: int = DEFAULT_LANES,
+        checked: bool | None = None,
+    ) -> None:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        self._copies = 1 + len(KICKS) * scene.numerics.uncertainty
+        if checked is None:
+            checked = scene.numerics.uncertainty
+        self._copies = 1 + len(KICKS) * checked
         problem = problem_of(scene)
         self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._problem = problem
@@ -153,7 +163,10 @@ class Evaluator:
             group[copy] = record
             group["flags"][copy] |= _ARRIVED
             if (group["flags"] & _ARRIVED).all():
-                done.append(joined(sample, self._partial.pop(sample)))
+                one = joined(sample, self._partial.pop(sample))
+                if not self.scene.numerics.uncertainty:  # checked, but the same record otherwise
+                    one["rhs_evaluations"] = group["rhs_evaluations"][0]
+                done.append(one)
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 

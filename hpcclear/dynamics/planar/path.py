@@ -39,7 +39,7 @@ def followed(
     ----------
     scene : Scene
     angle : ndarray, shape (t,)
-        Of the drive of the period, from the start on and rising by all its turns, rad.
+        Of the drive of the period, 0 at the start of the motion and rising by all its turns, rad.
     points : dict
         ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
     acceleration : ndarray of complex, shape (t,)
@@ -61,7 +61,7 @@ def followed(
     path = ideal_path(mechanism, place) if play else None
     if path is not None:
         cycle = at.TURN * turns_of(tables_of(scene))
-        ideal = path(np.mod(angle - angle[0], cycle) / cycle)
+        ideal = path(np.mod(angle, cycle) / cycle)
         found["path_error"] = np.abs(x + 1j * y - ideal)
     return found
 
