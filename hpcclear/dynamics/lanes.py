@@ -158,9 +158,7 @@ class Lanes:
         Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
         the first step.
         """
-        row, width = (
-            (MOTION_OF_EIGHT, LANES) if self.problem.collocation else (MOTION, self.width)
-        )
+        row, width = (MOTION_OF_EIGHT, LANES) if self.problem.collocation else (MOTION, self.width)
         out = np.zeros((len(times), self.problem.coordinates + at.RATES))
         states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
         motion = int(self._method.numbers[row])

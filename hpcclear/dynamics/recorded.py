@@ -4,6 +4,7 @@ Steps are worked off revolution by revolution, so that memory goes with the inst
 body does, at most `most_kept` steps of an unfinished revolution are held.
 """
 
+import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -107,7 +108,7 @@ class Recording:
         return row
 
     def observe(self, states: Array, contacts: Array, turn_time: Array) -> tuple[Array, Rates]:
-        """Accelerations (t, n) and rates at instants: states (t, 2 n), contacts (t, 2 MAX_JOINTS), time in the revolution (t,)."""
+        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS) and times in the revolution (t,)."""
         out = self._lanes.observe(self.par, states, contacts, turn_time)
         n = self.problem.coordinates
         return out[:, :n], Rates(out[:, n:])
@@ -155,7 +156,7 @@ def pieces(chunks: Iterable[Array], count: int) -> Iterator[Piece]:
         if done:
             yield _piece(rows[: done + 1], broken, count, last=False)
             rows, broken = rows[done:], broken[done:]
-        elif len(rows) > most_kept:
+        while len(rows) > most_kept:
             rows, broken = _thinned(rows, broken)
     assert rows is not None
     yield _piece(rows, broken, count, last=True)
@@ -171,7 +172,7 @@ def _piece(rows: Array, broken: Booleans, count: int, *, last: bool) -> Piece:
         borders = steps.time[np.unique([0, *closing, len(rows) - 1])]
         parts = [
             np.linspace(a, b, count, endpoint=False)
-            for a, b in zip(borders[:-1], borders[1:], strict=True)
+            for a, b in itertools.pairwise(borders)
         ]
         times = np.concatenate([*parts, borders[-1:] if last else []])
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, max(len(rows) - 2, 0))
@@ -183,7 +184,7 @@ def _piece(rows: Array, broken: Booleans, count: int, *, last: bool) -> Piece:
 
 
 def _thinned(rows: Array, broken: Booleans) -> tuple[Array, Booleans]:
-    """Drop every second step where steps are shortest, an eighth of all or more; `broken`: before which rows some are missing.
+    """Drop half of the rows where steps are shortest, a quarter of all; `broken`: before which rows some are missing.
 
     Of four rows the first two stay, which keep a step whole. What was thinned before has an even number of rows, so that its
     pairs stay together.

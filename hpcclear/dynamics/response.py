@@ -14,7 +14,7 @@ from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records, records_by
-from hpcclear.dynamics.evaluator import Evaluator, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import KICKS_ALONE, Evaluator, outcome_records, responses_told
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.bending import Bent
@@ -101,7 +101,7 @@ def simulate(
         Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
         motion without clearance has no copies.
     checked : bool
-        Whether f gets a half-width (``objective_uncertainty``), by replicas beside it; never for a copy.
+        Whether the objective gets a half-width (``objective_uncertainty``), by replicas beside it; never for a copy.
 
     Returns
     -------
@@ -124,8 +124,10 @@ def simulate(
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
     elif not (still or copy):
-        record = _sample(scene, checked, record)
+        record = _sample(scene, objective, checked, record)
+    half_width = record["objective_uncertainty"]  # of the objective already
     record = asked(record, objective)
+    record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
@@ -144,7 +146,7 @@ def simulate(
     )
 
 
-def _sample(scene: Scene, checked: bool, series: Records) -> Records:
+def _sample(scene: Scene, objective: Objective, checked: bool, series: Records) -> Records:
     """The record (1,) of the scene as the only sample of an ensemble.
 
     The motion of the time series is compiled with works and powers in it. Products that these share with the forces are
@@ -154,8 +156,8 @@ def _sample(scene: Scene, checked: bool, series: Records) -> Records:
     status = Status(int(series["status"][0]))
     if status is Status.STEP_CAP:
         return series  # as many steps again would come to the same
-    checked = (checked or scene.numerics.uncertainty) and status.valid
-    evaluator = Evaluator(scene, _ITSELF, checked=checked)
+    kicks = KICKS_ALONE if checked and status.valid else ()
+    evaluator = Evaluator(scene, _ITSELF, kicks=kicks, objective=objective)
     return records_by(evaluator, _ITSELF)
 
 
@@ -275,7 +277,9 @@ def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[st
         one[:, scene.bristles :] for one in (q, v, in_turn, accelerations)
     )
     if scene.is_planar:
-        return planar_series(scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works))
+        return planar_series(
+            scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works)
+        )
     first, second, free = topology(scene)
     nine = scene.numerics.formulation == "baumgarte"
     phi, omega = TURN * times / Parameters(par).period, np.full_like(times, Parameters(par).speed)

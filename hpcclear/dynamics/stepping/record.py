@@ -1,4 +1,4 @@
-"""The accepted steps of one sample, of which time series are made. Ensembles hand over a record without rows, which keeps none."""
+"""The accepted steps of one sample, of which time series are made. Ensembles pass a record without rows, which keeps none."""
 
 from hpcclear.base.eight import combined, nine_rows, put
 from hpcclear.base.jit import lane_function
