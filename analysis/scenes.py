@@ -72,7 +72,7 @@ def setup(chosen: Scene, par: Array) -> Setup:
 
 
 def single(chosen: Scene) -> Setup:
-    """One sample: the scene itself, by the method that a single response of it takes."""
+    """One sample: the scene itself, its implicit steps with the stages side by side."""
     one = setup(chosen, parameters(chosen))
     return one._replace(problem=problem_of(chosen, single=True))
 

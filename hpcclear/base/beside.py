@@ -65,4 +65,11 @@ def compile_parts(parts: Sequence[str]) -> None:
         module, function, *words = part.split(":")
         known = [int(word) if word.isdecimal() else word for word in words]
         getattr(importlib.import_module(module), function)(*known)
-        _mark(part).touch()
+        note_compiled([part])
+
+
+def note_compiled(parts: Sequence[str]) -> None:
+    """Note that parts are on disk, so that no other process is started for them."""
+    for part in parts:
+        with contextlib.suppress(OSError):
+            _mark(part).touch()

@@ -97,8 +97,6 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
     method = integrator_of(scene)
-    if (alone := integrator_of(scene, single=True)) != method:
-        method += f" ({alone} for a single response)"
     rows += [
         (
             "states",
@@ -262,22 +260,21 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     if "regime" in response and status.valid:
         rows.append(("f, steady mean", in_a_line(response, seconds)))
     words, unit = objective_of(response)
-    rows.append(("objective f", f"{quantity(f, unit, 6)}: {words}"))
+    half_width = float(response["objective_uncertainty"])
+    if "regime" in response:
+        half_width = float(response["objective_limit"])
+    shown = fitting(labels.with_half_width(f, half_width, unit)) if np.isfinite(f) else "nan"
+    rows.append(("objective f", f"{shown}: {words}"))
     if np.isfinite(spread):
         rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
-    if np.isfinite(uncertainty := float(response["objective_uncertainty"])):
-        rows.append(
-            (
-                "its uncertainty",
-                f"{quantity(uncertainty, unit, 2)}: so far stricter, kicked copies are off",
-            )
-        )
     rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
     for k, joint in enumerate(response["joint"].to_numpy()):
         peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
         told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
         rows.append((f"{joint}", told + _at_instants(response, k)))
     out.print(table("Response", rows + _crank(response)))
+    if half_width > SENSITIVE * abs(f) and "regime" not in response:
+        out.print(f"[yellow]Warning:[/] {SENSITIVE_WORDS.format(half_width / abs(f))}")
     for text in flag_remarks(int(response["flags"])):
         out.print(remark("Mind", text))
     out.print(f"written  {output}")
@@ -314,6 +311,14 @@ def _at_instants(response: xr.Dataset, joint: int) -> str:
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
 
+SENSITIVE = 0.01
+"""Half-width over f beyond which f is reported as sensitive to initial conditions."""
+
+SENSITIVE_WORDS = (
+    "f is sensitive to initial conditions or to the tolerance: by replicas whose starts differ by 1e-10 its half-width is {:.0%} "
+    "of f. Set numerics.target_error for a mean with a confidence interval"
+)
+
 
 def flag_remarks(flags: int) -> list[str]:
     """A sentence for each flag that is set."""
@@ -341,6 +346,7 @@ def describe_statistics(found: "Finished") -> None:
         shown = f"{quantity(mean, unit, 6)}, standard error {quantity(error, unit, 2)}"
         rows.append(("mean of f", shown))
         rows.append(("deviation of f", quantity(deviation, unit)))
+        rows.append(("half-width of a single f", labels.NOT_CHECKED))
     out.print(table("Statistics", rows + _load(found)))
     out.print(f"statistics {found.output}")
 
@@ -388,6 +394,7 @@ def describe_samples(found: "Finished") -> None:
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
         rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
+        rows.append(("half-width of f", _half_widths(samples)))
         spread = samples["objective_spread"].to_numpy()[status == Status.OK] / good
     if len(good) and np.isfinite(spread).any():
         rows.append(
@@ -413,6 +420,16 @@ def describe_samples(found: "Finished") -> None:
     for what, path in (("samples", found.output), ("timing", found.timing)):
         if path.exists():  # what was merged has its times beside the parts
             out.print(f"{what:8} {path}")
+
+
+def _half_widths(samples: xr.Dataset) -> str:
+    """Median and largest half-width of f over f, or that there is none."""
+    name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
+    good = (samples["status"] == Status.OK).to_numpy()
+    shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
+    if not np.isfinite(shares).any():
+        return f"{labels.NOT_CHECKED} (numerics.uncertainty = true gives every sample one)"
+    return f"median {np.nanmedian(shares):.1e}, largest {np.nanmax(shares):.1e} of f"
 
 
 def describe_map(found: "Finished") -> None:

@@ -9,6 +9,7 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
+from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
@@ -64,6 +65,13 @@ KICK = 1e-10
 KICKS = (0, 1, -1)
 """Signs of the kicks to a sample's copies, which run beside it when its uncertainty is asked for."""
 
+KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
+"""Those of the replicas of a single response, which take lanes that would stay empty. From the larger ones chaotic replicas separate
+before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
+
+KICK_OF_TOLERANCE = 0.1
+"""Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
+
 STRICTER = 300.0
 """Tolerance of a sample over that of its copies, whose own errors then count for little."""
 
@@ -74,6 +82,10 @@ COVERAGE = 1.7
 """Stated uncertainty over how far the farthest copy is; `analysis/uncertainty.py` tells how often it holds and how wide it is.
 Copies no stricter than the sample would add errors of their own where its motion is nearly regular: limits that hold as often
 were up to 12 times the error there."""
+
+COVERAGE_ALONE = 1.25
+"""Likewise with the replicas of a single response: of ten normal variates the last is farther from the first than 1.25 times the
+farthest of the others in 4 %, and of four than 1.7 times in 8 %."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
@@ -89,11 +101,15 @@ class Evaluator:
     Parameters
     ----------
     scene : Scene
-        With ``numerics.uncertainty`` each sample runs with kicked and stricter copies beside it.
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
         Samples in lockstep.
+    kicks : sequence of int, optional
+        Perturbations, in units of `KICK`, of replicas of tighter tolerance that run beside each sample and give its objective a
+        half-width; by default `KICKS` with ``numerics.uncertainty``, else none.
+    objective : Objective
+        Of which that half-width is.
 
     Raises
     ------
@@ -101,11 +117,22 @@ class Evaluator:
         If the scene asks for what the kernel cannot do.
     """
 
-    def __init__(self, scene: Scene, columns: Points, lanes: int = DEFAULT_LANES) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        columns: Points,
+        lanes: int = DEFAULT_LANES,
+        kicks: Sequence[int] | None = None,
+        objective: Objective = MEAN_GAP,
+    ) -> None:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        self._copies = 1 + len(KICKS) * scene.numerics.uncertainty
+        if kicks is None:
+            kicks = KICKS if scene.numerics.uncertainty else ()
+        self._kicks = tuple(kicks)
+        self._copies = 1 + len(self._kicks)
+        self._objective = objective
         problem = problem_of(scene)
         self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._problem = problem
@@ -124,7 +151,9 @@ class Evaluator:
         start = start_states(self.scene, par, made)
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
-            par, start, labels = with_copies(par, start, labels, self.scene.numerics.rtol)
+            par, start, labels = with_copies(
+                par, start, labels, self.scene.numerics.rtol, self._kicks
+            )
         if self._problem.effects.ledger and self._problem.coordinates:
             before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
@@ -153,7 +182,10 @@ class Evaluator:
             group[copy] = record
             group["flags"][copy] |= _ARRIVED
             if (group["flags"] & _ARRIVED).all():
-                done.append(joined(sample, self._partial.pop(sample)))
+                one = joined(sample, self._partial.pop(sample), self._objective)
+                if not self.scene.numerics.uncertainty:  # checked, but the same record otherwise
+                    one["rhs_evaluations"] = group["rhs_evaluations"][0]
+                done.append(one)
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
@@ -172,31 +204,33 @@ _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evalua
 
 
 def with_copies(
-    par: Array, start: Start, labels: Integers, rtol: float
+    par: Array, start: Start, labels: Integers, rtol: float, kicks: Sequence[int] = KICKS
 ) -> tuple[Array, Start, Integers]:
     """Each sample followed by its copies: kicked starts, and stricter tolerances."""
-    kicks = np.array([0, *KICKS])
-    count = len(kicks)
-    strict = np.array([1.0] + len(KICKS) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
+    most = max(1.0, KICK_OF_TOLERANCE * rtol / KICK)
+    sizes = np.clip([0, *kicks], -most, most)
+    count = len(sizes)
+    strict = np.array([1.0] + len(kicks) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
     par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))
     Parameters(par).strictness = np.tile(strict**2, len(labels))
     # Signs alternate over the coordinates, so that the kick is no motion of the mechanism as a whole.
     signs = np.where(np.arange(at.MAX_COORDINATES) % 2 == 0, 1.0, -1.0)
     pattern = np.concatenate([signs, -signs])  # of coordinates, then of velocities
-    start.moving *= 1.0 + KICK * np.tile(kicks, len(labels))[:, None] * pattern
+    start.moving *= 1.0 + KICK * np.tile(sizes, len(labels))[:, None] * pattern
     copies = (labels[:, None] + np.arange(count)).ravel()
     return par, start, copies
 
 
-def joined(sample: int, group: Records) -> Records:
+def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Records:
     """One record from a sample (first) and its copies: its own numbers, and how far they can be trusted."""
     record = group[0].copy()
     record["sample"] = sample
     record["flags"] &= ~_ARRIVED
     record["rhs_evaluations"] = group["rhs_evaluations"].sum()
-    values = group["objective"]
+    values = objective.of(group)
     # A copy that failed leaves the uncertainty unknown, and NaN says so.
-    record["objective_uncertainty"] = COVERAGE * np.max(np.abs(values[1:] - values[0]))
+    coverage = COVERAGE if len(group) == 1 + len(KICKS) else COVERAGE_ALONE
+    record["objective_uncertainty"] = coverage * np.max(np.abs(values[1:] - values[0]))
     return record
 
 

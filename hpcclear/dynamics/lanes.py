@@ -7,7 +7,7 @@ import numpy as np
 from numba import typeof
 
 from hpcclear.base.arrays import Array, Booleans, Integers, aligned
-from hpcclear.base.beside import compiled_beside
+from hpcclear.base.beside import compiled_beside, note_compiled
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
 from hpcclear.dynamics.collocation.lobatto import STAGES
@@ -20,10 +20,11 @@ from hpcclear.dynamics.implicit.abreast import abreast_code
 from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.memory import LANES
 from hpcclear.dynamics.implicit.stiff import blocks_of, implicit_code
-from hpcclear.dynamics.linkage.observe import observing_code
+from hpcclear.dynamics.linkage.observe import observe, observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.stepping.profile import profile_code
+from hpcclear.dynamics.stepping.record import columns
 from hpcclear.dynamics.stepping.settings import (
     COUNTERS,
     FINISHED,
@@ -55,7 +56,7 @@ class Lanes:
     width : int
         Lanes; 1 for a single response.
     record : numpy.ndarray, optional
-        Buffer (rows, columns) for every accepted step of lane 0.
+        Buffer (rows, columns) for every accepted step of the first sample of the queue, which runs in lane 0.
 
     Raises
     ------
@@ -68,7 +69,7 @@ class Lanes:
         width = 1 if problem.collocation else width
         self.problem = problem
         self.width = width
-        self.record = record
+        self.record = np.zeros((0, columns(n))) if record is None else record
         bank = aligned((at.STAGES + tab.STAGES * at.MAX_COORDINATES) * width)
         bank[at.WORK * width : at.STAGES * width] = (
             1.0  # parameters: a resting lane divides by them
@@ -96,9 +97,9 @@ class Lanes:
         )
         self._codes: tuple[Any, ...] = (0,) if problem.collocation else (n, Codes(0, 0, 0))
         self._step = (
-            make_collocation_stepper(recorded=record is not None)
+            make_collocation_stepper()
             if problem.collocation
-            else make_stepper(width, recorded=record is not None, implicit=implicit)
+            else make_stepper(width, implicit=implicit)
         )
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
@@ -108,16 +109,26 @@ class Lanes:
         self._effects = effects
         self._compiled = False
 
+    @property
+    def _widths(self) -> tuple[int, int]:
+        """Lanes of its motions, 0 for none: of all lanes, and of eight where evaluations of one lane stand side by side."""
+        all_lanes = 0 if self.problem.collocation else self.width
+        return all_lanes, LANES if self._memory is not None else 0
+
+    @property
+    def motions(self) -> list[str]:
+        """Its motions as `hpcclear.base.beside` names what another process may compile."""
+        widths = [width for width in self._widths if width]
+        return [f"{TEXT}:{self.problem.motion_text(self._effects, width)}" for width in widths]
+
     def _compile(self) -> None:
         """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
         problem, n, effects = self.problem, self.problem.coordinates, self._effects
         stiff = self._memory is not None and not problem.collocation
         blocks = not problem.collocation
-        # of so many lanes, and of eight where evaluations of one lane stand side by side
-        widths = (self.width if blocks else 0, LANES if self._memory is not None else 0)
-        texts = [problem.motion_text(effects, width) for width in widths if width]
-        apart = [SPECIAL, *(f"{TEXT}:{text}" for text in texts)]
-        apart += [OBSERVING] if self.record is not None else []
+        widths = self._widths
+        apart = [SPECIAL, *self.motions]
+        apart += [OBSERVING] if len(self.record) else []
         beside = f"{IMPLICIT}:{blocks_of(n)}" if problem.single else ABREAST
         with compiled_beside([beside] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width).address if blocks else 0
@@ -134,11 +145,25 @@ class Lanes:
             self._codes = (special,)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        note_compiled(self.motions)
         if self._rules.profile:
             self._method.numbers[PROFILE] = profile_code(effects, self.width).address
         self._compiled = (
             True  # last: a stepper must not call what an interrupted compilation left out
         )
+
+    def observe(self, par: Array, states: Array, contacts: Array, times: Array) -> Array:
+        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion that the lanes step with.
+
+        Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
+        the first step.
+        """
+        row, width = (MOTION_OF_EIGHT, LANES) if self.problem.collocation else (MOTION, self.width)
+        out = np.zeros((len(times), self.problem.coordinates + at.RATES))
+        states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
+        motion = int(self._method.numbers[row])
+        observe(motion, par, self.problem.tables, states, contacts, times, out, width)
+        return out
 
     def _implicit_address(self) -> int:
         """Of the implicit steps: a response's stages stand side by side, the samples of an ensemble."""
@@ -147,8 +172,8 @@ class Lanes:
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:
         arrays = (self._rules, self._block, self._queue, self._method)
-        some = (one for one in (self.record, self._memory) if one is not None)
-        return (*self._codes, *arrays, *some, budget)
+        memory = () if self._memory is None else (self._memory,)
+        return (*self._codes, *arrays, self.record, *memory, budget)
 
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
         count = len(labels)
@@ -186,7 +211,7 @@ class Lanes:
         To be called when nothing is queued or running.
         """
         assert self.pending == 0
-        assert self.record is None
+        assert len(self.record) == 0
         self.queue(par, start, np.arange(len(par)))
         while self.step(NO_LIMIT):
             pass
@@ -234,18 +259,17 @@ class Lanes:
                 self._budget = min(2 * self._budget, 1 << 20)
             elif now - start > 0.4 * seconds:
                 self._budget = max(self._budget // 2, 16)
-            if not going or now >= end or (self.record is not None and self.record_full):
+            if not going or now >= end or self.record_full:
                 return
 
     @property
     def record_full(self) -> bool:
         """Whether the record must be emptied before the stepper can go on."""
-        left = 0 if self.record is None else len(self.record) - int(self.counters[RECORDED])
-        return self.record is not None and left < (STAGES if self.problem.collocation else 1)
+        left = len(self.record) - int(self.counters[RECORDED])
+        return len(self.record) > 0 and left < (STAGES if self.problem.collocation else 1)
 
     def take_record(self) -> Array:
         """The recorded rows since the last call (a copy); the record is empty afterwards."""
-        assert self.record is not None
         rows = self.record[: int(self.counters[RECORDED])].copy()
         self.counters[RECORDED] = 0
         return rows

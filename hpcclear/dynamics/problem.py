@@ -36,11 +36,6 @@ LEAST_AVERAGED = 10
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
-LOOSEST_COLLOCATION = 10.0**-4.5
-"""Relative tolerance from which "auto" integrates a single response by collocation: the faster method at equal error, and at
-this tolerance the more accurate one by 100 to 1000. At 1e-4 the pair is as fast, and good to 1e-6 m; there collocation takes
-one mechanism of seven, a platform on three loops, so far off that it jams (never in 800 of its variants at 5e-5)."""
-
 STIFF_RAMP = STEEP
 """Friction coefficient over ramp speed, s/m, from which "auto" compiles the implicit method: the steeper, the stiffer."""
 
@@ -293,7 +288,7 @@ def implicit_method(scene: Scene) -> str:
     """When the kernel takes implicit steps: "never", "stiff" (where a lane's motion calls for it), "always".
 
     The automatic choice goes by the scene's numbers, so that a scene that is not stiff pays nothing for the other method.
-    It is the same for a single response and for an ensemble.
+    A response and an ensemble go by the same choice.
     """
     method = scene.numerics.method
     if method == "auto" and scene.modes:
@@ -319,35 +314,24 @@ def _bars_of(scene: Scene) -> Mechanism:
     return planar.linkage_of(scene).mechanism if scene.is_planar else slider_crank_mechanism(scene)
 
 
-def takes_collocation(scene: Scene, single: bool) -> bool:
-    """Whether samples are integrated one by one, by collocation: where it is named, or for a single response.
+def takes_collocation(scene: Scene) -> bool:
+    """Whether samples are integrated one by one, by collocation: where ``numerics.method`` names it.
 
-    So a response and the sample of an ensemble, which takes the pair, agree to the pair's error; with the pair named for both
-    they are the same, also where the motion is chaotic. Looser than `LOOSEST_COLLOCATION` the pair is kept, and for a free
-    linkage whose loops fold flat: it passes that within a ten-thousandth of a turn, which long steps see too late. Where the
-    motion may be stiff, implicit steps are called for. Baumgarte's formulation has the pair alone.
+    "auto" never chooses it, so that a response and the sample of the same design are the same number.
 
     Raises
     ------
     InputError
-        If it is named and cannot be had.
+        If it is named with Baumgarte's formulation, which has Runge-Kutta pairs alone.
     """
-    minimal = scene.numerics.formulation == "minimal"
-    if scene.numerics.method == "lobatto":
-        if not minimal:
-            raise InputError(
-                "numerics.method", "lobatto", "works in minimal coordinates only",
-                'set numerics.formulation = "minimal" or another method',
-            )  # fmt: skip
-        return True
-    automatic = scene.numerics.method == "auto" and implicit_method(scene) == "never"
-    asked = single and automatic and minimal and scene.numerics.rtol <= LOOSEST_COLLOCATION
-    return asked and not (scene.is_planar and _may_fold(planar.linkage_of(scene)))
-
-
-def _may_fold(linkage: Linkage) -> bool:
-    """Whether a linkage has loops that may fold flat under a drive that does not hold it."""
-    return bool(linkage.mechanism.free and linkage.forest.closures)
+    if scene.numerics.method != "lobatto":
+        return False
+    if scene.numerics.formulation != "minimal":
+        raise InputError(
+            "numerics.method", "lobatto", "works in minimal coordinates only",
+            'set numerics.formulation = "minimal" or another method',
+        )  # fmt: skip
+    return True
 
 
 def _cells_of_curves(
@@ -396,7 +380,7 @@ def problem_of(
         torque_table=cells(torque) if isinstance(torque, tuple) else None,
         load_table=cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
-        collocation=takes_collocation(scene, single),
+        collocation=takes_collocation(scene),
         single=single,
         cycle=at.TURN if linkage is None else linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
@@ -407,11 +391,11 @@ def problem_of(
     )
 
 
-def integrator_of(scene: Scene, *, single: bool = False) -> str:
-    """Name of the method that a scene's samples, or its single response, are integrated by."""
+def integrator_of(scene: Scene) -> str:
+    """Name of the method that a scene's responses and samples are integrated by."""
     if coordinate_count(scene) == 0:
         return "closed form"
-    if takes_collocation(scene, single):
+    if takes_collocation(scene):
         return "lobatto"
     name = tableau_of(scene).name
     return {"never": name, "stiff": f"{name} and radau", "always": "radau"}[implicit_method(scene)]

@@ -1,190 +1,94 @@
-"""One response, whole: the motion step by step, and from it forces, energies and time series."""
+"""One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
-import itertools
-from dataclasses import dataclass
+import os
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Records
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY, failed
+from hpcclear.base.outcome import STEADY, Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
-from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.curves import curve_at
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import outcome_records, responses_told
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation import evaluate_records, records_by
+from hpcclear.dynamics.evaluator import KICKS_ALONE, Evaluator, outcome_records, responses_told
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.bending import Bent
-from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.problem import (
-    Problem,
-    coordinate_count,
-    integrator_of,
-    problem_of,
-)
+from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
+from hpcclear.dynamics.recorded import Piece, Recording, Steps, pieces
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import kicked, scales
 from hpcclear.dynamics.steady.telling import recorded
-from hpcclear.dynamics.stepping import record as rec
-from hpcclear.dynamics.views import Parameters, Rates, Start
+from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
-_CHUNK = 8192  # accepted steps kept before they are handed over
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Every accepted step of one response, the start included; arrays over steps (s,)."""
-
-    time: Array
-    turn_time: Array  # since the start of the revolution
-    revolution: Array
-    contacts: Array  # (s, 2 MAX_JOINTS): active flags, then 1/d'_0, valid until the next step
-    works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
-    q: Array  # (s, n)
-    v: Array
-    a: Array
+MOST = 0.5
+"""Share of the machine's memory that the time series of a response may take."""
 
 
 def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
-    """Integrate a scene, or a kicked copy; its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
-    problem = problem_of(scene, ledger=True, series=True, single=True)
-    par = parameters(scene)
-    start = start_states(scene, par, walk=False)
-    if copy:
-        start = kicked(start, scales(scene), range(copy, copy + 1))
-    n = problem.coordinates
-    told = refused_of(scene) if scene.is_planar else None
-    if told is not None:
-        row = _first_row(problem, par[0], start[0], n)
-        return _steps(row, n), failed(0, told[0]), par[0]
-    buffer = np.zeros((_CHUNK, rec.columns(n)))
-    lanes = Lanes(problem, 1, buffer)
-    lanes.queue(par, start, np.zeros(1, np.int64))
-    chunks = []
-    while lanes.pending:
-        lanes.advance(0.2)
-        chunks.append(lanes.take_record())
-    # last: what it calls was compiled beside the stepper
-    rows = np.concatenate([_first_row(problem, par[0], start[0], n), *chunks])
-    labels, out, finished = lanes.collect()
-    return (
-        _steps(rows, n),
-        outcome_records(labels, out, finished, responses_told(problem), bool(problem.effects.wear)),
-        par[0],
-    )
+    """Integrate a scene, or a perturbed replica; all its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
+    recording = Recording(scene, copy)
+    steps = Steps.of(np.concatenate(list(recording.chunks())))
+    return steps, recording.record(), recording.par
 
 
-def _steps(rows: Array, n: int) -> Steps:
-    """Rows of the record by name; a motion that ended where it began has the start twice."""
-    rows = rows if len(rows) > 1 else rows[[0, 0]]
-    s = rec.STATE
-    return Steps(
-        rows[:, rec.TIME],
-        rows[:, rec.TURN_TIME],
-        rows[:, rec.REVOLUTION],
-        rows[:, rec.CONTACTS : rec.DRIVE_WORK],
-        rows[:, rec.DRIVE_WORK : rec.STATE],
-        rows[:, s : s + n],
-        rows[:, s + n : s + 2 * n],
-        rows[:, s + 2 * n :],
-    )
-
-
-def _first_row(problem: Problem, par: Array, start: Start, n: int) -> Array:
-    """The start as a row of the record."""
-    row = np.zeros((1, rec.columns(n)))
-    states = start.state(n)[None]
-    contacts = slice(rec.CONTACTS, rec.DRIVE_WORK)
-    row[0, contacts] = start.contacts
-    row[:, rec.STATE : rec.STATE + 2 * n] = states
-    accelerations, _ = _observed(problem, par, states, row[:, contacts], np.zeros(1))
-    row[:, rec.STATE + 2 * n :] = accelerations
-    return row
-
-
-def _observed(
-    problem: Problem, par: Array, states: Array, contacts: Array, times: Array
-) -> tuple[Array, Rates]:
-    """Accelerations (n) and rates at each instant."""
-    n = problem.coordinates
-    out = np.zeros((len(times), n + Rates.size))
-    states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
-    # by the motion that is compiled anyway
-    width = STAGES if problem.collocation else 1
-    effects = problem.effects._replace(sliding=1) if problem.collocation else problem.effects
-    motion = problem.motion(effects, width).address
-    observe(motion, par, problem.tables, states, contacts, times, out, width)
-    return out[:, :n], Rates(out[:, n:])
-
-
-def _between(
-    steps: Steps, times: Array, cycle: float
-) -> tuple[Array, Array, Array, NDArray[np.intp], Array]:
-    """States, contacts, step index and time within the step at given times.
+def _between(piece: Piece, cycle: float) -> tuple[Array, Array, Array]:
+    """Coordinates and velocities (t, n) at the instants, and how far each lies in its step, from 0 to 1 (t,).
 
     Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
     accurate as the integrator; a free crank's angle restarts every `cycle` and is unwrapped first.
     """
-    q = steps.q.copy()
+    steps, k = piece.steps, piece.k
+    after = np.minimum(k + 1, len(steps.time) - 1)
+    q0, q1 = steps.q[k], steps.q[after]
     if cycle:
-        q[:, -1] += cycle * steps.revolution
-    k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
-    h = (steps.time[k + 1] - steps.time[k])[:, None]
-    safe = np.where(h > 0.0, h, 1.0)  # the last of a motion that stalled, or never began
-    s = (times - steps.time[k])[:, None] / safe
-    d = q[k + 1] - q[k]
-    v0, v1 = h * steps.v[k], h * steps.v[k + 1]
-    a0, a1 = h * h * steps.a[k], h * h * steps.a[k + 1]
+        q0[:, -1] += cycle * steps.revolution[k]
+        q1[:, -1] += cycle * steps.revolution[after]
+    h = (steps.time[after] - steps.time[k])[:, None]
+    h = np.where(h > 0.0, h, 1.0)  # the last of a motion that stalled
+    s = (piece.times - steps.time[k])[:, None] / h
+    d = q1 - q0
+    v0, v1 = h * steps.v[k], h * steps.v[after]
+    a0, a1 = h * h * steps.a[k], h * h * steps.a[after]
     c3 = 10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
     c4 = -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
     c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
-    position = q[k] + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
-    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / safe
-    velocity = np.where(h > 0.0, velocity, steps.v[k])
-    return position, velocity, steps.contacts[k], k, s[:, 0]
+    position = q0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    return position, velocity, s[:, 0]
 
 
-def _works_between(steps: Steps, powers: Array, k: NDArray[np.intp], s: Array) -> Array:
+def _works_between(recording: Recording, piece: Piece, s: Array) -> Array:
     """Works (t, 4) by the cubic through works and powers at both ends of the step."""
-    h = (steps.time[k + 1] - steps.time[k])[:, None]
+    steps, k = piece.steps, piece.k
+    after = np.minimum(k + 1, len(steps.time) - 1)
+    rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
+    ends = np.hstack([steps.q[rows], steps.v[rows]])
+    powers = recording.observe(ends, steps.contacts[rows], steps.turn_time[rows])[1].powers
+    before, behind = np.split(powers[where], 2)
+    h = (steps.time[after] - steps.time[k])[:, None]
     s = s[:, None]
-    w0, w1 = steps.works[k], steps.works[k + 1]
-    p0, p1 = h * powers[k], h * powers[k + 1]
+    w0, w1 = steps.works[k], steps.works[after]
+    p0, p1 = h * before, h * behind
     d = w1 - w0
     return w0 + s * (p0 + s * (3 * d - 2 * p0 - p1 + s * (p0 + p1 - 2 * d)))
 
 
-def instants(scene: Scene, steps: Steps) -> Array:
-    """Times of the output, s, shape (times,): evenly spaced over each revolution, or every accepted step."""
-    count = scene.output.instants_per_revolution
-    if count == 0:
-        return steps.time
-    if steps.time[-1] == steps.time[0]:
-        return steps.time[:1]  # it ended where it began
-    ends = np.flatnonzero(np.diff(steps.revolution) > 0)  # the rows that close a revolution
-    borders = np.concatenate([[0.0], steps.time[ends]])
-    if steps.time[-1] > borders[-1]:
-        borders = np.append(borders, steps.time[-1])
-    parts = [np.linspace(a, b, count, endpoint=False) for a, b in itertools.pairwise(borders)]
-    return np.append(np.concatenate(parts), borders[-1])
-
-
-def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) -> xr.Dataset:
+def simulate(
+    scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
+) -> xr.Dataset:
     """Simulate one scene; time series of the motion, forces and energies.
 
     Parameters
@@ -196,32 +100,34 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
     copy : int
         Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
         motion without clearance has no copies.
+    checked : bool
+        Whether the objective gets a half-width (``objective_uncertainty``), by replicas beside it; never for a copy.
 
     Returns
     -------
     xarray.Dataset
         Kind ``response``: dimensions time and joint, SI units as attributes. Every step before a failure is kept;
-        `status` says how the simulation ended.
+        `status` says how the simulation ended. All scalars are those of the sample of the same design (`hpcclear.evaluate`),
+        bit for bit; those of a copy belong to its series.
 
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene asks for what the kernel cannot do, or for time series that do not fit into memory.
     """
     steady = _steady(scene)
-    if steady is not None:
-        named, scene = scene, _shown(scene, steady)
-    else:
-        named = scene
+    named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
     still = coordinate_count(scene) == 0
     times, data, record = _closed_form(scene) if still else _integrated(scene, copy)
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
-    elif named.numerics.uncertainty and coordinate_count(scene):
-        record["objective_uncertainty"] = evaluate_records(scene, _ITSELF)["objective_uncertainty"]
+    elif not (still or copy):
+        record = _sample(scene, objective, checked, record)
+    half_width = record["objective_uncertainty"]  # of the objective already
     record = asked(record, objective)
+    record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
@@ -233,13 +139,28 @@ def simulate(scene: Scene, objective: Objective | None = None, copy: int = 0) ->
         {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
-        | {"integrator": integrator_of(scene, single=True)}
-        | {"transient_revolutions": scene.numerics.transient_revolutions}
+        | {"integrator": integrator_of(scene)}
+        | {"transient_revolutions": str(scene.numerics.transient_revolutions)}
         | _reason(scene),
         objective,
         labels,
         _dimensions(scene),
     )
+
+
+def _sample(scene: Scene, objective: Objective, checked: bool, series: Records) -> Records:
+    """The record (1,) of the scene as the only sample of an ensemble.
+
+    The motion of the time series is compiled with works and powers in it. Products that these share with the forces are
+    rounded there (else they stand in a fused multiply-add), so that in some linkages its last bits are other ones; where the
+    motion is chaotic it parts from the sample after some impacts. Its f is no worse, but it is not the sample's.
+    """
+    status = Status(int(series["status"][0]))
+    if status is Status.STEP_CAP:
+        return series  # as many steps again would come to the same
+    kicks = KICKS_ALONE if checked and status.valid else ()
+    evaluator = Evaluator(scene, _ITSELF, kicks=kicks, objective=objective)
+    return records_by(evaluator, _ITSELF)
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
@@ -311,25 +232,62 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
 
 def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
-    steps, record, par = integrate(scene, copy)
-    times = instants(scene, steps)
-    problem = problem_of(scene, ledger=True, series=True, single=True)
+    recording = Recording(scene, copy)
+    count = scene.output.instants_per_revolution
+    problem = recording.problem
+    parts: list[dict[str, Array]] = []
+    taken = 0
+    for piece in pieces(recording.chunks(), count):
+        series = {"time": piece.times, **_series_between(scene, recording, piece)}
+        # copies: a column that is a view would keep all that was observed
+        parts.append({name: one.copy() for name, one in series.items()})
+        taken += len(piece.times)
+        least = max(taken, count * (problem.transient + problem.averaged))
+        _refuse_what_does_not_fit(least * _bytes_an_instant(parts[0]), count)
+    data = {}
+    for name in list(parts[0]):
+        data[name] = np.concatenate([part.pop(name) for part in parts])
+    data["energy_residual"] -= data["energy_residual"][0]
+    return data.pop("time"), data, recording.record()
+
+
+def _bytes_an_instant(part: dict[str, Array]) -> float:
+    return sum(one.nbytes for one in part.values()) / max(len(part["time"]), 1)
+
+
+def _refuse_what_does_not_fit(size: float, count: int) -> None:
+    """Raise InputError where time series of so many bytes would take more than `MOST` of the machine's memory."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if size > MOST * memory:
+        raise InputError(
+            "output.instants_per_revolution",
+            count,
+            f"makes time series of {size / 1e9:.3g} GB or more; this machine has {memory / 1e9:.3g} GB of memory",
+            "write fewer instants a revolution (0 writes every accepted step), or simulate fewer revolutions; "
+            "hpcclear sample keeps no time series",
+        )
+
+
+def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[str, Array]:
+    """Every time series at the instants of a piece."""
+    problem, par, times = recording.problem, recording.par, piece.times
     turning = bool(at.rules_of(problem.effects).turning)  # the crank angle is the last coordinate
-    q, v, contacts, k, s = _between(steps, times, problem.cycle if turning else 0.0)
-    turn_time = times - np.interp(np.arange(len(steps.time)), *_turn_starts(steps))[k]
-    in_turn = _in_turn(q, steps.revolution[k], problem.cycle if turning else 0.0)
-    states = np.hstack([in_turn, v])
-    accelerations, rates = _observed(problem, par, states, contacts, turn_time)
-    ends = np.hstack([steps.q, steps.v])
-    at_steps = _observed(problem, par, ends, steps.contacts, steps.turn_time)[1]
+    cycle = problem.cycle if turning else 0.0
+    q, v, s = _between(piece, cycle)
+    steps, k = piece.steps, piece.k
+    revolution, contacts = steps.revolution[k], steps.contacts[k]
+    turn_time = times - (steps.time - steps.turn_time)[k]
+    in_turn = _in_turn(q, revolution, cycle)
+    accelerations, rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time)
+    works = _works_between(recording, piece, s)
     n = problem.coordinates - scene.bristles
-    works = _works_between(steps, at_steps.powers, k, s)
     q, v, in_turn, accelerations = (
         one[:, scene.bristles :] for one in (q, v, in_turn, accelerations)
     )
     if scene.is_planar:
-        seen = Seen(in_turn, v, turn_time, steps.revolution[k], contacts, rates, works)
-        return times, planar_series(scene, par, seen), record
+        return planar_series(
+            scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works)
+        )
     first, second, free = topology(scene)
     nine = scene.numerics.formulation == "baumgarte"
     phi, omega = TURN * times / Parameters(par).period, np.full_like(times, Parameters(par).speed)
@@ -350,11 +308,7 @@ def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Recor
     data |= _series(scene, m, par, rates, contacts, works, bar)
     if bar is not None:
         data |= mode_series(scene.modes, q, v, bar.strain)
-    return (
-        times,
-        data | {"crank_angle": phi, "crank_speed": omega, "slider_acceleration": slider},
-        record,
-    )
+    return data | {"crank_angle": phi, "crank_speed": omega, "slider_acceleration": slider}
 
 
 def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
@@ -363,12 +317,6 @@ def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
         q = q.copy()
         q[:, -1] -= cycle * revolution
     return q
-
-
-def _turn_starts(steps: Steps) -> tuple[Array, Array]:
-    """Index and value of the time at which the revolution of each step interval began, for `numpy.interp`."""
-    index = np.arange(len(steps.time), dtype=float)
-    return index, steps.time - steps.turn_time
 
 
 def _series(

@@ -46,6 +46,10 @@ _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 # Building
 
 
+NOT_CHECKED = "not checked: no replicas were simulated (numerics.uncertainty)"
+"""Value of the attribute ``objective_half_width`` of files whose objective has none."""
+
+
 def dataset(
     kind: str,
     coords: Mapping[str, ArrayLike],
@@ -237,7 +241,16 @@ def samples_dataset(
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)
-    return dataset("samples", coords, data, attributes, units, objective, words)
+    told = {**(attributes or {}), **_checked(data)}
+    return dataset("samples", coords, data, told, units, objective, words)
+
+
+def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
+    """The global attribute that says where the half-width of the objective stands, or that there is none."""
+    for name in ("objective_limit", "objective_uncertainty"):
+        if np.isfinite(np.asarray(data.get(name, np.nan), float)).any():
+            return {"objective_half_width": name}
+    return {"objective_half_width": NOT_CHECKED}
 
 
 def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
@@ -286,7 +299,8 @@ def response_dataset(
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
     coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
-    return dataset("response", coords, data, attributes, objective=objective)
+    told = {**(attributes or {}), **_checked(data)}
+    return dataset("response", coords, data, told, objective=objective)
 
 
 def timing_dataset(

@@ -21,10 +21,9 @@ class Numerics(Table):
     method: Literal[
         "auto", "tsitouras", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"
     ] = "auto"
-    """Integrator; "lobatto" takes one sample after the other, "switching" takes implicit steps where the motion is stiff,
-    "radau" always, "auto" as "switching" in scenes with steep friction ramps, strong damping, oil or bristles, as "radau"
-    where bars bend in modes too fast for explicit steps, in others
-    "lobatto" for a single response with rtol up to 3e-5 and else "tsitouras"."""
+    """Integrator, of responses and samples alike; "lobatto" takes one sample after the other, "switching" takes implicit steps
+    where the motion is stiff, "radau" always, "auto" as "switching" in scenes with steep friction ramps, strong damping, oil
+    or bristles, as "radau" where bars bend in modes too fast for explicit steps, as "tsitouras" in others."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
@@ -50,7 +49,8 @@ class Numerics(Table):
     """Accepted and rejected steps of one sample together; beyond it the sample ends with status
     STEP_CAP."""
     uncertainty: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also reports how far its objective may be off, by copies of tighter tolerance, kicked by 1e-10."""
+    """Whether each sample also reports the half-width of its objective, by replicas of tighter tolerance, their starts
+    perturbed by 1e-10. A single response (`hpcclear simulate`) always does."""
     energy: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also closes its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False
@@ -67,4 +67,5 @@ class Output(Table):
     """What `simulate` writes."""
 
     instants_per_revolution: Annotated[int, Count(0, 10**6)] = 720
-    """Instants a revolution, evenly spaced in crank angle; 0 writes every accepted step."""
+    """Instants a revolution, evenly spaced in time; 0 writes every accepted step. Time series larger than half of the machine's
+    memory are refused."""

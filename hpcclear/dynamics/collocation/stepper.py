@@ -1,4 +1,4 @@
-"""The stepper of a single response: one step of Lobatto collocation after the other.
+"""The stepper of `numerics.method = "lobatto"`: one sample after the other, one step of Lobatto collocation after the other.
 
 State, books and outcome are those of the block stepper with one lane, and so are the functions around a step; what
 differs is the step itself, and that contacts which begin or end inside it are found at its nodes.
@@ -354,13 +354,12 @@ def advance(special, rules, block, queue, method, record, m, budget):
 
 
 @cache
-def make_collocation_stepper(*, recorded: bool = False) -> Any:
-    """Return the compiled stepper of one response, whatever its coordinates and joints.
+def make_collocation_stepper() -> Any:
+    """Return the compiled stepper of one sample at a time, whatever its coordinates and joints.
 
     Its arguments are those of `stepper.make_stepper` with an implicit method, but for its codes, of which it takes the address
     of `special.special_code` alone; the tableau is not read,
     and `memory` is what `lobatto.new_memory` makes.
     """
-    known: dict[str, Any] = {} if recorded else {"record": None}
-    text = one_text(advance, "collocation", **known)
+    text = one_text(advance, "collocation")
     return njit(error_model="numpy", fastmath=FASTMATH, cache=True)(text)  # type: ignore[no-any-return]

@@ -107,17 +107,15 @@ class Codes(NamedTuple):
 
 
 @cache
-def make_stepper(W: int, *, recorded: bool = False, implicit: bool = False) -> Any:
+def make_stepper(W: int, *, implicit: bool = False) -> Any:
     """Return the compiled stepper for W lanes, of any number of coordinates and any joints.
 
-    Its arguments: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`, `layout.Method`; if
-    `recorded` an array for the steps of lane 0; if `implicit` the memory of the implicit method (see `radau.new_memory`); and
-    the budget: how many block steps to take at most. It returns True while lanes are running. W = 1 is the single
-    response; ensembles want at least twice the vector length.
+    Its arguments: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`, `layout.Method`; an
+    array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the implicit method (see
+    `radau.new_memory`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
+    response and an ensemble call the same machine code; ensembles want at least twice the vector length.
     """
     known: dict[str, Any] = {"W": W}
-    if not recorded:
-        known["record"] = None
     if not implicit:
         known["memory"] = None
     text = one_text(advance, f"stepper_{W}", **known)

@@ -55,7 +55,7 @@ def followed(
     path = ideal_path(mechanism, place) if play else None
     if path is not None:
         cycle = at.TURN * turns_of(tables_of(scene))
-        ideal = path(np.mod(phase - phase[0], cycle) / cycle)
+        ideal = path(np.mod(phase, cycle) / cycle)
         found["path_error"] = np.abs(x + 1j * y - ideal)
     return found
 

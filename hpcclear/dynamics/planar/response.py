@@ -68,7 +68,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
 def balance_series(
     stored: tuple[Array, Array, Array, Array | float], works: Array
 ) -> dict[str, Array]:
-    """Series of the energy balance, J, and what it does not close by.
+    """Series of the energy balance, J, and what it does not close by, from which its value at the start has to be taken.
 
     `stored`: kinetic energy, that of contacts, that of gravity and springs, and that of bent bars. `works` (t, 4): done
     by drives, its absolute value, dissipated, and done by loads.
@@ -83,7 +83,7 @@ def balance_series(
         "driving_work": driving,
         "load_work": load,
         "dissipated_energy": dissipated,
-        "energy_residual": total - total[0] - driving - load + dissipated,
+        "energy_residual": total - driving - load + dissipated,
     }
 
 

@@ -1,4 +1,4 @@
-"""Keeping every accepted step of a single response: the raw material of time series. Off in ensembles."""
+"""The accepted steps of one sample, of which time series are made. Ensembles pass a record without rows, which keeps none."""
 
 from hpcclear.base.eight import combined, nine_rows, put
 from hpcclear.base.jit import lane_function
@@ -20,9 +20,11 @@ def columns(n: int) -> int:
 
 @lane_function
 def record_step(record, counters, work, stages, book, n, W):
-    """Append the new state of lane 0 to `record`; True when it is full and the stepper must return."""
-    if record is not None:
-        if work[at.ACCEPT * W] * work[at.RUNNING * W] == 1.0:
+    """Append the new state of the first sample of the queue, in lane 0, to `record`; True when it is full and the stepper must
+    return. The steps of samples beside or behind it are not recorded."""
+    full = False
+    if record.shape[0] > 0:
+        if work[at.ACCEPT * W] * work[at.RUNNING * W] == 1.0 and book[at.SAMPLE * W] == 0.0:
             row = counters[RECORDED]
             record[row, TIME] = book[at.ELAPSED * W] + work[at.TIME * W]
             record[row, TURN_TIME] = work[at.TIME * W]
@@ -38,15 +40,14 @@ def record_step(record, counters, work, stages, book, n, W):
                 record[row, STATE + n + k] = work[(at.V + k) * W]
                 record[row, STATE + 2 * n + k] = stages[k * W]
             counters[RECORDED] = row + 1
-        return counters[RECORDED] >= record.shape[0]
-    else:
-        return False
+        full = counters[RECORDED] >= record.shape[0]
+    return full
 
 
 @lane_function
 def record_nodes(record, counters, work, m, book, n):
     """Append the inner nodes of a step of collocation, which stand in the lanes of `m`, before it is committed."""
-    if record is not None:
+    if record.shape[0] > 0 and book[at.SAMPLE] == 0.0:
         for i in range(STAGES - 1):
             row = counters[RECORDED] + i
             turn_time = m[at.STAGE_TIME * STAGES + i]
@@ -75,7 +76,4 @@ def record_nodes(record, counters, work, m, book, n):
 @lane_function
 def no_room(record, counters):
     """Whether another step of collocation might not fit into `record`."""
-    if record is not None:
-        return counters[RECORDED] + STAGES > record.shape[0]
-    else:
-        return False
+    return record.shape[0] > 0 and counters[RECORDED] + STAGES > record.shape[0]

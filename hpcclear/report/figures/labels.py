@@ -80,6 +80,32 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
     return f"{value * chosen.factor:.{digits}g}{unit}"
 
 
+NOT_CHECKED = "not checked"
+"""What stands in place of a half-width that nobody simulated."""
+
+_MOST_DIGITS = 6
+
+
+def with_half_width(value: float, half_width: float, units: str) -> str:
+    """A number with its half-width, "20.9 ± 1.2 µm": no more digits than two of the half-width; without one `NOT_CHECKED`."""
+    if not np.isfinite(value):
+        return "–"
+    if not np.isfinite(half_width):
+        return f"{quantity(value, units)}, {NOT_CHECKED}"
+    chosen = scale(units, value)
+    shown, width = value * chosen.factor, half_width * chosen.factor
+    unit = "" if chosen.unit == "–" else f" {chosen.unit}"
+
+    def places(number: float, digits: int) -> int:
+        return digits - 1 - int(np.floor(np.log10(number))) if number > 0.0 else digits
+
+    least = places(abs(shown), _MOST_DIGITS)
+    decimals = max(min(places(width, 2), least) if width > 0.0 else least, 0)
+    step = 10.0**-decimals
+    rounded = np.ceil(width / step - 1e-9) * step  # up: a half-width is no narrower than it is
+    return f"{shown:.{decimals}f} ± {rounded:.{decimals}f}{unit}"
+
+
 def between(low: float, high: float, units: str) -> str:
     """From where to where limits reach, told so far that they differ."""
     for digits in range(4, 8):

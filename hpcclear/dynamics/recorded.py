@@ -1,0 +1,210 @@
+"""The accepted steps of one sample as they come, and the states at the output's instants between them.
+
+Steps are worked off revolution by revolution, so that memory goes with the instants and not with the steps: whatever a light
+body does, at most `most_kept` steps of an unfinished revolution are held.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.base.arrays import Array, Booleans, Records
+from hpcclear.base.beside import compiled_beside
+from hpcclear.base.outcome import failed
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
+from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import refused_of
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.views import Rates
+from hpcclear.scene import Scene
+
+CHUNK = 8192
+"""Accepted steps between two visits to the stepper."""
+
+LEAST_KEPT = 1 << 16
+"""Steps of an unfinished revolution that are held before any is dropped."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Accepted steps of one response in their order; arrays over steps (s,)."""
+
+    time: Array
+    turn_time: Array  # since the start of the revolution
+    revolution: Array
+    contacts: Array  # (s, 2 MAX_JOINTS): active flags, then 1/d'_0, valid until the next step
+    works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
+    q: Array  # (s, n)
+    v: Array
+    a: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> "Steps":
+        """Those of rows of the record (s, columns)."""
+        s, n = rec.STATE, (rows.shape[1] - rec.STATE) // 3
+        return cls(
+            rows[:, rec.TIME],
+            rows[:, rec.TURN_TIME],
+            rows[:, rec.REVOLUTION],
+            rows[:, rec.CONTACTS : rec.DRIVE_WORK],
+            rows[:, rec.DRIVE_WORK : rec.STATE],
+            rows[:, s : s + n],
+            rows[:, s + n : s + 2 * n],
+            rows[:, s + 2 * n :],
+        )
+
+
+class Recording:
+    """One sample of a scene in the lanes of an ensemble, its accepted steps kept.
+
+    Parameters
+    ----------
+    scene : Scene
+    copy : int
+        Perturb the start in the direction of this number (`hpcclear.dynamics.steady.copies`); 0 does not.
+    """
+
+    def __init__(self, scene: Scene, copy: int = 0) -> None:
+        self._scene = scene
+        self.problem = problem_of(scene, ledger=True, series=True)
+        self._par = parameters(scene)
+        self._start = start_states(scene, self._par, walk=False)
+        self._refused = refused_of(scene) if scene.is_planar else None
+        if copy:
+            self._start = kicked(self._start, scales(scene), range(copy, copy + 1))
+        buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
+        self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer)
+
+    @property
+    def par(self) -> Array:
+        """Kernel parameters, shape (PARAMETERS,)."""
+        par: Array = self._par[0]
+        return par
+
+    def chunks(self) -> Iterator[Array]:
+        """Integrate; yield rows of the record (m, columns), the start first. To be called once.
+
+        Of a linkage that cannot turn there is the start alone.
+        """
+        if self._refused is not None:
+            yield self._first_row()
+            return
+        lanes = self._lanes
+        lanes.queue(self._par, self._start, np.zeros(1, np.int64))
+        ensemble = Lanes(problem_of(self._scene), DEFAULT_LANES)
+        with compiled_beside(ensemble.motions):  # which gives the scalars
+            lanes.step(0)
+        yield self._first_row()
+        while lanes.pending:
+            lanes.advance(0.2)
+            yield lanes.take_record()
+
+    def _first_row(self) -> Array:
+        n = self.problem.coordinates
+        row = np.zeros((1, rec.columns(n)))
+        contacts = slice(rec.CONTACTS, rec.DRIVE_WORK)
+        row[0, contacts] = self._start[0].contacts
+        row[0, rec.STATE : rec.STATE + 2 * n] = self._start[0].state(n)
+        states = row[:, rec.STATE : rec.STATE + 2 * n]
+        row[:, rec.STATE + 2 * n :] = self.observe(states, row[:, contacts], np.zeros(1))[0]
+        return row
+
+    def observe(self, states: Array, contacts: Array, turn_time: Array) -> tuple[Array, Rates]:
+        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS) and times in the revolution (t,)."""
+        out = self._lanes.observe(self.par, states, contacts, turn_time)
+        n = self.problem.coordinates
+        return out[:, :n], Rates(out[:, n:])
+
+    def record(self) -> Records:
+        """The outcome (1,) of the recorded sample, once all chunks were taken."""
+        if self._refused is not None:
+            return failed(0, self._refused[0])
+        labels, outcome, par = self._lanes.collect()
+        told, worn = responses_told(self.problem), bool(self.problem.effects.wear)
+        return outcome_records(labels, outcome, par, told, worn)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Some instants of the output (t,), and the steps (s,) that they lie between."""
+
+    times: Array
+    steps: Steps
+    k: NDArray[np.intp]  # (t,): each lies in the step that begins with row k
+
+
+def pieces(chunks: Iterable[Array], count: int) -> Iterator[Piece]:
+    """Distribute instants over the steps, in their order, a piece for some revolutions.
+
+    Parameters
+    ----------
+    chunks : iterable of ndarray, shape (m, columns)
+        Of `Recording.chunks`.
+    count : int
+        Instants a revolution, evenly spaced in time from its start to its end; the last revolution ends with the last step. 0:
+        every step is an instant.
+    """
+    most_kept = max(LEAST_KEPT, 8 * count)
+    rows: Array | None = None
+    for chunk in chunks:
+        if rows is None:
+            rows, broken = chunk, np.zeros(len(chunk), bool)
+            continue
+        rows = np.concatenate([rows, chunk])
+        broken = np.concatenate([broken, np.zeros(len(chunk), bool)])
+        if count == 0:
+            done = len(rows) - 1
+        else:
+            closing = np.flatnonzero(np.diff(rows[:, rec.REVOLUTION]) > 0)
+            done = int(closing[-1]) if len(closing) else 0
+        if done:
+            yield _piece(rows[: done + 1], broken, count, last=False)
+            rows, broken = rows[done:], broken[done:]
+        while len(rows) > most_kept:
+            rows, broken = _thinned(rows, broken)
+    assert rows is not None
+    yield _piece(rows, broken, count, last=True)
+
+
+def _piece(rows: Array, broken: Booleans, count: int, *, last: bool) -> Piece:
+    """Instants from the first of these rows to the last, which is an instant itself if it is the `last` of all."""
+    steps = Steps.of(rows)
+    if count == 0:
+        times = steps.time if last else steps.time[:-1]
+    else:
+        closing = np.flatnonzero(np.diff(steps.revolution) > 0)
+        borders = steps.time[np.unique([0, *closing, len(rows) - 1])]
+        parts = [
+            np.linspace(a, b, count, endpoint=False)
+            for a, b in itertools.pairwise(borders)
+        ]
+        times = np.concatenate([*parts, borders[-1:] if last else []])
+    k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, max(len(rows) - 2, 0))
+    if broken.any():  # an instant where steps were dropped moves to the next that were not
+        dropped = broken[np.minimum(k + 1, len(rows) - 1)]
+        k = k + dropped
+        times = np.where(dropped, steps.time[k], times)
+    return Piece(times, steps, k)
+
+
+def _thinned(rows: Array, broken: Booleans) -> tuple[Array, Booleans]:
+    """Drop half of the rows where steps are shortest, a quarter of all; `broken`: before which rows some are missing.
+
+    Of four rows the first two stay, which keep a step whole. What was thinned before has an even number of rows, so that its
+    pairs stay together.
+    """
+    quads = (len(rows) - 1) // 4
+    begins = rows[: 4 * quads + 1 : 4, rec.TIME]
+    spans = np.diff(begins)
+    keep = np.ones(len(rows), bool)
+    of_quads = keep[: 4 * quads].reshape(quads, 4)
+    of_quads[spans <= np.median(spans), 2:] = False
+    after_gap = np.concatenate([[False], ~keep[:-1]])
+    return rows[keep], (broken | after_gap)[keep]

@@ -1,0 +1,135 @@
+"""A response and the sample of the same design are the same number, and what is printed of it says how sure it is."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import hpcclear
+from hpcclear.cli import cli
+from hpcclear.dynamics.problem import coordinate_count
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.samples import run_sample
+from hpcclear.ensemble.session import Options
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.figures.labels import with_half_width
+from hpcclear.scene import Scene, load_scene
+
+JOBS = Path(__file__).parents[1] / "jobs"
+SHORT = {"numerics.transient_revolutions": 1, "numerics.averaged_revolutions": 1}
+SPREAD = ("slider_crank.toml", "linkages/quick_return.toml", "linkages/v_twin.toml")
+STIFF = {"effects.friction": {"law": "coulomb", "coefficient": 0.3, "ramp_speed": 1e-4}}
+
+
+def scene_of(name: str) -> Scene:
+    scene = load_scene(JOBS / name)
+    return scene.with_({"study": None} if scene.study is not None else {})
+
+
+def scenes():
+    for path in sorted(JOBS.rglob("*.toml")):
+        name = str(path.relative_to(JOBS))
+        yield pytest.param(name, marks=[] if name in SPREAD else [pytest.mark.full])
+
+
+def differing(scene: Scene) -> list[str]:
+    """Scalars, and numbers at joints, whose bytes are not those of the sample of the same design."""
+    path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))
+    sample = hpcclear.evaluate(scene, {path: [scene.number(path)]}).isel(sample=0)
+    response = hpcclear.simulate(scene)
+    common = [
+        name
+        for name, one in sample.data_vars.items()
+        if name in response and name != "objective_uncertainty" and "role" not in one.attrs
+    ]
+    assert {"objective", "mean_gap", "peak_contact_force", "latched", "status"} <= set(common)
+    return [n for n in common if response[n].to_numpy().tobytes() != sample[n].to_numpy().tobytes()]
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_a_response_has_the_bits_of_the_sample(name: str):
+    scene = scene_of(name).with_(SHORT)
+    assert coordinate_count(scene)
+    assert differing(scene) == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"numerics.method": "lobatto"}, pytest.param(STIFF, marks=pytest.mark.full)],
+    ids=["lobatto", "stiff"],
+)
+def test_so_it_has_by_other_methods(changes: dict):
+    assert differing(scene_of("slider_crank.toml").with_(SHORT | changes)) == []
+
+
+def simulated(tmp_path: Path, *changes: str) -> str:
+    """What `simulate` prints of a scene of ten chaotic revolutions."""
+    words = [word for change in changes for word in ("--set", change)]
+    scene = str(JOBS / "linkages/quick_return.toml")
+    done = CliRunner().invoke(
+        cli, ["simulate", scene, "-o", str(tmp_path / "r.nc"), *words], standalone_mode=False
+    )
+    return " ".join(done.stdout.replace("+-", "±").split())
+
+
+def test_a_chaotic_response_is_printed_with_the_half_width_that_its_replicas_give(tmp_path: Path):
+    """As shipped it has 20.9 um by one method and 18.6 um by another; other pairs and tolerances are the oracle."""
+    shown = simulated(tmp_path)
+    f, half_width = map(float, re.search(r"objective f ([\d.]+) ± ([\d.]+)", shown).groups())
+    assert half_width > 0.01 * f
+    assert "sensitive to initial conditions" in shown
+    scene = scene_of("linkages/quick_return.toml")
+    others = (("dormand-prince", 1e-6), ("fehlberg", 1e-6), ("tsitouras", 1e-5), ("tsitouras", 1e-7))
+    found = [
+        scene.with_({"numerics.method": method, "numerics.rtol": rtol}) for method, rtol in others
+    ]
+    off = [abs(float(simulate(one, checked=False)["objective"]) * 1e6 - f) for one in found]
+    assert sum(one < half_width for one in off) >= 3  # of four that are inside with 96 % each
+    assert max(off) > 0.01 * f  # or there would be nothing to print it for
+
+
+def test_a_regular_response_is_printed_without_a_warning(tmp_path: Path):
+    quiet = [f"joints.{joint}.clearance=0.01 mm" for joint in ("crank_rod", "rod_slider")]
+    words = [word for change in (*quiet, "drive.speed=60 rpm") for word in ("--set", change)]
+    scene = str(JOBS / "slider_crank.toml")
+    done = CliRunner().invoke(
+        cli, ["simulate", scene, "-o", str(tmp_path / "r.nc"), *words], standalone_mode=False
+    )
+    assert re.search(r"objective f +[\d.]+ (±|\+-) [\d.]+", done.stdout)
+    assert "sensitive" not in done.stdout
+
+
+def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Path, capsys):
+    from hpcclear.cli.printing import describe_samples
+
+    for on, words in ((False, "not checked"), (True, "median")):
+        scene = load_scene(JOBS / "quickstart.toml").with_(
+            SHORT | {"study.samples": 3, "numerics.uncertainty": on}
+        )
+        found = run_sample(scene, tmp_path / f"{on}.nc", alone(), options=Options(style="quiet"))
+        assert found.content.attrs["objective_half_width"].startswith(
+            "objective_uncertainty" if on else "not checked"
+        )
+        describe_samples(found)
+        line = next(x for x in capsys.readouterr().out.splitlines() if "half-width of f" in x)
+        assert words in line
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "shown"),
+    [
+        (2.0894e-5, 1.23e-6, "20.9 ± 1.3 µm"),
+        (2.0894e-5, 1.2e-5, "21 ± 12 µm"),
+        (2.0894e-5, 2.5e-4, "21 ± 250 µm"),
+        (2.85510342e-4, 8.4929e-8, "0.285510 ± 0.000085 mm"),
+        (5.24434806e-6, 6.1e-12, "5.24435 ± 0.00001 µm"),
+        (1.9731e3, 0.0, "1.97310 ± 0.00000 kN"),
+        (2.0894e-5, np.nan, "20.89 µm, not checked"),
+        (np.nan, np.nan, "–"),
+    ],
+)
+def test_no_more_digits_than_the_half_width_supports(value: float, half_width: float, shown: str):
+    unit = "N" if value > 1.0 else "m"
+    assert with_half_width(value, half_width, unit) == shown
