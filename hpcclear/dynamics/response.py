@@ -140,7 +140,7 @@ def simulate(
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
-        | {"transient_revolutions": str(scene.numerics.transient_revolutions)}
+        | {"transient_revolutions": scene.numerics.transient_revolutions}
         | _reason(scene),
         objective,
         labels,
@@ -172,7 +172,7 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
 
 
-def _reason(scene: Scene) -> dict[str, str]:
+def _reason(scene: Scene) -> dict[str, str | int]:
     """Where a linkage that cannot turn locks, as an attribute."""
     told = refused_of(scene) if scene.is_planar else None
     return {} if told is None else {"ended": told[1].reason}
