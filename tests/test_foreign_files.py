@@ -1,4 +1,4 @@
-"""Files of other people: what they name is not opened, what they hold commands no terminal, and no cache of theirs is loaded."""
+"""Files of other people: those they name are not opened, their text commands no terminal, their cache is not loaded."""
 
 import json
 import os
@@ -71,7 +71,9 @@ def test_no_file_that_the_scene_of_a_result_names_is_opened(tmp_path, secret, mo
     assert SECRET not in done.output
     assert str(secret) not in opened
     said = [line.split(": ") for line in done.output.splitlines()]
-    assert [words[0] for words in said] == [f"{name}.nc" for name in "abcde"]  # none stops the others
+    assert [words[0] for words in said] == [
+        f"{name}.nc" for name in "abcde"
+    ]  # none stops the others
     assert all(words[1] == "not simulated" for words in said)
     assert "names a file" in said[0][2]
     assert "names a file" in said[1][2]
@@ -276,7 +278,11 @@ def test_a_named_cache_needs_no_directory_for_temporary_files(tmp_path, monkeypa
 
 def test_where_nothing_can_be_kept_a_temporary_folder_goes_at_the_end(tmp_path):
     code = "from hpcclear.base.private import private_folder; print(private_folder('HPCCLEAR_CACHE').is_dir())"
-    known = {"HPCCLEAR_CACHE": "/proc/nowhere", "XDG_CACHE_HOME": "/proc/nowhere", "TMPDIR": str(tmp_path)}
+    known = {
+        "HPCCLEAR_CACHE": "/proc/nowhere",
+        "XDG_CACHE_HOME": "/proc/nowhere",
+        "TMPDIR": str(tmp_path),
+    }
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=crowded(60.0),
         env=os.environ | {"PYTHONPATH": str(ROOT)} | known,

@@ -97,8 +97,13 @@ def test_a_scene_that_is_none_is_refused(made, tmp_path):
         content.attrs["scene"] = "mechanism = 3"
 
     for change in (forge, strip):
+        found = changed(
+            made, tmp_path, "samples.nc", change
+        )  # in a directory the others are compared all the same
+        assert found["unread"]
+        assert str(found["told"]).startswith("not simulated")
         with pytest.raises(InputError):
-            changed(made, tmp_path, "samples.nc", change)
+            list(repeated(tmp_path / "samples.nc", 5))
     assert write_crate(tmp_path).exists()
 
 

@@ -97,7 +97,8 @@ LEAST_BESIDE_OTHERS = 900
 def check_address_space(others: bool = False) -> None:
     """Raise LimitError where the process may not have enough address space (``ulimit -v``) to load everything.
 
-    `others`: other ranks run beside it. Asked before anything is loaded: out of memory amid an import Python 3.11 may raise the error for ever.
+    `others`: other ranks run beside it. To be called before anything is loaded: out of memory amid an import Python 3.11
+    may raise the error for ever.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     least = LEAST_BESIDE_OTHERS if others else LEAST_ADDRESS_SPACE

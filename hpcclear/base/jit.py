@@ -86,7 +86,9 @@ def _chosen_folder() -> str:
     if not why:
         return named
     folder = str(cache_folder())
-    remark(f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}")
+    remark(
+        f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
+    )
     return folder
 
 

@@ -1,6 +1,7 @@
 """A folder that only its user can write to, for what is loaded without being checked, such as compiled code."""
 
 import atexit
+import contextlib
 import getpass
 import grp
 import os
@@ -36,7 +37,7 @@ def private_folder(variable: str) -> Path:
     InputError
         Nothing can be written anywhere.
     """
-    refusals = []
+    refusals: list[str] = []
     for candidate in _candidates(variable):
         why = _refusal(candidate)
         if not why:
@@ -51,7 +52,9 @@ def private_folder(variable: str) -> Path:
         remedy = "Set it to a directory of your own on a disk with room"
         raise InputError(variable, os.environ.get(variable), reason, remedy) from None
     atexit.register(shutil.rmtree, last, ignore_errors=True)
-    remark(f"Warning: {'; '.join(refusals)}. Compiled code is not kept: every command compiles anew")
+    remark(
+        f"Warning: {'; '.join(refusals)}. Compiled code is not kept: every command compiles anew"
+    )
     return last
 
 
@@ -60,14 +63,11 @@ def _candidates(variable: str) -> Iterator[Path]:
     if os.environ.get(variable):
         yield Path(os.environ[variable]).absolute() / name
     else:
-        try:
+        with contextlib.suppress(OSError):  # it looks for a place that can be written to
             yield Path(tempfile.gettempdir()).absolute() / name
-        except OSError:  # it looks for a place that can be written to
-            pass
-    try:
-        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "hpcclear"
-    except RuntimeError:  # a user without a home
-        pass
+    with contextlib.suppress(RuntimeError):  # a user without a home
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        yield home.absolute() / "hpcclear"
 
 
 def _refusal(folder: Path) -> str:

@@ -103,7 +103,7 @@ def _numbers_in_silence() -> Iterator[None]:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of both ``hpcclear`` and ``python -m hpcclear``; ends the process with the exit code."""
     listen(say)
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
         try:

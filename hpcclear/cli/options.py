@@ -48,7 +48,9 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
 
 def output_option(words: str, required: bool = True) -> Callable[[Any], Any]:
     """The option that names the file that results go to."""
-    return click.option("-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name)
+    return click.option(
+        "-o", "--output", type=PATH, required=required, help=words, callback=_netcdf_name
+    )
 
 
 def directory_option(words: str) -> Callable[[Any], Any]:
@@ -64,7 +66,9 @@ def flag(name: str, words: str) -> Callable[[Any], Any]:
 class Amount(click.FloatRange):
     """A number within bounds; "nan" is none."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         """Return the number, or raise BadParameter."""
         number: float = super().convert(value, param, ctx)
         if math.isnan(number):

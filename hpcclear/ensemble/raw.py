@@ -68,9 +68,7 @@ class RawFiles:
     @staticmethod
     def missing(folder: Path, blocks: Iterable[int]) -> list[str]:
         """Names of the files of some blocks that are not in a directory."""
-        return [
-            name for name in map(RawFiles._name, blocks) if not (folder / name).is_file()
-        ]
+        return [name for name in map(RawFiles._name, blocks) if not (folder / name).is_file()]
 
     @staticmethod
     def _name(number: int) -> str:

@@ -184,7 +184,9 @@ class _Streaming:
         elif earlier is not None:
             self._sums.restore(earlier)
             if raw is not None and (gone := RawFiles.missing(raw, self._whole_blocks())):
-                session.tell(f"{gone[0]} is missing in {raw}: what was summed up is simulated again")
+                session.tell(
+                    f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
+                )
                 self._sums = self._new_sums()
         self._saved = time.monotonic()
 

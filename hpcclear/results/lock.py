@@ -165,7 +165,9 @@ class Lock:
     def refuse_others(self) -> None:
         """Raise InputError while another process holds the lock, which is not taken; one that cannot be read counts as free."""
         try:
-            descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+            descriptor = os.open(
+                self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+            )
         except OSError:
             return
         try:
