@@ -328,7 +328,7 @@ def check(found):
     """Numbers of six lives hang together."""
     assert (found.ending == Status.OK).all()
     assert not (found.flags & Flag.TARGET_MISSED).any()
-    followed = found.ended >= found.cycle
+    followed = (found.ended >= found.cycle).transpose("life", "cycle")
     assert (found.clearance.notnull().all("joint") == followed).all()
     assert (np.diff(found.clearance, axis=1)[followed.values[:, 1:]] > 0.0).all()
     assert (found.end_clearance <= found.attrs["limit_clearance"] * (1.0 + 1e-6)).all()

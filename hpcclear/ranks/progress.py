@@ -136,7 +136,7 @@ class LivesProgress(Progress):
         self._lives, self._over, self._behind = total, over, (over + sum(parts)) / total
 
     def start(self, total: int, completed: np.ndarray) -> None:
-        """Begin with a further design."""
+        """Begin with a further design of `total` samples, of which the records `completed` are there already."""
         if self._done < 0:
             super().start(self._lives, np.empty(0))
         self._done += completed.size

@@ -96,7 +96,7 @@ def _moments(found: Life, joints: Joints, counted: Array) -> Array:
 
 
 def local_bounds(joints: Joints, limits: Mapping[str, float]) -> Array:
-    """Largest clearance around each joint (..., joints) that ends a life, m."""
+    """Largest clearance around each joint that ends a life, m, of the shape of `joints`."""
     return np.minimum(DEEPEST * joints.bearing_radius, limits.get("clearance", math.inf))
 
 
