@@ -28,8 +28,11 @@ POOR = 1e-2
 """Smallest singular value over the largest seen, from which on a longer step is tried that passes a change point at once."""
 FAST = 100.0
 """Velocity, rad (or typical lengths) per rad of the drive, from which on the end of a walk is a dead centre."""
-BESIDE = 2e-3
-"""Of a change point, rad of the drive: nearer to it numbers are interpolated, since Newton's method loses digits."""
+BESIDE = 0.01
+"""Of a change point, rad of the drive: nearer to it numbers are interpolated, since forces lose digits with the fourth power of
+the distance (1e-8 of them there)."""
+NEARER = 4.0
+"""By how much nearer than `BESIDE` a change point is looked at as well."""
 CLEAR = 1e-2
 """Smallest singular value over the largest in `clear`, at least."""
 MOST_ROUNDS = 64
@@ -178,7 +181,7 @@ class _Walker:
         smooth motion leads through it, and no other one touches that."""
         loops, wide = self.loops, BESIDE * self.unit
         left, right = outer = here, there
-        for reach in (wide, wide / 8):
+        for reach in (wide, wide / NEARER):
             span = right.time - left.time
             zero = _zero(lambda s, a=left, b=right, h=span: self._determinant(a, b, h, s))
             time = left.time + zero * span
@@ -190,12 +193,10 @@ class _Walker:
                 return None
             near = left, right = one, two
             outer = near if reach == wide else outer
-        jumps = [
-            np.abs((b.v - a.v) / loops.scales).max() * self.unit for a, b in (outer, near)
-        ]
+        jumps = [np.abs((b.v - a.v) / loops.scales).max() * self.unit for a, b in (outer, near)]
         sizes = [abs(a.determinant) + abs(b.determinant) for a, b in (outer, near)]
-        smooth = jumps[0] < 0.2 and jumps[1] < 0.3 * jumps[0] + 1e-5
-        if not (smooth and 0.06 < sizes[1] / sizes[0] < 0.25):
+        smooth = jumps[0] < 0.3 and jumps[1] < 0.5 * jumps[0] + 1e-5
+        if not (smooth and 0.5 < NEARER * sizes[1] / sizes[0] < 2.0):
             return None
         middle = Node(time, self._along(*near, 0.5), 0.5 * (near[0].v + near[1].v), 0.0, 0.0)
         return middle, list(outer)
@@ -282,7 +283,8 @@ def _through(walker: _Walker, found: Passage, here: Node, end: float) -> Node:
             if leap is not None:
                 change, sides, there = leap
                 found.changes.append(change)
-                found.nodes += [*sides, there]
+                found.nodes += [one for one in sides if here.time < one.time < there.time]
+                found.nodes.append(there)
                 here, turn = there, np.zeros(walker.loops.size)
                 continue
             if flips:  # no crossing that can be passed: what is there is looked at in short steps
@@ -332,7 +334,9 @@ def clear(loops: Loops, start: Array, seconds: Array, turns: int) -> Booleans:
         best, worst = np.maximum(best, size), np.minimum(worst, size)
         good &= np.abs(change).max(axis=0, initial=0.0) < FARTHEST
         if k:
-            good &= (signs == sign) & (np.abs((new - v) * h / scales).max(axis=0, initial=0.0) < TURNED)
+            good &= (signs == sign) & (
+                np.abs((new - v) * h / scales).max(axis=0, initial=0.0) < TURNED
+            )
         # what is off already must not spoil the arithmetic of the others
         q = np.where(good, guess - scales * change, start)
         first = first if k else q
