@@ -297,7 +297,7 @@ def ideal(bodies, joints, drives, ground, **numerics):
 
 
 def parallelogram(start, speed, **more):
-    joints = [("crank.a", "ground.o"), ("crank.b", "coupler.a"), ("coupler.b", "rocker.b"), ("rocker.a", "ground.p")]  # fmt: skip
+    joints = [(one, two) for _, one, two in FOUR]
     bodies = {"crank": (0.1, start), "coupler": (0.2, 0.0), "rocker": (0.1, start)}
     return ideal(bodies, joints, [("crank", speed)], {"o": [0.0, 0.0], "p": [0.2, 0.0]}, **more)
 

@@ -9,6 +9,7 @@ bound, ends the walk.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -183,7 +184,7 @@ class _Walker:
         left, right = outer = here, there
         for reach in (wide, wide / NEARER):
             span = right.time - left.time
-            zero = _zero(lambda s, a=left, b=right, h=span: self._determinant(a, b, h, s))
+            zero = _zero(partial(self._determinant, left, right, span))
             time = left.time + zero * span
             one, two = (
                 self.pose(self._along(left, right, (time + side - left.time) / span), time + side)
@@ -203,7 +204,7 @@ class _Walker:
 
     def _along(self, a: Node, b: Node, s: float) -> Array:
         h = b.time - a.time
-        return _hermite(a.q, a.v * h, b.q, b.v * h, np.float64(s))
+        return _hermite(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
 
     def _determinant(self, a: Node, b: Node, h: float, s: float) -> float:
         loops = self.loops
@@ -212,7 +213,7 @@ class _Walker:
         return float(np.linalg.det(jacobian * loops.scales / loops.row_scales[:, None]))
 
     def leap(self, here: Node, turn: Array, h: float) -> tuple[Node, list[Node], Node] | None:
-        """Over a change point within about a step: it, poses on both its sides, and the pose at the end; None if there is none."""
+        """A change point within about a step, poses on both its sides, and the pose at the end; None if there is none."""
         for share in (1.0, 1.37, 1.73, 0.81, 0.6):
             found = self.step(here, turn, share * h)
             if found is None or found[0].margin < POOR * self.best:
