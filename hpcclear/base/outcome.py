@@ -52,7 +52,8 @@ _TEXT = {
     Status.OK: ("finished", "nothing to do"),
     Status.STEP_CAP: (
         "numerics.max_steps was reached before the last revolution ended",
-        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; if all of them are meant, raise numerics.max_steps",
+        "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
+        "if all of them are meant, raise numerics.max_steps",
     ),
     Status.STEP_TOO_SMALL: (
         "the step size fell below the resolution of the time",
@@ -71,8 +72,8 @@ _TEXT = {
         "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
-        "the constraints of joints without clearance depend on one another at a change point (the rod is hardly longer than the "
-        "crank, a parallelogram in line), so that forces grow without bound or the motion is not determined",
+        "the constraints of joints without clearance depend on one another at a change point (the rod is hardly longer than "
+        "the crank, a parallelogram in line), so that forces grow without bound or the motion is not determined",
         'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
     ),
     Status.WORN_THROUGH: (

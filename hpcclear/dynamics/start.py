@@ -16,8 +16,8 @@ def start_states(
 ) -> Start:
     """Start of each sample, of parameters (samples, PARAMETERS) and the points they were made from.
 
-    Journals are centred, or where ``start_eccentricity`` puts them. Linkages that cannot turn fail at the start, unless `walk` is
-    off.
+    Journals are centred, or where ``start_eccentricity`` puts them. Linkages that cannot turn fail at the start,
+    unless `walk` is off.
 
     Raises
     ------

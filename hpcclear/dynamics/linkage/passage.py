@@ -9,6 +9,7 @@ bound, ends the walk.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,11 @@ POOR = 1e-2
 """Smallest singular value over the largest seen, from which on a longer step is tried that passes a change point at once."""
 FAST = 100.0
 """Velocity, rad (or typical lengths) per rad of the drive, from which on the end of a walk is a dead centre."""
-BESIDE = 2e-3
-"""Of a change point, rad of the drive: nearer to it numbers are interpolated, since Newton's method loses digits."""
+BESIDE = 0.01
+"""Of a change point, rad of the drive: nearer to it numbers are interpolated, since forces lose digits with the fourth power of
+the distance (1e-8 of them there)."""
+NEARER = 4.0
+"""By how much nearer than `BESIDE` a change point is looked at as well."""
 CLEAR = 1e-2
 """Smallest singular value over the largest in `clear`, at least."""
 MOST_ROUNDS = 64
@@ -178,9 +182,9 @@ class _Walker:
         smooth motion leads through it, and no other one touches that."""
         loops, wide = self.loops, BESIDE * self.unit
         left, right = outer = here, there
-        for reach in (wide, wide / 8):
+        for reach in (wide, wide / NEARER):
             span = right.time - left.time
-            zero = _zero(lambda s, a=left, b=right, h=span: self._determinant(a, b, h, s))
+            zero = _zero(partial(self._determinant, left, right, span))
             time = left.time + zero * span
             one, two = (
                 self.pose(self._along(left, right, (time + side - left.time) / span), time + side)
@@ -190,19 +194,17 @@ class _Walker:
                 return None
             near = left, right = one, two
             outer = near if reach == wide else outer
-        jumps = [
-            np.abs((b.v - a.v) / loops.scales).max() * self.unit for a, b in (outer, near)
-        ]
+        jumps = [np.abs((b.v - a.v) / loops.scales).max() * self.unit for a, b in (outer, near)]
         sizes = [abs(a.determinant) + abs(b.determinant) for a, b in (outer, near)]
-        smooth = jumps[0] < 0.2 and jumps[1] < 0.3 * jumps[0] + 1e-5
-        if not (smooth and 0.06 < sizes[1] / sizes[0] < 0.25):
+        smooth = jumps[0] < 0.3 and jumps[1] < 0.5 * jumps[0] + 1e-5
+        if not (smooth and 0.5 < NEARER * sizes[1] / sizes[0] < 2.0):
             return None
         middle = Node(time, self._along(*near, 0.5), 0.5 * (near[0].v + near[1].v), 0.0, 0.0)
         return middle, list(outer)
 
     def _along(self, a: Node, b: Node, s: float) -> Array:
         h = b.time - a.time
-        return _hermite(a.q, a.v * h, b.q, b.v * h, np.float64(s))
+        return _hermite(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
 
     def _determinant(self, a: Node, b: Node, h: float, s: float) -> float:
         loops = self.loops
@@ -211,7 +213,7 @@ class _Walker:
         return float(np.linalg.det(jacobian * loops.scales / loops.row_scales[:, None]))
 
     def leap(self, here: Node, turn: Array, h: float) -> tuple[Node, list[Node], Node] | None:
-        """Over a change point within about a step: it, poses on both its sides, and the pose at the end; None if there is none."""
+        """A change point within about a step, poses on both its sides, and the pose at the end; None if there is none."""
         for share in (1.0, 1.37, 1.73, 0.81, 0.6):
             found = self.step(here, turn, share * h)
             if found is None or found[0].margin < POOR * self.best:
@@ -282,7 +284,8 @@ def _through(walker: _Walker, found: Passage, here: Node, end: float) -> Node:
             if leap is not None:
                 change, sides, there = leap
                 found.changes.append(change)
-                found.nodes += [*sides, there]
+                found.nodes += [one for one in sides if here.time < one.time < there.time]
+                found.nodes.append(there)
                 here, turn = there, np.zeros(walker.loops.size)
                 continue
             if flips:  # no crossing that can be passed: what is there is looked at in short steps
@@ -332,7 +335,9 @@ def clear(loops: Loops, start: Array, seconds: Array, turns: int) -> Booleans:
         best, worst = np.maximum(best, size), np.minimum(worst, size)
         good &= np.abs(change).max(axis=0, initial=0.0) < FARTHEST
         if k:
-            good &= (signs == sign) & (np.abs((new - v) * h / scales).max(axis=0, initial=0.0) < TURNED)
+            good &= (signs == sign) & (
+                np.abs((new - v) * h / scales).max(axis=0, initial=0.0) < TURNED
+            )
         # what is off already must not spoil the arithmetic of the others
         q = np.where(good, guess - scales * change, start)
         first = first if k else q

@@ -22,7 +22,7 @@ from hpcclear.dynamics.linkage.loops import WORDS, Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, split
-from hpcclear.dynamics.linkage.passage import BESIDE, Node, Passage, walked
+from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates, placed
 from hpcclear.dynamics.linkage.table_drive import words_of
 
@@ -99,7 +99,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
 
 def _diverges(assembly: Assembly, passage: Passage, change: Node, gravity: float) -> bool:
     """Whether a force grows as one over the distance from a change point; tabulated loads count as those of factor 1."""
-    near = BESIDE * passage.unit / np.array([1.0, 8.0])
+    near = BESIDE * passage.unit / np.array([1.0, NEARER])
     far = np.linspace(0.1, 1.0, 10) * min(change.time, passage.unit)
     sides = change.time + np.concatenate([-near, near])
     times = np.concatenate([sides, change.time - far])
@@ -110,7 +110,7 @@ def _diverges(assembly: Assembly, passage: Passage, change: Node, gravity: float
     sizes = [assembly.loops.length if name.endswith("_angle") else 1.0 for name in held]
     force = np.array(list(held.values())) / np.array(sizes)[:, None]
     wide, close = 0.5 * (force[:, 2:4] - force[:, :2]).T
-    residue = np.abs(close - wide / 8.0).max() * BESIDE / (8.0 - 1.0 / 8.0)
+    residue = np.abs(close - wide / NEARER).max() * BESIDE / (NEARER - 1.0 / NEARER)
     return bool(residue > DIVERGING * np.abs(force[:, 4:]).max())
 
 
@@ -152,7 +152,9 @@ def why(assembly: Assembly, passage: Passage) -> str:
     body = mechanism.period.body
     where = f"{math.degrees(placed(pose, f'{body}.{CENTER}')[2]) % 360.0:.1f} deg of the {body}"
     names = " and ".join([", ".join(bodies[:-1]), bodies[-1]] if len(bodies) > 1 else bodies)
-    state = f"{names} {'in line' if straight and len(bodies) > 1 else 'jammed'}" if bodies else "jammed"
+    state = (
+        f"{names} {'in line' if straight and len(bodies) > 1 else 'jammed'}" if bodies else "jammed"
+    )
     joints = ", ".join(joint.name for joint in between)
     state += f" (joints {joints})" if joints else ""
     if status is Status.CANNOT_TURN:

@@ -257,9 +257,7 @@ def start_states_of(scene: Scene, par: Array, points: Points | None, walk: bool 
             if sample is not None:
                 places[row], speeds[row] = coordinates(trees, sample[1])
         numbers = with_columns(tables_of(scene), linkage.mechanism, points)
-        found = statuses(
-            _twins(scene), numbers, samples, scene.effects.gravity, _rounds(scene)
-        )
+        found = statuses(_twins(scene), numbers, samples, scene.effects.gravity, _rounds(scene))
     _start_contacts(scene, linkage, par, start)
     start.fail(found)
     return start

@@ -150,7 +150,7 @@ def statuses(
     if loops is None or not closed.any():
         return found
     doubtful = closed & ~_clear(loops, sample, made)
-    for row in np.flatnonzero(doubtful):
+    for row in np.flatnonzero(doubtful).tolist():
         one = made[row]
         assert one is not None
         try:
