@@ -147,7 +147,7 @@
     redraw();
   }
 
-  /* of more than two things that are made small, any two may be looked at */
+  /* where a case has other objectives than mean and deviation, any two may be looked at */
   function directions(controls, redraw) {
     const { axes, points } = content.front;
     if (!axes) return;
