@@ -93,7 +93,7 @@ def with_half_width(value: float, half_width: float, units: str) -> str:
     decimals = max(min(places(width, 2), least) if width > 0.0 else least, 0)
     step = 10.0**-decimals
     rounded = (
-        max(float(np.ceil(width / step - 1e-9)), 0.0) * step
+        abs(np.ceil(width / step - 1e-9)) * step
     )  # up: it is no narrower than it is
     return f"{shown:.{decimals}f} ± {rounded:.{decimals}f}{unit}"
 
