@@ -74,7 +74,7 @@ def test_dropped_steps_change_no_instant_s_state(monkeypatch, kind: str):
     assert len(piece.times) == 101
     even = np.linspace(0.0, lengths.sum(), 101)
     assert (np.diff(piece.times) > 0.0).all()
-    assert np.abs(piece.times - even).max() < 0.2 * even[1]
+    assert np.abs(piece.times - even).max() < 0.5 * even[1]  # some eight rows are held for each
     q, v, s = response._between(piece, 0.0)
     assert ((s >= 0.0) & (s <= 1.0)).all()
     np.testing.assert_allclose(q[:, 0], np.sin(piece.times), atol=1e-9)

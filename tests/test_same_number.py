@@ -81,7 +81,12 @@ def test_a_chaotic_response_is_printed_with_the_half_width_that_its_replicas_giv
     assert half_width > 0.01 * f
     assert "sensitive to initial conditions" in shown
     scene = scene_of("linkages/quick_return.toml")
-    others = (("dormand-prince", 1e-6), ("fehlberg", 1e-6), ("tsitouras", 1e-5), ("tsitouras", 1e-7))
+    others = (
+        ("dormand-prince", 1e-6),
+        ("fehlberg", 1e-6),
+        ("tsitouras", 1e-5),
+        ("tsitouras", 1e-7),
+    )
     found = [
         scene.with_({"numerics.method": method, "numerics.rtol": rtol}) for method, rtol in others
     ]
@@ -106,7 +111,7 @@ def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Pat
 
     for on, words in ((False, "not checked"), (True, "median")):
         scene = load_scene(JOBS / "quickstart.toml").with_(
-            SHORT | {"study.samples": 3, "numerics.uncertainty": on}
+            SHORT | {"study.samples": 50, "numerics.uncertainty": on}
         )
         found = run_sample(scene, tmp_path / f"{on}.nc", alone(), options=Options(style="quiet"))
         assert found.content.attrs["objective_half_width"].startswith(

@@ -315,8 +315,8 @@ SENSITIVE = 0.01
 """Half-width over f beyond which f is reported as sensitive to initial conditions."""
 
 SENSITIVE_WORDS = (
-    "f is sensitive to initial conditions or to the tolerance: by replicas whose starts differ by 1e-10 its half-width is {:.0%} "
-    "of f. Set numerics.target_error for a mean with a confidence interval"
+    "f is sensitive to initial conditions or to the tolerance: by replicas with other starts its half-width is {:.0%} of f. "
+    "Set numerics.target_error for a mean with a confidence interval"
 )
 
 

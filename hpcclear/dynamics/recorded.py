@@ -181,10 +181,7 @@ def _piece(rows: Array, broken: Booleans, count: int, *, last: bool) -> Piece:
     else:
         closing = np.flatnonzero(np.diff(steps.revolution) > 0)
         borders = steps.time[np.unique([0, *closing, len(rows) - 1])]
-        parts = [
-            np.linspace(a, b, count, endpoint=False)
-            for a, b in itertools.pairwise(borders)
-        ]
+        parts = [np.linspace(a, b, count, endpoint=False) for a, b in itertools.pairwise(borders)]
         times = np.concatenate([*parts, borders[-1:] if last else []])
     k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, max(len(rows) - 2, 0))
     if broken.any():  # an instant where steps were dropped moves to the next that were not
