@@ -111,9 +111,9 @@ def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
 
 
 def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> dict[str, Array]:
-    """Series of the body that gives the period: its angle and speed, and the progress of the drive, rad.
+    """Return the series (t,) of the body that gives the period: its angle and speed, and the progress of the drive, rad.
 
-    `places`: as `bodies_and_points` has them.
+    `places`: as `bodies_and_points` has them; `phase` (t,): that progress.
     """
     k = [body.name for body in mechanism.bodies].index(mechanism.period.body)
     angle, speed = (places[f"body_{name}"][:, k] for name in ("angle", "spin"))
@@ -121,7 +121,7 @@ def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> d
 
 
 def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
-    """Progress of the drive since the start, 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
+    """Progress of the drive since the start (t,), 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(tables_of(scene))
     if linkage.mechanism.period.prescribed:
