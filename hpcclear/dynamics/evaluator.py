@@ -67,8 +67,7 @@ KICKS = (0, 1, -1)
 
 KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
 """Those of the replicas of a single response, which take lanes that would stay empty. From the larger ones chaotic replicas
-separate
-before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
+separate before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
 
 KICK_OF_TOLERANCE = 0.1
 """Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
@@ -86,8 +85,7 @@ were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """Likewise with the replicas of a single response: of ten normal variates the last is farther from the first than 1.25 times
-the
-farthest of the others in 4 %, and of four than 1.7 times in 8 %."""
+the farthest of the others in 4 %, and of four than 1.7 times in 8 %."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
