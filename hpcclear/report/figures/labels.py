@@ -92,9 +92,7 @@ def with_half_width(value: float, half_width: float, units: str) -> str:
     least = places(abs(shown), _MOST_DIGITS)
     decimals = max(min(places(width, 2), least) if width > 0.0 else least, 0)
     step = 10.0**-decimals
-    rounded = (
-        abs(np.ceil(width / step - 1e-9)) * step
-    )  # up: it is no narrower than it is
+    rounded = abs(np.ceil(width / step - 1e-9)) * step  # up: it is no narrower than it is
     return f"{shown:.{decimals}f} ± {rounded:.{decimals}f}{unit}"
 
 
