@@ -66,8 +66,8 @@ KICKS = (0, 1, -1)
 """Signs of the kicks to a sample's copies, which run beside it when its uncertainty is asked for."""
 
 KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
-"""Those of the replicas of a single response, which take lanes that would stay empty. From the larger ones chaotic replicas
-separate before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
+"""Perturbations of the replicas of a single response, which take lanes that would stay empty. With the larger ones chaotic
+replicas separate before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
 
 KICK_OF_TOLERANCE = 0.1
 """Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
@@ -84,8 +84,8 @@ Copies no stricter than the sample would add errors of their own where its motio
 were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
-"""Likewise with the replicas of a single response: of ten normal variates the last is farther from the first than 1.25 times
-the farthest of the others in 4 %, and of four than 1.7 times in 8 %."""
+"""The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
+times the largest difference of nine others in 4 % of cases, by more than 1.7 times that of three others in 8 %."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
