@@ -138,12 +138,14 @@ def test_check_prints_the_corners(tmp_path):
     assert "3 make a mechanism" in shown
 
 
-def test_a_linkage_that_closes_at_no_corner_of_short_couplers_is_named():
+@pytest.mark.parametrize(("shortest", "word"), [(0.01, "close"), (0.088, "cannot turn")])
+def test_short_couplers_at_which_a_linkage_does_not_close_or_locks_are_named(shortest, word):
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
     path = "mechanism.bodies.coupler.length"
-    study = {"samples": 8, "variables": {"L": {"path": path, "range": [0.01, 0.12]}}}
+    study = {"samples": 8, "variables": {"L": {"path": path, "range": [shortest, 0.12]}}}
     found = tried(scene.with_({"study": study}), simulate=False)
     assert list(found.refused) == [0]
+    assert word in found.refused[0]
 
 
 @pytest.mark.parametrize("count", [1, 3, 6, 7, 12])

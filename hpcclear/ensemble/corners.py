@@ -7,6 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.planar.problem import refused_of, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points, check_points
@@ -78,20 +79,11 @@ def tried(scene: Scene, simulate: bool) -> Tried:
 
 
 def _refusal(scene: Scene, corner: Points) -> str:
-    """Why one corner (1 row) makes no mechanism; "" if it does."""
-    changes = {
-        path: float(value)
-        for value, paths in zip(corner.values[0], corner.paths, strict=True)
-        for path in paths
-    }
+    """Why one corner (1 row) makes no mechanism, or one that cannot turn; "" if it does."""
     try:
         check_points(scene, corner)
-        one = scene.with_(changes)
-        if one.is_planar:
-            from hpcclear.dynamics.planar.problem import put_together, tables_of
-            from hpcclear.dynamics.planar.tables import mechanism_of
-
-            put_together(mechanism_of(tables_of(one)))
+        one = scene_of(scene, corner, 0)
+        locked = refused_of(one) if one.is_planar else None
     except InputError as error:
         return f"{error.reason}. {error.remedy}"
-    return ""
+    return "" if locked is None else f"{locked[0].message}. {locked[0].remedy}"
