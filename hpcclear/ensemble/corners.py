@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.planar.problem import refused_of, scene_of
+from hpcclear.dynamics.planar.problem import poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points, check_points
@@ -83,6 +83,8 @@ def _refusal(scene: Scene, corner: Points) -> str:
     try:
         check_points(scene, corner)
         one = scene_of(scene, corner, 0)
+        if one.is_planar:
+            poses_at_start(one)  # refuses one that does not close
         locked = refused_of(one) if one.is_planar else None
     except InputError as error:
         return f"{error.reason}. {error.remedy}"
