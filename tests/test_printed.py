@@ -215,7 +215,7 @@ def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
     force = np.where(turn < 1.0, 2000.0, 1000.0)
     response["contact_force"][:] = force[:, None]
     response["peak_contact_force"][:] = 1500.0
-    response.attrs["transient_revolutions"] = 2
+    response.attrs["transient_turns"] = 2
     describe_response(response, tmp_path / "a.nc")
     shown = " ".join(capsys.readouterr().out.split())
     assert "largest stored value of the averaged revolutions 1 kN" in shown

@@ -273,8 +273,8 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
         told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
         rows.append((f"{joint}", told + _at_instants(response, k)))
     out.print(table("Response", rows + _crank(response)))
-    if half_width > SENSITIVE * abs(f) and "regime" not in response:
-        out.print(f"[yellow]Warning:[/] {SENSITIVE_WORDS.format(half_width / abs(f))}")
+    if half_width > SENSITIVE * abs(f) > 0.0 and "regime" not in response:
+        out.print(remark("Warning", SENSITIVE_WORDS.format(half_width / abs(f))))
     for text in flag_remarks(int(response["flags"])):
         out.print(remark("Mind", text))
     out.print(f"written  {output}")
@@ -298,11 +298,10 @@ def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
 
 def _at_instants(response: xr.Dataset, joint: int) -> str:
     """The largest stored force of the averaged revolutions, which the peak is of, where the true peak lies between instants."""
-    if "transient_revolutions" not in response.attrs:
+    if "transient_turns" not in response.attrs:
         return ""
-    angle, peak = response["crank_angle"].to_numpy(), float(response["peak_contact_force"][joint])
-    turned = np.abs(angle - angle[:1]) / (2.0 * np.pi)
-    averaged = turned > int(response.attrs["transient_revolutions"]) - 1e-6
+    turned, peak = motion.turns(response), float(response["peak_contact_force"][joint])
+    averaged = turned - turned[:1] > int(response.attrs["transient_turns"]) - 1e-6
     shown = float(response["contact_force"].to_numpy()[averaged, joint].max(initial=0.0))
     if not peak > shown * 1.001 or not averaged.any():
         return ""

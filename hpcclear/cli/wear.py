@@ -93,7 +93,7 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
         return [*rows, ("life", "no limit was given (wear.limit)")]
     rows += [
         ("life, revolutions", _spread(content, "lifetime_quantile", cycles)),
-        ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).max()))),
+        ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).min()))),
     ]
     limits = (
         f"95 % limits {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"

@@ -103,7 +103,8 @@ def _of_linkage(
 def of_starts(scene: Scene, par: Array, start: Start, n: int) -> Array:
     """Energy of m starts, J, shape (m,); parameters (m, PARAMETERS), n coordinates."""
     q, v = start.coordinates(n).T, start.velocities(n).T
-    return energies(scene, par, q, v, start.active)[1]
+    with np.errstate(invalid="ignore"):  # starts that failed are not finite
+        return energies(scene, par, q, v, start.active)[1]
 
 
 def errors(scene: Scene, par: Array, before: Array, outcome: Outcome, n: int) -> Array:

@@ -72,6 +72,13 @@ replicas separate before the average begins; none is beyond `KICK_OF_TOLERANCE`.
 KICK_OF_TOLERANCE = 0.1
 """Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
 
+
+def alone(rtol: float) -> tuple[int, ...]:
+    """Perturbations of the replicas of a single response at a tolerance: `KICKS_ALONE`, where those are too large `KICKS`."""
+    large = max(map(abs, KICKS_ALONE)) * KICK > 1.001 * KICK_OF_TOLERANCE * rtol
+    return KICKS if large else KICKS_ALONE
+
+
 STRICTER = 300.0
 """Tolerance of a sample over that of its copies, whose own errors then count for little."""
 
@@ -207,8 +214,7 @@ def with_copies(
     par: Array, start: Start, labels: Integers, rtol: float, kicks: Sequence[int] = KICKS
 ) -> tuple[Array, Start, Integers]:
     """Each sample followed by its copies: kicked starts, and stricter tolerances."""
-    most = max(1.0, KICK_OF_TOLERANCE * rtol / KICK)
-    sizes = np.clip([0, *kicks], -most, most)
+    sizes = np.array([0, *kicks])
     count = len(sizes)
     strict = np.array([1.0] + len(kicks) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
     par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))

@@ -93,17 +93,19 @@ class Recording:
 
         Of a linkage that cannot turn there is the start alone.
         """
+        lanes = self._lanes
         if self._refused is not None:
+            lanes.step(0)  # compiles what observes the start
             yield self._first_row()
             return
-        lanes = self._lanes
         lanes.queue(self._par, self._start, np.zeros(1, np.int64))
         ensemble = Lanes(problem_of(self._scene), DEFAULT_LANES)
         with compiled_beside(ensemble.motions):  # which gives the scalars
             lanes.step(0)
         yield self._first_row()
         while lanes.pending:
-            lanes.advance(0.2)
+            while lanes.pending and not lanes.record_full:  # by steps, not by the clock
+                lanes.advance(0.2)
             yield lanes.take_record()
 
     def _first_row(self) -> Array:

@@ -14,13 +14,13 @@ from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records, records_by
-from hpcclear.dynamics.evaluator import KICKS_ALONE, Evaluator, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import KICKS, Evaluator, alone, outcome_records, responses_told
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.bending import Bent
 from hpcclear.dynamics.parameters import parameters, topology
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of, refused_of
+from hpcclear.dynamics.planar.problem import linkage_of, refused_of, tables_of
 from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -31,6 +31,7 @@ from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
 MOST = 0.5
@@ -140,7 +141,7 @@ def simulate(
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
-        | {"transient_revolutions": scene.numerics.transient_revolutions}
+        | {"transient_turns": scene.numerics.transient_revolutions * _turns(scene)}
         | _reason(scene),
         objective,
         labels,
@@ -155,10 +156,13 @@ def _sample(scene: Scene, objective: Objective, checked: bool, series: Records) 
     rounded there (else they stand in a fused multiply-add), so that in some linkages its last bits are other ones; where the
     motion is chaotic it parts from the sample after some impacts. Its f is no worse, but it is not the sample's.
     """
-    status = Status(int(series["status"][0]))
-    if status is Status.STEP_CAP:
-        return series  # as many steps again would come to the same
-    kicks = KICKS_ALONE if checked and status.valid else ()
+    if not Status(int(series["status"][0])).valid:
+        return series  # numbers of a motion that the series do not show would be of another one
+    kicks: tuple[int, ...] = ()
+    if scene.numerics.uncertainty:
+        kicks = KICKS  # as for any sample
+    elif checked:
+        kicks = alone(scene.numerics.rtol)
     evaluator = Evaluator(scene, _ITSELF, kicks=kicks, objective=objective)
     return records_by(evaluator, _ITSELF)
 
@@ -170,6 +174,11 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         return modes or None
     found = planar_labels(linkage_of(scene).mechanism) | modes
     return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
+
+
+def _turns(scene: Scene) -> int:
+    """Turns of a revolution."""
+    return turns_of(tables_of(scene)) if scene.is_planar else 1
 
 
 def _reason(scene: Scene) -> dict[str, str | int]:

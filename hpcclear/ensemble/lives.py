@@ -89,7 +89,10 @@ def lives_dataset(
     local, times = _stacked(found, "local"), revolution_times(scene, inputs)
     last = [curves(one, joints[k], np.array([one.ended]), relief) for k, one in enumerate(lives)]
     at_end = np.concatenate([one.local for one in last])
-    over = at_end >= (1.0 - 1e-9) * local_bounds(joints, limits)
+    # a crossing is interpolated between points of the curve, which lies below its chord where wear speeds up
+    over = at_end >= (1.0 - 1e-6) * local_bounds(joints, limits)
+    failed = np.array([not (one.reason or one.status.valid) for one in lives], bool)
+    at_end[failed] = np.nan
     data: dict[str, Any] = {
         **values,
         "clearance_limit": np.stack([one.limit for one in lives]),

@@ -58,7 +58,9 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     if text is None or named:  # results carry the values: whoever has one need not have the file
         scene._text = scene.to_toml()
     else:
-        scene._text = notes + text
+        # an empty line ends the notes, whatever a file's own first comment says
+        own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
+        scene._text = notes + own
     return scene
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,12 +53,18 @@ def followed(
         "followed_acceleration_x": acceleration.real,
         "followed_acceleration_y": acceleration.imag,
     }
-    path = ideal_path(mechanism, place) if play else None
+    path = _path_of(scene) if play else None
     if path is not None:
         cycle = at.TURN * turns_of(tables_of(scene))
         ideal = path(np.mod(phase, cycle) / cycle)
         found["path_error"] = np.abs(x + 1j * y - ideal)
     return found
+
+
+@lru_cache(maxsize=16)
+def _path_of(scene: Scene) -> Path | None:
+    place = tables_of(scene).followed
+    return None if place is None else ideal_path(linkage_of(scene).mechanism, place)
 
 
 def _path(ideal: Mechanism, place: str) -> Path:

@@ -141,6 +141,7 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
     found.limit = np.sqrt(variance)
     if not found.reason:
         found.ended = found.nodes[-1].cycle if found.nodes else 0.0
+        found.reason = THROUGH if found.status is Status.WORN_THROUGH else ""
     return found
 
 

@@ -36,10 +36,11 @@ def turns_label(response: xr.Dataset) -> str:
 
 def crank_angle(response: xr.Dataset) -> tuple[Array, int]:
     """Crank angle times its sense (time,), rad, which rises, and the sense, -1 clockwise; of a drive that swings its phase."""
-    angle = response["crank_angle"].to_numpy()
+    angle, gone = response["crank_angle"].to_numpy(), phase(response)
     sense = -1 if angle[-1] < angle[0] else 1
-    if "drive_phase" in response and (sense * np.diff(angle) < 0.0).any():
-        return phase(response), 1
+    # a body that a torque drives may be thrown back a little; one that swings gains nothing
+    if "drive_phase" in response and abs(angle[-1] - angle[0]) < 0.5 * (gone[-1] - gone[0]):
+        return gone, 1
     return sense * angle, sense
 
 

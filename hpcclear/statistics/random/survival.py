@@ -5,7 +5,6 @@ Biometrika 26 (1934), doi:10.1093/biomet/26.4.404.
 """
 
 import numpy as np
-from scipy.special import betaincinv
 
 from hpcclear.base.arrays import Array, Integers
 
@@ -14,6 +13,8 @@ CONFIDENCE = 0.95
 
 def share_limits(count: Integers, total: int) -> tuple[Array, Array]:
     """Clopper and Pearson's 95 % limits of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
+    from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
+
     count = np.asarray(count)
     if total == 0:
         return np.zeros(count.shape), np.ones(count.shape)
