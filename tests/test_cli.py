@@ -121,14 +121,12 @@ def test_the_list_of_commands_is_not_cut_off():
     assert len(listed.split()) > 20
 
 
-def test_the_directory_of_the_results_is_made_unless_it_looks_misspelt(tmp_path):
+def test_the_directories_of_the_results_are_made(tmp_path):
     words = ["simulate", "jobs/slider_crank.toml", *SHORT, "-o"]
     assert hpcclear(*words, tmp_path / "results" / "response.nc").returncode == 0
     assert (tmp_path / "results" / "response.nc").is_file()
-    done = hpcclear(*words, tmp_path / "resluts" / "more" / "response.nc")
-    assert done.returncode == 2
-    assert "Make the directory" in done.stderr
-    assert not (tmp_path / "resluts").exists()
+    assert hpcclear(*words, tmp_path / "some" / "more" / "response.nc").returncode == 0
+    assert (tmp_path / "some" / "more" / "response.nc").is_file()
 
 
 def test_both_entry_points_give_version_and_help():
@@ -153,8 +151,8 @@ def test_both_entry_points_give_version_and_help():
         ),
         (["simulate", "jobs/slider_crank.toml"], "--output"),
         (
-            ["simulate", "jobs/slider_crank.toml", "-o", "/no/such/directory/x.nc"],
-            "/no/such/directory",
+            ["simulate", "jobs/slider_crank.toml", "-o", "/proc/no/such/x.nc"],
+            "/proc/no/such",
         ),
         (["sample", "jobs/slider_crank.toml", "-o", "x.nc"], "study"),
         (["frobnicate"], "No such command"),

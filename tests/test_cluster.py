@@ -268,7 +268,7 @@ def test_a_neighbour_is_given_up_once_and_not_when_it_said_goodbye():
 
 
 def test_the_silence_can_be_set_and_a_slip_does_not_count():
-    assert silence({}) == 30.0
+    assert silence({}) == 15.0
     assert silence({"HPCCLEAR_SILENCE": "5"}) == 5.0
     assert silence({"HPCCLEAR_SILENCE": "0"}) == 0.0
     assert silence({"HPCCLEAR_SILENCE": "soon"}) == 15.0

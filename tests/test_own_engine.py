@@ -230,11 +230,12 @@ def test_a_peak_between_the_instants_of_the_series_is_said_to_be_one(tmp_path, c
     told = " ".join(capsys.readouterr().out.split())
     for joint in range(2):
         peak = float(response.peak_contact_force[joint])
-        shown = float(response.contact_force[:, joint].max())
+        averaged = response.crank_angle >= 2.0 * np.pi * response.attrs["transient_turns"] - 1e-6
+        shown = float(response.contact_force[averaged, joint].max())
         assert quantity(peak, "N") in told
         if peak > shown * 1.001:
-            assert f"the series, which shows {quantity(shown, 'N')}" in told
-    assert "which shows" in told  # 36 instants miss one of them at least
+            assert f"averaged revolutions {quantity(shown, 'N')}" in told
+    assert "largest stored value" in told  # 36 instants miss one of them at least
 
 
 def test_every_command_that_simulates_warns_of_a_slip(tmp_path):

@@ -293,9 +293,9 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
             made[re.sub(r"(-\d+| check)?: simulations", "", task.name)] += len(points)
         return run_points(self, task, points, **options)
 
-    def respond(one, *rest):
+    def respond(one, *rest, **options):
         responded["all"] += 1
-        return formula.respond(one, *rest)
+        return formula.respond(one, *rest, **options)
 
     monkeypatch.setattr(Ranks, "run_points", counted)
     monkeypatch.setattr(responses, "simulate", respond)
@@ -730,11 +730,11 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
     """All of the study but that one file is there, and no comparison is made up."""
     design = None
 
-    def failing(scene, *others):
+    def failing(scene, *others, **options):
         """The design that comes first, the original, ends amid its transient."""
         nonlocal design
         design = design or (scene.mechanism.rod.mass, scene.mechanism.slider.mass)
-        response = formula.respond(scene, *others)
+        response = formula.respond(scene, *others, **options)
         if design != (scene.mechanism.rod.mass, scene.mechanism.slider.mass):
             return response
         return response.isel(time=slice(5)).assign(status=int(Status.STEP_CAP))

@@ -168,7 +168,7 @@ def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
     """Takes the place of the compilers."""
 
 
-def respond(scene: Scene, judged_by: Objective = MEAN_GAP, copy: int = 0):
+def respond(scene: Scene, judged_by: Objective = MEAN_GAP, copy: int = 0, *, checked: bool = True):
     """A response whose forces and accelerations are the objective times a wave."""
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     angle = np.linspace(0.0, 2 * np.pi * turns, 40 * turns + 1)
