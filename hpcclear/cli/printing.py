@@ -13,13 +13,13 @@ from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
 from hpcclear.report.failures import explained
-from hpcclear.report.figures import labels, motion
+from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
@@ -246,82 +246,6 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
 def _all(count: int, each: float) -> str:
     """What so many samples take, s each."""
     return f"{count} samples, {duration(count * each)} of one core"
-
-
-def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
-    """Print the outcome of one response, what it took and where it went."""
-    out = console()
-    status = Status(int(response["status"]))
-    said = f"{status.name.lower()}: {status.message}"
-    rows = [("status", response.attrs.get("ended", said))]
-    if status is not Status.OK:
-        rows.append(("remedy", status.remedy))
-    f, spread = float(response["objective"]), float(response["objective_spread"])
-    if "regime" in response and status.valid:
-        rows.append(("f, steady mean", in_a_line(response, seconds)))
-    words, unit = objective_of(response)
-    half_width = float(response["objective_uncertainty"])
-    if "regime" in response:
-        half_width = float(response["objective_limit"])
-    shown = fitting(labels.with_half_width(f, half_width, unit)) if np.isfinite(f) else "nan"
-    rows.append(("objective f", f"{shown}: {words}"))
-    if np.isfinite(spread):
-        rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
-    rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
-    for k, joint in enumerate(response["joint"].to_numpy()):
-        peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
-        told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
-        rows.append((f"{joint}", told + _at_instants(response, k)))
-    out.print(table("Response", rows + _crank(response)))
-    if half_width > SENSITIVE * abs(f) > 0.0 and "regime" not in response:
-        out.print(remark("Warning", SENSITIVE_WORDS.format(half_width / abs(f))))
-    for text in flag_remarks(int(response["flags"])):
-        out.print(remark("Mind", text))
-    out.print(f"written  {output}")
-
-
-def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
-    """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
-    if "crank_speed" not in response:
-        return []
-    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
-    turns, time = motion.turns(response), response["time"].to_numpy()
-    if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
-        return []  # it is prescribed
-    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)
-    told = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
-    means = 60.0 / np.diff(ends)
-    if len(means) > 1:
-        told += f"; drift of the last revolution {means[-1] - means[-2]:+.2g} rpm"
-    return [("crank speed", told)]
-
-
-def _at_instants(response: xr.Dataset, joint: int) -> str:
-    """The largest stored force of the averaged revolutions, which the peak is of, where the true peak lies between instants."""
-    if "transient_turns" not in response.attrs:
-        return ""
-    turned, peak = motion.turns(response), float(response["peak_contact_force"][joint])
-    averaged = turned - turned[:1] > int(response.attrs["transient_turns"]) - 1e-6
-    shown = float(response["contact_force"].to_numpy()[averaged, joint].max(initial=0.0))
-    if not peak > shown * 1.001 or not averaged.any():
-        return ""
-    return f" (between instants; largest stored value of the averaged revolutions {quantity(shown, 'N')})"
-
-
-REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
-
-SENSITIVE = 0.01
-"""Half-width over f beyond which f is reported as sensitive to initial conditions."""
-
-SENSITIVE_WORDS = (
-    "f is sensitive to initial conditions or to the tolerance: by replicas with other starts its half-width is {:.0%} of f. "
-    "Set numerics.target_error for a mean with a confidence interval"
-)
-
-
-def flag_remarks(flags: int) -> list[str]:
-    """A sentence for each flag that is set."""
-    return [text for flag, text in REMARKS.items() if flags & flag]
 
 
 def _load(found: "Finished") -> list[tuple[str, str]]:

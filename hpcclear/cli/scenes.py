@@ -117,7 +117,7 @@ def simulate(written: Written, output: Path) -> int:
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
     from hpcclear.base.outcome import Flag, Status
-    from hpcclear.cli.printing import describe_response
+    from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session

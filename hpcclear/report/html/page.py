@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.report.answer import answer
-from hpcclear.report.html import costs, gallery, origin, picture, sections
+from hpcclear.report.html import costs, gallery, loads, origin, picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import Section, render
@@ -119,6 +119,7 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
         ("claims", "Claims of the paper", "parts.html", sections.claims),
         ("readings", "How the paper can be read", "parts.html", sections.readings),
+        ("loads", "Loads of the bearings", "parts.html", loads.loads),
         ("motion", "The mechanism in motion", "motion.html", lambda one: one.responses or None),
         ("accuracy", "What accuracy cost", "parts.html", costs.accuracy),
         ("figures", "Figures", "figures.html", drawn),
