@@ -10,6 +10,8 @@ from typing import NamedTuple
 import pytest
 from doc_pages import ROOT, tokens
 
+from hpcclear.cli import cli
+
 FILES = (
     "README.md",
     "CHANGELOG.md",
@@ -152,6 +154,24 @@ def test_sentences_of_a_page_are_short(name):
         for sentence in sentences(passage.text)
         if len(sentence.split()) >= LONGEST
     ]
+    assert not found, "\n".join(found)
+
+
+def help_passages() -> Iterator[tuple[str, str]]:
+    """Prose of the help of every command, with the command's name; examples and metavariables are left out."""
+    for name, command in [("hpcclear", cli), *cli.commands.items()]:
+        texts = (command.help or "").split("\n\n")
+        yield from ((name, " ".join(text.split())) for text in texts if "xample:" not in text)
+        yield from ((name, command.short_help or ""),)
+        for option in command.params:
+            yield name, getattr(option, "help", None) or ""
+
+
+def test_help_of_commands_has_the_fields_words_and_short_sentences():
+    found = []
+    for name, text in help_passages():
+        found += [f"{name}: {word!r}; write: {instead}" for word, instead in private_words(text)]
+        found += [f"{name}: {one}" for one in sentences(text) if len(one.split()) >= LONGEST]
     assert not found, "\n".join(found)
 
 

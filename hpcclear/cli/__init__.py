@@ -54,8 +54,8 @@ _ON_RANKS = (
 def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
-    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy
-    and plan under mpiexec to use more than one core:
+    Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
+    core, start sample, run, wear, map, effects, accuracy or plan under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
