@@ -260,7 +260,7 @@ def test_the_figure_of_samples_marks_none_as_failed_where_the_scatter_is_not_kno
     crosses = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "x"]
     assert sum(len(line.get_xdata()) for line in crosses) == 0
     words = " ".join(text.get_text() for axes in figure.axes for text in axes.texts)
-    assert "not known of this objective" in words
+    assert "not available for this objective" in words
 
 
 def test_a_free_cranks_speed_and_its_drift_are_told(tmp_path, capsys):
