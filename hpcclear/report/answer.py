@@ -118,7 +118,7 @@ def beside_original(
             if name in verified or not name.startswith("life_")
         ]
         for name in _asked(designs[0]):
-            words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
+            words = labels.statistic(str(designs[0][f"{name}_goal"].item())).removesuffix(" of f")
             lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
         if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
             lines.append(
@@ -198,7 +198,9 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
             continue  # has a line of its own
         value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
-        text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
+        text = (
+            f"{labels.statistic(str(best[f'{name}_goal'].item()))} {labels.quantity(value, unit)}"
+        )
         if low < high:
             text += f" (95 % CI {labels.between(low, high, unit)})"
         yield text
@@ -277,7 +279,7 @@ def _merit(ours: xr.Dataset) -> str:
     first = ours.isel(design=0)
     if is_plain(first):
         return f"mean + {SPAN:g} standard deviations of f"
-    words = str(first["first_goal"].item())
+    words = labels.statistic(str(first["first_goal"].item()))
     return f"{words} within the constraints" if str(first["constraints"].item()) else words
 
 

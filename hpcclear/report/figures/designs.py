@@ -96,6 +96,7 @@ def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
 def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     """One of them, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
     values = one[f"searched_{name}"]
+    words = labels.statistic(words)
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
     share = words.startswith("share ")

@@ -123,7 +123,7 @@ def _spread(below: "Axes", samples: xr.Dataset, main: xr.DataArray) -> None:
         below.text(0.5, 0.5, words, fontsize=style.SMALL, **place)
         return
     _cloud(below, main, spread, _values(main))
-    below.set_ylabel(labels.of(spread).label("cycle-to-cycle std. dev. of $f$"))
+    below.set_ylabel(labels.of(spread).label("std. dev. in time"))
     positive = spread.where(spread > 0)
     if float(positive.max()) > 30.0 * float(positive.min()):
         below.set_yscale("log")

@@ -305,7 +305,7 @@ def _asked(one: xr.Dataset, names: Sequence[str]) -> list[object]:
     cells: list[object] = []
     for name in names:
         value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
-        words = str(one[f"{name}_goal"].item())
+        words = labels.statistic(str(one[f"{name}_goal"].item()))
         cells.append(f"{words}: {value}" if words else "")
     return [*cells, str(one["constraints"].item()) or "none"]
 
