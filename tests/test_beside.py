@@ -44,7 +44,7 @@ def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
     """A stepper never runs on addresses that are not there yet."""
     lanes = Lanes(problem_of(scene_with()), 4)
 
-    def interrupted(width):
+    def interrupted(width, stages):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

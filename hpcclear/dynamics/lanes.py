@@ -12,7 +12,6 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.collocation import lobatto
 from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.collocation.stepper import make_collocation_stepper
-from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.explicit.steps import explicit_code
 from hpcclear.dynamics.implicit import radau
@@ -70,7 +69,7 @@ class Lanes:
         self.problem = problem
         self.width = width
         self.record = np.zeros((0, columns(n))) if record is None else record
-        bank = aligned((at.STAGES + tab.STAGES * at.MAX_COORDINATES) * width)
+        bank = aligned((at.STAGES + problem.tableau.stages * at.MAX_COORDINATES) * width)
         bank[at.WORK * width : at.STAGES * width] = (
             1.0  # parameters: a resting lane divides by them
         )
@@ -131,7 +130,7 @@ class Lanes:
         apart += [OBSERVING] if len(self.record) else []
         beside = f"{IMPLICIT}:{blocks_of(n)}" if problem.single else ABREAST
         with compiled_beside([beside] if stiff else apart):  # either is half of it
-            explicit = explicit_code(self.width).address if blocks else 0
+            explicit = explicit_code(self.width, problem.tableau.stages).address if blocks else 0
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
             if stiff:  # implicit steps take as long as all of this together
                 special_code()

@@ -19,7 +19,14 @@ class Numerics(Table):
     interpolation: Literal["smooth", "linear"] = "smooth"
     """Between the rows of tables against the crank angle: a monotone cubic, or straight lines."""
     method: Literal[
-        "auto", "tsitouras", "dormand-prince", "fehlberg", "lobatto", "switching", "radau"
+        "auto",
+        "tsitouras",
+        "dormand-prince",
+        "fehlberg",
+        "prince-dormand",
+        "lobatto",
+        "switching",
+        "radau",
     ] = "auto"
     """Integrator, of responses and samples alike; "lobatto" takes one sample after the other, "switching" takes implicit steps
     where the motion is stiff, "radau" always, "auto" as "switching" in scenes with steep friction ramps, strong damping, oil
