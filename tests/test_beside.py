@@ -52,7 +52,7 @@ def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             lanes.step(1)
     assert not lanes.step(1)  # compiled now; nothing is queued
-    assert all(lanes._codes[1][:2])
+    assert all(lanes._codes[:2])
 
 
 class Started(Exception):

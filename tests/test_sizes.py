@@ -14,11 +14,11 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.stepper import quadratures
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
 from hpcclear.dynamics.explicit.steps import weigh_rates
-from hpcclear.dynamics.implicit.radau import means_of_step
+from hpcclear.dynamics.implicit.columns import leave
+from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.stepping.control import commit_measures
@@ -105,7 +105,7 @@ def test_an_end_is_a_start():
 # ---- what is integrated ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_measures])
+@pytest.mark.parametrize("traversal", [weigh_rates, observe_stages, leave, commit_measures])
 def test_every_stepper_integrates_all_of_the_list(traversal):
     """The gaps of the joints that are open (`commit` has its own); the rest is measured."""
     seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
@@ -182,7 +182,7 @@ def test_no_stepper_names_a_rate_of_its_own():
     assert {getattr(at, name) for name in own} | of_joints == rows
     own |= {"SLIDING_POWERS", "sliding_power"}
     room = Path(hpcclear.dynamics.__file__).parent
-    for folder in ("explicit", "implicit", "collocation"):
+    for folder in ("explicit", "implicit"):
         for path in (room / folder).glob("*.py"):
             text = path.read_text()
             assert not [name for name in own if f"at.{name}" in text], path.name
