@@ -61,7 +61,7 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
 def differentiate(problem: Problem, m: np.ndarray) -> None:
     """Evaluate the stages, and the Jacobians at the middle one."""
     motion = motion_of(problem.effects, COLUMNS).address
-    moved = Moved(motion, problem.coordinates, problem.tables)
+    moved = Moved(0, motion, problem.coordinates, problem.tables)
     evaluate_stages(moved, m)
     new_jacobian(moved, m)
 

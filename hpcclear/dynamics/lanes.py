@@ -25,6 +25,8 @@ from hpcclear.dynamics.stepping.settings import (
     MOTION,
     MOTION_OF_EIGHT,
     NEXT_SLOT,
+    OBSERVING,
+    OBSERVING_EIGHT,
     PROFILE,
     RECORDED,
     SLOTS,
@@ -36,7 +38,7 @@ from hpcclear.dynamics.views import Outcome, Parameters, Start
 NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
-OBSERVING = f"{observing_code.__module__}:{observing_code.__name__}"
+OBSERVER = f"{observing_code.__module__}:{observing_code.__name__}"
 ABREAST = f"{abreast_code.__module__}:{abreast_code.__name__}"
 
 
@@ -50,6 +52,9 @@ class Lanes:
         Lanes; 1 for a single response.
     record : numpy.ndarray, optional
         Buffer (rows, columns) for every accepted step of the first sample of the queue, which runs in lane 0.
+    observed : Effects, optional
+        With which the same motion is run a second time while that sample is recorded, for its works and what `observe` returns.
+        No other number depends on it.
 
     Raises
     ------
@@ -57,7 +62,13 @@ class Lanes:
         If the problem's coordinates do not fit the stepper.
     """
 
-    def __init__(self, problem: Problem, width: int, record: Array | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        width: int,
+        record: Array | None = None,
+        observed: at.Effects | None = None,
+    ) -> None:
         n = problem.coordinates
         self.problem = problem
         self.width = width
@@ -74,9 +85,11 @@ class Lanes:
         )
         implicit = problem.implicit != "never"
         self._memory = new_columns(width) if implicit else None
-        effects = problem.effects._replace(sliding=None if self._memory is None else 1)
+        sliding = None if self._memory is None else 1
+        effects = problem.effects._replace(sliding=sliding)
+        self._observed = None if observed is None else observed._replace(sliding=sliding)
         self._rules = at.rules_of(effects)
-        measures = at.measures_of(problem.effects)
+        measures = at.measures_of(observed or problem.effects)
         self._method = at.Method(
             problem.settings().rows,
             problem.tableau.packed(),
@@ -102,15 +115,21 @@ class Lanes:
     @property
     def motions(self) -> list[str]:
         """Its motions as `hpcclear.base.beside` names what another process may compile."""
-        widths = [width for width in self._widths if width]
-        return [f"{TEXT}:{self.problem.motion_text(self._effects, width)}" for width in widths]
+        kinds = [effects for effects in (self._effects, self._observed) if effects is not None]
+        texts = [
+            self.problem.motion_text(effects, width)
+            for effects in kinds
+            for width in self._widths
+            if width
+        ]
+        return [f"{TEXT}:{text}" for text in texts]
 
     def _compile(self) -> None:
         """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
         problem, effects, widths = self.problem, self._effects, self._widths
         stiff = self._memory is not None
         apart = [SPECIAL, *self.motions]
-        apart += [OBSERVING] if len(self.record) else []
+        apart += [OBSERVER] if len(self.record) else []
         with compiled_beside([ABREAST] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, problem.tableau.stages).address
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
@@ -122,6 +141,12 @@ class Lanes:
         self._codes = Codes(special_code().address, explicit, implicit)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        self._observer = int(self._method.numbers[MOTION])
+        if self._observed is not None:
+            for row, width in zip((OBSERVING, OBSERVING_EIGHT), widths, strict=True):
+                address = problem.motion(self._observed, width).address if width else 0
+                self._method.numbers[row] = address
+            self._observer = int(self._method.numbers[OBSERVING])
         note_compiled(self.motions)
         if self._rules.profile:
             self._method.numbers[PROFILE] = profile_code(effects, self.width).address
@@ -130,15 +155,14 @@ class Lanes:
         )
 
     def observe(self, par: Array, states: Array, contacts: Array, times: Array) -> Array:
-        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion that the lanes step with.
+        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion with the observed effects.
 
         Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
         the first step.
         """
         out = np.zeros((len(times), self.problem.coordinates + at.RATES))
         states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
-        motion = int(self._method.numbers[MOTION])
-        observe(motion, par, self.problem.tables, states, contacts, times, out, self.width)
+        observe(self._observer, par, self.problem.tables, states, contacts, times, out, self.width)
         return out
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:
@@ -239,9 +263,14 @@ class Lanes:
         return 0 < len(self.record) == int(self.counters[RECORDED])
 
     def take_record(self) -> Array:
-        """The recorded rows since the last call (a copy); the record is empty afterwards."""
+        """The recorded rows since the last call (a copy); the record is empty afterwards.
+
+        Once the recorded sample is over, those that go on are no longer observed.
+        """
         rows = self.record[: int(self.counters[RECORDED])].copy()
         self.counters[RECORDED] = 0
+        if not self.running[0] or self._block.book[at.SAMPLE * self.width] != 0.0:
+            self._method.numbers[[OBSERVING, OBSERVING_EIGHT]] = 0
         return rows
 
     def step(self, budget: int) -> bool:

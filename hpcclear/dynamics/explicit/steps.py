@@ -12,7 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, any_stage_state, step_error
 from hpcclear.dynamics.explicit.switching import sense_stiffness
-from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.linkage.rhs import run_observed
 from hpcclear.dynamics.stepping.control import coordinate, measure, place
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
@@ -20,6 +20,7 @@ from hpcclear.dynamics.stepping.settings import (
     MEASURES,
     MOTION,
     NUMBERS,
+    OBSERVING,
     RTOL,
     SENSES,
     SETTINGS,
@@ -116,7 +117,7 @@ def any_fresh(work, W):
 
 
 @lane_function
-def take_explicit_steps(effects, motion, step, tables, senses, stages, W):
+def take_explicit_steps(effects, observing, motion, step, tables, senses, stages, W):
     """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
     work, weights = step.work, step.weights
     for s in range(0 if any_fresh(work, W) else 1, stages):
@@ -125,7 +126,7 @@ def take_explicit_steps(effects, motion, step, tables, senses, stages, W):
         else:
             any_stage_state(step, s, stages, W)
         begin_stage(work, effects.rules.free, weights[tab.NODES + s], W)
-        run_motion(motion, work, tables)
+        run_observed(observing, motion, work, tables)
         if s == 0:
             adopt_fresh(effects, work, step.stages, step.n, W)
         else:
@@ -158,7 +159,8 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
     )
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
     curves, senses = carray(tables, at.TABLES), entries[SENSES]
-    take_explicit_steps(effects, of[MOTION], step, curves, senses, stages, W)
+    observing, motion = of[OBSERVING], of[MOTION]
+    take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 
 
 _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)

@@ -67,6 +67,7 @@ from hpcclear.dynamics.stepping.settings import (
     MEASURES,
     MOTION_OF_EIGHT,
     NUMBERS,
+    OBSERVING_EIGHT,
     SETTINGS,
     WIDTH,
     rules_in,
@@ -340,7 +341,9 @@ def steps_abreast(numbers, work, stages, par, settings, tables, measures, memory
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
     of, effects, block = unpacked(numbers, work, stages, par, measures)
     W = of[WIDTH]
-    moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.TABLES))
+    moved = Moved(
+        of[OBSERVING_EIGHT], of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.TABLES)
+    )
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
     settle_columns(block.work, W, eights)
     for e in range(len(eights)):

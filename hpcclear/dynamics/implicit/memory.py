@@ -74,8 +74,9 @@ MEMORY = (GAP_ERROR + at.MAX_JOINTS) * COLUMNS
 
 
 class Moved(NamedTuple):
-    """What is stepped: the address of its motion of eight lanes, coordinates, tables."""
+    """What is stepped: the addresses of its motions of eight lanes (`rhs.run_observed`), coordinates, tables."""
 
+    observing: int
     motion: int
     n: int
     tables: Array

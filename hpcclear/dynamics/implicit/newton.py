@@ -26,7 +26,7 @@ from hpcclear.dynamics.implicit.radau import (
     T,
     weights_at,
 )
-from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.linkage.rhs import run_motion, run_observed
 from hpcclear.dynamics.stepping.control import measure, place
 
 RELATIVE = 1.5e-8  # of a difference: square root of the round-off
@@ -57,7 +57,7 @@ def start_of_step(moved, m):
     for k in range(moved.n):
         put(m, at.QS + k, fetch(m, at.Q + k))
         put(m, at.VS + k, fetch(m, at.V + k))
-    run_motion(moved.motion, m, moved.tables)
+    run_observed(moved.observing, moved.motion, m, moved.tables)
 
 
 @lane_function
@@ -96,7 +96,7 @@ def observe_stages(effects, moved, m, integrated):
     rules = effects.rules
     for s in range(STAGES):
         put_stage(moved.n, m, s)
-        run_motion(moved.motion, m, moved.tables)
+        run_observed(moved.observing, moved.motion, m, moved.tables)
         for k in range(moved.n):
             put(m, mem.STAGE_ACC + s * N + k, fetch(m, at.ACC + k))
         kink_functions(rules, m, mem.STAGE_KINKS + s * ALL_KINKS)
