@@ -236,7 +236,7 @@ MEASURES = (
 )
 INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
-The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
+The explicit and implicit steppers, the books of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
