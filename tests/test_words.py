@@ -42,6 +42,7 @@ FILES = (
     "docs/how-to/speeds.md",
     "docs/how-to/stick-slip.md",
     "docs/how-to/surrogates.md",
+    "docs/how-to/wear.md",
     "docs/how-to/xarray.md",
 )
 """Pages that have been rewritten. Add a page here once it has been."""
