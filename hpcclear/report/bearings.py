@@ -14,6 +14,9 @@ from hpcclear.scene.loading import scene_of_text
 MISSED = 0.01
 """Of a peak force: what the largest stored force may lack of it and still be the same peak."""
 
+ROUNDING = 1e-12
+"""Of the largest torque: a smaller mean is zero but for rounding."""
+
 SENSITIVE = 0.01
 """Half-width over f beyond which f is reported as sensitive to initial conditions."""
 
@@ -94,7 +97,8 @@ def torque(response: xr.Dataset) -> Torque:
         return Torque(np.nan, np.nan)
     moment = response["crank_moment"].to_numpy()[inside]
     weight = _weights(response["time"].to_numpy()[inside])
-    return Torque(float(np.abs(moment).max()), float(weight @ moment))
+    peak, mean = float(np.abs(moment).max()), float(weight @ moment)
+    return Torque(peak, mean if abs(mean) > ROUNDING * peak else 0.0)
 
 
 def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
