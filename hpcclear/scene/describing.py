@@ -32,7 +32,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"
     if effects.friction.law != "none":
-        yield f"friction {effects.friction.law}, coefficient {effects.friction.coefficient:g}"
+        coefficient = effects.friction.value("coefficient")
+        size = "" if coefficient is None else f", coefficient {coefficient:g}"
+        yield f"friction {effects.friction.law}{size}"
     if isinstance(scene.drive, TorqueDrive):
         falls = "" if scene.drive.no_load_speed is None else ", torque falling with speed"
         rest = ", from rest" if scene.drive.initial_speed == 0.0 else ""

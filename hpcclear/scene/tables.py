@@ -133,7 +133,7 @@ class SceneTables(Table):
                 "the nine coordinates of Baumgarte's slider-crank have no place for bristles",
                 'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
                 key="effects.friction.law",
-                value="lugre",
+                value=self.effects.friction.law,
             )
         return self
 
@@ -229,7 +229,7 @@ class SceneTables(Table):
     @property
     def bristles(self) -> int:
         """Joints whose friction has bristles, each with a state of its own."""
-        return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
+        return len(self.clearance_joints()) if self.effects.friction.bristled else 0
 
     def bending(self) -> dict[str, Bending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
@@ -404,4 +404,5 @@ def plain(value: Any) -> Any:
             entry = {row.pop("name"): row for row in entry}
         if entry is not None:
             content[name] = entry
-    return content
+    own = {name: plain(entry) for name, entry in (value.__pydantic_extra__ or {}).items()}
+    return {"law": content["law"], **own, **content} if own else content
