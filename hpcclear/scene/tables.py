@@ -18,6 +18,7 @@ from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance
+from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import SHORT_NAMES
 from hpcclear.scene.wear import Lives
@@ -40,6 +41,7 @@ class SceneTables(Table):
     output: Output = Output()
     study: Study | None = None
     wear: Lives | None = None
+    plugins: Plugins | None = None
 
     elsewhere: ClassVar = {
         key: (f"belongs to [{part}]", f"Write {part}.{key}")
@@ -225,6 +227,11 @@ class SceneTables(Table):
         """Oil films by the labels of their joints."""
         tables = {name: self.clearance_joint(name).film for name in self.clearance_joints()}
         return {name: film for name, film in tables.items() if film is not None}
+
+    @property
+    def plugin_texts(self) -> dict[str, str]:
+        """Source texts of the Python files that this scene names, by module."""
+        return {} if self.plugins is None else {row.name: row.source for row in self.plugins.files}
 
     @property
     def bristles(self) -> int:
