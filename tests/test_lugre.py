@@ -331,7 +331,7 @@ def test_other_laws_have_no_bristles():
         bristled({"effects.friction": coulomb})
     assert caught.value.key == "effects.friction.bristle_stiffness"
     assert caught.value.value == 1e5
-    assert "'coulomb' has no bristles" in caught.value.reason
+    assert "'coulomb' has no bristle_stiffness" in caught.value.reason
 
 
 def test_units_of_bristles_are_converted():

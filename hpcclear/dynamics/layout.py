@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.laws.declared import MOST_NUMBERS
 
 TURN = 6.283185307179586  # rad
 
@@ -148,7 +147,7 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
 ) = range(30)
 JOINT_ROWS = 30
-LAW_NUMBERS = MOST_NUMBERS
+LAW_NUMBERS = 8
 """Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
 JOINT_BLOCKS = 30  # of all joints, one behind the other
 # within a joint's block
