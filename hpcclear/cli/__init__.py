@@ -21,7 +21,7 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import ensembles, scenes, studies
+from hpcclear.cli import ensembles, laws, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
@@ -34,6 +34,7 @@ _ROOT_ALONE = (
     scenes.reproduce,
     scenes.crate,
     scenes.schema,
+    laws.laws,
 )
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
+TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
+
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
@@ -145,15 +147,18 @@ def simulate(written: Written, output: Path) -> int:
 
 @click.command(short_help="Write figures and an HTML page.")
 @click.argument("directory", type=PATH)
+@TRUST
 @of_one_process
-def report(directory: Path) -> int:
+def report(directory: Path, trust: bool) -> int:
     """Write figures and a self-contained HTML page from a directory of results.
 
     Example: hpcclear report results/quickstart
     """
+    from hpcclear.plugins import trusting
     from hpcclear.report.html.page import write_report
 
-    show(f"report  {write_report(directory)}")
+    with trusting(trust):
+        show(f"report  {write_report(directory)}")
     return Exit.DONE
 
 
@@ -166,8 +171,9 @@ def report(directory: Path) -> int:
     show_default=True,
     help="Number of samples to repeat of each file.",
 )
+@TRUST
 @of_one_process
-def reproduce(place: Path, samples: int) -> int:
+def reproduce(place: Path, samples: int, trust: bool) -> int:
     """Repeat some simulations of a result from the scene in its file, and compare bit by bit.
 
     PLACE is a result file or a directory of results. Other versions and processors than those of the result are listed.
@@ -176,8 +182,10 @@ def reproduce(place: Path, samples: int) -> int:
     Example: hpcclear reproduce results/quickstart
     """
     from hpcclear.ensemble.repeating import repeated
+    from hpcclear.plugins import trusting
 
-    found = list(repeated(place, samples))
+    with trusting(trust):
+        found = list(repeated(place, samples))
     for one in found:
         said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
         show(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))
