@@ -127,7 +127,15 @@ def test_what_is_measured_goes_by_the_effects():
     assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
     worn = at.Effects(rod_slider=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
-    assert max(one.rate for one in at.MEASURES) < 64  # `control.measure` keeps six bits
+    for mask, largest in (
+        (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
+        (at.JOINT_MASK, at.MAX_JOINTS - 1),
+        (at.COORDINATE_MASK, at.MAX_COORDINATES - 1),
+    ):
+        assert all(number & mask == number for number in range(largest + 1))
+    assert (
+        at.MEASURE_MASK < at.RATES
+    )  # what the compiler then knows of the distance between two rows
 
 
 def test_rules_are_numbers_of_one_kind():

@@ -199,18 +199,16 @@ GAP_RATE = FORCE + MAX_JOINTS
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-FORCE_KINKS = DRIVE_MOMENT + 1
+FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of the slider, or of a point along x; for responses only
+FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
+FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
+SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
+FORCE_KINKS = SLIDING_POWERS + MAX_JOINTS
 """Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
 sides of friction's ramp."""
 LOW_KINKS = FORCE_KINKS + MAX_JOINTS
 HIGH_KINKS = LOW_KINKS + MAX_JOINTS
-FOLLOWED_ACCELERATION = (
-    HIGH_KINKS + MAX_JOINTS
-)  # of the slider, or of a point along x; for responses only
-FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
-FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
-SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-ANGLES = SLIDING_POWERS + MAX_JOINTS
+ANGLES = HIGH_KINKS + MAX_JOINTS
 """Of each joint cosine and sine of the contact's angle in the bearing, then in the journal; these and what follows are for
 profiles of wear only, and stand last, so that others need not pass over them."""
 PROFILES = (
@@ -248,6 +246,16 @@ INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 The explicit and implicit steppers, the books of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
+
+
+def _mask(largest: int) -> int:
+    """All bits that numbers up to `largest` have: taken with it a number is not below 0, and no other number."""
+    return (1 << largest.bit_length()) - 1
+
+
+JOINT_MASK = _mask(MAX_JOINTS - 1)
+COORDINATE_MASK = _mask(MAX_COORDINATES - 1)
+MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 
 def measures_of(effects: Effects) -> np.ndarray:

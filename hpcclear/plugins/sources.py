@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import importlib.abc
 import importlib.util
+import linecache
 import re
 import sys
 import traceback
@@ -116,11 +117,12 @@ def run_source(module: str, text: str) -> ModuleType:
     name = f"hpcclear_plugin_{module}_{digest(text)[:16]}"
     if name in sys.modules:
         return sys.modules[name]
-    path = f"<{module}.py of the scene>"
+    path = f"<{module}.py of the scene, {digest(text)[:12]}>"
     spec = importlib.util.spec_from_loader(name, _Loader(text, path), origin=path)
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
+    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
     sys.modules[name] = made  # dataclasses look their module up while it is run
     try:
         spec.loader.exec_module(made)
