@@ -413,7 +413,7 @@ def _next(
         yield "raise study.samples: the surrogate is off there, and a better design may hide"
     twins = alike.others(ours, best)
     if twins and ours.attrs.get("method") == "qmc":
-        yield "a smaller study.verification.accuracy tells designs apart that read the same"
+        yield "a smaller study.accuracy tells designs apart that read the same"
     elif twins and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
     found, name = files.get("chaos"), str(best["design"].item())

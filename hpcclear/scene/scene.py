@@ -7,8 +7,9 @@ import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError, unboxed
-from hpcclear.scene import budget, citation, describing, domain
+from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.units import noting
@@ -29,7 +30,6 @@ class Scene(SceneTables):
         if self.study is None:
             return self
         self._check_worn_inputs()
-        budget.check(self.study, self.numerics)
         numbers = self._numbers()
         for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
             for row in rows:
@@ -116,7 +116,7 @@ class Scene(SceneTables):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Texts whose unit left open what is meant, and how each was read, a sentence each."""
+        """Texts whose unit left open what is meant, entries of an earlier version, and how each was read, a sentence each."""
         return self._readings
 
     @property
@@ -170,10 +170,11 @@ class Scene(SceneTables):
 
 def scene_of(content: Mapping[str, Any]) -> Scene:
     """The scene of a file's tables, with the readings of its units; errors as `load_scene`."""
+    content, former = renewed(content)
     read: dict[str, str] = {}
     with noting(read.__setitem__):
         scene = validated(Scene, content)
-    scene._readings = tuple(_placed(content, read)) if read else ()
+    scene._readings = (*former, *(_placed(content, read) if read else ()))
     return scene
 
 
