@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pairwise import CONTACTS, FRICTIONS, all_pairs, pairs_of, pairwise_table
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
+from some_laws import FRICTION, effects_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -113,8 +114,12 @@ def test_every_pair_of_effects_runs(row):
 
 
 ZEROS = {
-    "coulomb": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
-    "ambrosio": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
+    "coulomb": dict.fromkeys(
+        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
+    ),
+    "ambrosio": dict.fromkeys(
+        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
+    ),
     "gravity": {at.GRAVITY: 0.0},
     "load": {at.LOAD: 0.0},
     "load_table": {at.LOAD: 0.0},
@@ -145,6 +150,8 @@ def assert_same_motion(one, other):
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
     scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
     flags = dict.fromkeys((effect, "short_film", "long_film") if effect == "film" else (effect,), 1)
+    if effect in FRICTION:
+        flags = {"friction": effects_with({effect}).friction}
     assert_same_motion(run(scene, flags, ZEROS[effect]), without)
 
 
@@ -248,7 +255,7 @@ def test_what_a_scene_leaves_out_is_off():
     on = {
         name for name, value in effects_of(load_scene(SCENE))._asdict().items() if value is not None
     }
-    assert on == {"crank_rod", "rod_slider", "latched", "coulomb"}
+    assert on == {"crank_rod", "rod_slider", "contact", "friction"}
     bare = scene_with(
         {"joints.crank_rod": IDEAL, "joints.rod_slider": IDEAL, "effects.friction": {"law": "none"}}
     )

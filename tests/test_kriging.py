@@ -9,12 +9,12 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.fitting import fit_kriging
+from hpcclear.statistics.surrogate.fitting import KrigingMethod, fit_kriging
 from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise, stored_fields
 from hpcclear.statistics.surrogate.predictor import gaussian, matern
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
@@ -369,6 +369,7 @@ def test_names_must_fit(model):
 
 
 SQUARE = np.array([[0.0, 1.0], [0.0, 2.0]])
+METHOD = KrigingMethod(restarts=0)
 
 
 def kinked(points):
@@ -388,9 +389,10 @@ class Counted:
 
 def fit_kinked(evaluate, seed=0, **changes):
     arguments = {"samples": 30, "test_samples": 40, "max_resamples": 0, "max_depth": 5}
-    arguments |= {"r2_min": 0.999, "rmae_max": 0.05, "restarts": 0} | changes
+    arguments |= {"r2_min": 0.999, "rmae_max": 0.05} | changes
     settings = SubintervalSettings(**arguments)
-    return fit_subintervals(evaluate, SQUARE, settings, rng=np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    return fit_subintervals(evaluate, SQUARE, settings, rng=rng, method=METHOD)
 
 
 def test_recursion_cuts_where_the_kink_is(shift):
@@ -437,7 +439,6 @@ def test_grid_of_subintervals_and_borders():
     np.testing.assert_allclose(pieces.predict(places), places.sum(axis=1), atol=1e-3)
     one = pieces.leaves[pieces.locate(places[3:])[0]]
     assert pieces.predict(places[3:]) == one.predict(places[3:])
-    assert pieces.variance(places[3:]) == one.variance(places[3:])
 
 
 def test_pieces_refuse_what_lies_outside():
@@ -449,10 +450,10 @@ def test_pieces_refuse_what_lies_outside():
 def test_pieces_round_trip_is_bitwise():
     pieces = fit_kinked(kinked)
     arrays = {name: np.copy(array) for name, array in pieces.to_arrays().items()}
-    assert arrays.keys() == PIECEWISE_FIELDS.keys()
-    for name, dims in PIECEWISE_FIELDS.items():
+    assert arrays.keys() == stored_fields(METHOD).keys()
+    for name, dims in stored_fields(METHOD).items():
         assert arrays[name].ndim == len(dims), name
-    again = PiecewiseKriging.from_arrays(arrays)
+    again = Piecewise.from_arrays(arrays, METHOD)
     places = draw(200, 14, SQUARE)
     assert (again.predict(places) == pieces.predict(places)).all()
     assert (again.accepted == pieces.accepted).all()
@@ -465,7 +466,7 @@ def test_pieces_round_trip_is_bitwise():
         ("names", arrays["names"][:1]),
     ]:
         with pytest.raises(InputError):
-            PiecewiseKriging.from_arrays(arrays | {name: damaged})
+            Piecewise.from_arrays(arrays | {name: damaged}, METHOD)
 
 
 def test_pieces_are_deterministic_and_survive_failures():

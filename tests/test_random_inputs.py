@@ -18,7 +18,7 @@ from hpcclear.scene.sampling import latin_hypercube, monte_carlo, sampled
 from hpcclear.statistics.random.distributions import Tabled
 from hpcclear.statistics.surrogate.kernels import MATERN, SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.optimisation import problem_of
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -308,9 +308,7 @@ def test_rules_and_kernel_integrals_agree_with_quadrature(name: str) -> None:
         np.testing.assert_allclose(weights @ kernel(nodes), exact, atol=1e-5)
 
 
-def _model(
-    scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTIAL
-) -> PiecewiseKriging:
+def _model(scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTIAL) -> Piecewise:
     """Any model of the optimisation's inputs over their widened box."""
     names = scene.required_study.optimisation
     region = box(scene, names, sorted({n for c in scene.required_study.cases for n in c.random}))
@@ -323,7 +321,7 @@ def _model(
         inputs=region.lower + unit * (region.upper - region.lower), values=np.zeros(40), alpha=rng.normal(size=40),
         kernel=kernel,
     )  # fmt: skip
-    return PiecewiseKriging((leaf,), np.ones(1), np.zeros(1), np.array([True]))
+    return Piecewise((leaf,), np.ones(1), np.zeros(1), np.array([True]))
 
 
 def test_a_model_that_found_noise_is_averaged_by_draws() -> None:

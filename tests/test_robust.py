@@ -21,7 +21,7 @@ from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, sample_moments
 from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 
 LOWER, UPPER = np.array([1.0, -0.2, 5e-5, 3e-4]), np.array([2.0, 0.3, 8e-4, 1e-3])
 NAMES = ("m", "u", "I", "C")
@@ -338,7 +338,7 @@ def pieces():
         (upper if u == 0 else lower)[1] = 0.03
         (upper if c == 0 else lower)[3] = 5e-4
         leaves.append(surrogate(lower=lower, upper=upper, seed=k))
-    return PiecewiseKriging(tuple(leaves), np.ones(4), np.zeros(4), np.ones(4, bool))
+    return Piecewise(tuple(leaves), np.ones(4), np.zeros(4), np.ones(4, bool))
 
 
 @pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1], UNIFORM[1:2]])
@@ -362,7 +362,7 @@ def test_piecewise_with_derived_inputs_takes_monte_carlo():
             (np.array([1.5, *LOWER[1:]]), RATIO_UPPER),
         ]
     )
-    model = PiecewiseKriging(leaves, np.ones(2), np.zeros(2), np.ones(2, bool))
+    model = Piecewise(leaves, np.ones(2), np.zeros(2), np.ones(2, bool))
     with pytest.raises(InputError, match="derived on a piecewise model"):
         RobustObjective(model, DESIGN, UNIFORM, derived=RATIO, probes=designs(3))
     objective = RobustObjective(
@@ -431,7 +431,7 @@ def test_matern_has_no_tensor_rule_and_no_closed_form():
     rough = replace(surrogate(), kernel=MATERN)
     with pytest.raises(InputError, match="no product") as caught:
         RobustObjective(rough, DESIGN, UNIFORM[:1])
-    assert caught.value.key == "kernel"
+    assert caught.value.key == "surrogate"
     averaged = RobustObjective(rough, DESIGN, UNIFORM[:1], draws=(64, np.random.default_rng(0)))
     with pytest.raises(InputError, match="no closed form"):
         averaged.closed_form(designs(1))

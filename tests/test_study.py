@@ -27,6 +27,7 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import (
     chaos,
     extent,
@@ -35,7 +36,6 @@ from hpcclear.study import (
     responses,
     run_study,
     sensitivities,
-    surrogates,
 )
 from hpcclear.study.paper import claims
 
@@ -189,7 +189,7 @@ def test_alpha_and_beta_have_the_least_and_the_front_is_true(results):
 
 
 def test_a_user_can_go_on_from_the_models(results):
-    models = surrogates.read_kriging(results / "kriging.nc")
+    models = models_in(dataset.read(results / "kriging.nc", "kriging"))
     assert set(models) == {"m2 m3 C", "m2 m3 u2 I2_ratio C"}
     model = models["m2 m3 u2 I2_ratio C"]
     m2, m3, u2, c = 0.3, 0.1, 0.05, 6e-4
@@ -210,9 +210,10 @@ def test_another_kernel_and_chosen_terms_go_through_to_the_files(results, tmp_pa
     )  # fmt: skip
     place = tmp_path / "out"
     run_study(scene, place, alone(), progress_style="quiet")
-    models = surrogates.read_kriging(place / "kriging.nc")
+    models = models_in(dataset.read(place / "kriging.nc", "kriging"))
     assert {leaf.kernel for model in models.values() for leaf in model.leaves} == {"matern-5/2"}
-    model, other = models["m2 m3 C"], surrogates.read_kriging(results / "kriging.nc")["m2 m3 C"]
+    known = models_in(dataset.read(results / "kriging.nc", "kriging"))
+    model, other = models["m2 m3 C"], known["m2 m3 C"]
     assert {leaf.kernel for leaf in other.leaves} == {"squared-exponential"}
     at = np.array([[0.3, 0.1, 6e-4]])
     assert model.predict(at) == pytest.approx(other.predict(at), rel=0.05)
@@ -334,8 +335,8 @@ def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     spoilt = found.copy(deep=True)
     spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
     lines = dict(answer(files | {"chaos": spoilt}, "here"))
-    assert "moves 50% of the samples of this one, which makes 40% of its variance" in lines["chaos"]
-    assert "averaged_revolutions" in lines["next"]
+    assert "change 50% of the samples of this one and explain 40% of its variance" in lines["chaos"]
+    assert "averaged_revolutions" in lines["next steps"]
 
 
 def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):
@@ -668,7 +669,7 @@ def test_the_swarm_sees_the_exact_moments():
     from hpcclear.scene.domain import box, to_coordinates
     from hpcclear.scene.sampling import latin_hypercube
     from hpcclear.statistics.surrogate.fitting import fit_kriging
-    from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+    from hpcclear.statistics.surrogate.piecewise import Piecewise
 
     widen = ("m2", "m3", "u2", "I2", "C")
     points = latin_hypercube(scene, 250, names=names, widen=widen)
@@ -683,7 +684,7 @@ def test_the_swarm_sees_the_exact_moments():
         rng=np.random.default_rng(0),
         names=("m2", "m3", "u2", "I2_ratio", "C"),
     )
-    surrogate = PiecewiseKriging((model,), np.ones(1), np.ones(1), np.ones(1, bool))
+    surrogate = Piecewise((model,), np.ones(1), np.ones(1), np.ones(1, bool))
     design = {"m2": 0.2, "m3": 0.15, "u2": 0.05, "I2": 4e-4}
     for case, robust in (("first", False), ("second", True)):
         problem = optimisation.problem_of(scene, case, surrogate)

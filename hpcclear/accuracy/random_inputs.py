@@ -15,7 +15,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
-from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.leaf import Leaf
 from hpcclear.study.optimisation import problem_of
 
 ESTIMATES = ("surrogate", "simulation")
@@ -62,7 +62,7 @@ def middle_of(scene: Scene, case: str) -> tuple[tuple[str, ...], Array]:
 
 
 def measure(
-    scene: Scene, case: str, model: Kriging, profile: Profile, values: Array, each: float
+    scene: Scene, case: str, model: Leaf, profile: Profile, values: Array, each: float
 ) -> RandomInputs:
     """Measure at the middle of the design space.
 
@@ -71,7 +71,7 @@ def measure(
     scene : Scene
         With a study that has the case.
     case : str
-    model : Kriging
+    model : Leaf
         In the inputs of the study's optimisation.
     profile : Profile
     values : ndarray, shape (n,)

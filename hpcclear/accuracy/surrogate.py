@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,13 +15,12 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import generator, unit_lhs
-from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, correlation
-from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.fitting import KrigingMethod
+from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
-from hpcclear.study.surrogates import coordinate
+from hpcclear.study.surrogates import coordinate, method_of
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Surrogates:
     leave_one_out: Array  # RMS, over the standard deviation of the values
     fit_seconds: Array
     sample_seconds: float
-    model: Kriging
+    model: Leaf
     """The Kriging model of the largest sample, with the squared exponential."""
 
 
@@ -66,7 +66,7 @@ def measure(
 ) -> Surrogates:
     """Fit the surrogates to samples of each size and compare them with fresh simulations.
 
-    They are two, and Kriging with the kernel that the study asks for, where that is another than the squared exponential.
+    They are two, and what the study asks for, where that is another than Kriging with the squared exponential.
     `values`, shape (n,), and `sample_seconds` are those of `simulate`.
     """
     region, rng = region_of(scene, case), _generator(scene)
@@ -74,11 +74,10 @@ def measure(
     parts = np.split(values, np.cumsum([len(one) for one in coordinates])[:-1])
     bounds = np.column_stack([region.lower, region.upper])
     names = [coordinate(scene.required_study.variable(name)) for name in region.names]
-    asked = scene.required_study.surrogate.kernel
-    kernels = {"Kriging": SQUARED_EXPONENTIAL}
-    if asked not in (None, SQUARED_EXPONENTIAL):
-        kernels[f"Kriging, {asked}"] = asked
-    shape = (1 + len(kernels), len(profile.training))
+    methods: dict[str, Method] = {"Kriging": KrigingMethod()}
+    asked = method_of(scene)
+    methods |= {asked.label: asked} if asked.label else {}
+    shape = (1 + len(methods), len(profile.training))
     r2, rmae, loo, seconds = (np.full(shape, np.nan) for _ in range(4))
     for k, (points, f) in enumerate(zip(coordinates[:-1], parts[:-1], strict=True)):
         deviation = np.nanstd(f)
@@ -88,16 +87,18 @@ def measure(
         seconds[0, k] = time.perf_counter() - started
         loo[0, k] = np.sqrt(np.mean(surface.leave_one_out_errors**2)) / deviation
         models = []
-        for j, kernel in enumerate(kernels.values(), 1):
+        for j, method in enumerate(methods.values(), 1):
             started = time.perf_counter()
-            models.append(fit_kriging(points, f, bounds, rng=rng, names=names, kernel=kernel))
+            models.append(method.fit(points, f, bounds, rng=rng, names=names))
             seconds[j, k] = time.perf_counter() - started
-            loo[j, k] = np.sqrt(np.mean(leave_one_out(models[-1]) ** 2)) / deviation
-        for j, surrogate in enumerate((surface, *models)):
-            found = accuracy(parts[-1], surrogate.predict(coordinates[-1]))  # type: ignore[attr-defined]
+            left_out = models[-1].values - models[-1].leave_one_out()
+            loo[j, k] = np.sqrt(np.mean(left_out**2)) / deviation
+        predictors: list[Any] = [surface, *models]
+        for j, surrogate in enumerate(predictors):
+            found = accuracy(parts[-1], surrogate.predict(coordinates[-1]))
             r2[j, k], rmae[j, k] = found.r2, found.rmae
     training = np.array(profile.training, np.int64)
-    fitted = ("response surface", *kernels)
+    fitted = ("response surface", *methods)
     return Surrogates(fitted, training, r2, rmae, loo, seconds, sample_seconds, models[0])
 
 
@@ -123,15 +124,3 @@ def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[
     values = records["objective"]
     busy = float(ranks.stage_seconds[stage][:, 0].sum())
     return np.where(records["status"] == Status.OK, values, np.nan), busy / len(points)
-
-
-def leave_one_out(model: Kriging) -> Array:
-    """Error at each training point of the Kriging model with the same hyperparameters and without that point.
-
-    Dubrule 1983 (doi:10.1007/BF01033232): ``alpha_i / (K^-1)_ii``; in the unit of the values, shape (n,).
-    """
-    train = model.to_unit(model.inputs) / model.length_scales
-    squares = np.square(train[:, None, :] - train[None, :, :]).sum(axis=2)
-    matrix = model.signal_variance * correlation(squares, model.kernel)
-    matrix[np.diag_indices_from(matrix)] += model.noise_variance
-    return model.scale * model.alpha / np.diag(np.linalg.inv(matrix))

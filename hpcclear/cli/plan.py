@@ -72,7 +72,7 @@ def _needs(
         rows.append(("reached", row.reached))
     if command == "run":
         text = (
-            f"and {plan.responses} single responses; refused surrogates and limits that are hard to meet take more; "
+            f"and {plan.responses} single responses; refused surrogates and tight constraints need more; "
             "single responses, fits and swarm run on one core"
         )
         rows.append(("simulations", f"{simulations}, {text}"))

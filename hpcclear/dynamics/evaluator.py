@@ -94,13 +94,6 @@ COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
 times the largest difference of nine others in 4 % of cases, by more than 1.7 times that of three others in 8 %."""
 
-HERTZ_RANGE = 0.25
-"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
-
-Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
-the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
-"""
-
 
 class Evaluator:
     """Simulates points of one scene as a stream: submit some, advance, submit more while others run.
@@ -117,6 +110,8 @@ class Evaluator:
         half-width; by default `KICKS` with ``numerics.uncertainty``, else none.
     objective : Objective
         Of which that half-width is.
+    recorder : Lanes, optional
+        By which samples are simulated, instead of lanes of its own.
 
     Raises
     ------
@@ -131,6 +126,7 @@ class Evaluator:
         lanes: int = DEFAULT_LANES,
         kicks: Sequence[int] | None = None,
         objective: Objective = MEAN_GAP,
+        recorder: Lanes | None = None,
     ) -> None:
         self.scene = scene
         self.lanes = lanes
@@ -141,7 +137,10 @@ class Evaluator:
         self._copies = 1 + len(self._kicks)
         self._objective = objective
         problem = problem_of(scene)
-        self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+        if recorder is not None:
+            self._lanes: Lanes | ClosedForm = recorder
+        else:
+            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}
@@ -155,7 +154,10 @@ class Evaluator:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         made = Points(self._columns.names, points, self._columns.paths)
         par = parameters(self.scene, made)
-        start = start_states(self.scene, par, made)
+        self.queue(index, par, start_states(self.scene, par, made))
+
+    def queue(self, index: Integers, par: Array, start: Start) -> None:
+        """Queue samples by their indices (m,), kernel parameters (m, PARAMETERS) and m starts."""
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
             par, start, labels = with_copies(
@@ -295,9 +297,7 @@ def sliding_work(outcome: Outcome) -> Array:
 
 
 def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
-    """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
-    p = Parameters(par)
-    # places without a joint have neither radii nor penetration
-    ratio = p.journal_radius / np.maximum(p.bearing_radius, 1e-300)
-    beyond: Booleans = np.any(outcome.deepest > HERTZ_RANGE * ratio * p.clearance, axis=1)
+    """Whether a penetration in the averaged revolutions left the range of its law, shape (m,)."""
+    # places without a joint have no penetration
+    beyond: Booleans = np.any(outcome.deepest > Parameters(par).deepest_valid, axis=1)
     return beyond

@@ -8,20 +8,19 @@ from typing import Any, cast
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
+from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
 from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
-from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
 from hpcclear.dynamics.stepping.settings import STRICT
@@ -90,8 +89,6 @@ class Problem:
     """torque_table and load_table: cubic cells of a periodic table, 4 coefficients a cell."""
     implicit: str = "never"
     """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
-    collocation: bool = False
-    """Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes."""
     cycle: float = at.TURN
     """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
     parameter_rows: int = at.OWN
@@ -102,8 +99,6 @@ class Problem:
     """Cubic cells of a linkage's tables."""
     chosen: tuple[int, ...] = ()
     """Places of the joints whose gaps count for f; none for all."""
-    single: bool = False
-    """Whether it is for one response, whose implicit steps have its stages side by side; those of ensembles go abreast."""
     from_rest: bool = False
     """Whether the body that a torque drives may begin at rest."""
 
@@ -205,8 +200,6 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         swings = not main.advance
     else:
         first, second, free = topology(scene)
-    contact_law = e.contact.law if e.contact is not None and count else None
-    friction_law = e.friction.law if count else None
     torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
     load_is_table = isinstance(e.slider_load, tuple)
     waves = scene.waves()
@@ -216,11 +209,8 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         rod_slider=_flag(second),
         joints=count if scene.is_planar else None,
         swinging=_flag(swings),
-        fixed=_flag(contact_law == "hunt-crossley"),
-        latched=_flag(contact_law in contact.LATCHED_LAWS),
-        coulomb=_flag(friction_law == "coulomb"),
-        ambrosio=_flag(friction_law == "ambrosio"),
-        lugre=_flag(friction_law == "lugre"),
+        contact=in_lanes(e.contact.declared) if e.contact is not None and count else None,
+        friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         bending=None if scene.is_planar else scene.modes or None,
         torque=_flag(free),
         torque_table=_flag(free and torque_is_table),
@@ -300,38 +290,15 @@ def implicit_method(scene: Scene) -> str:
     if scene.films() or scene.bristles:
         return "stiff"  # a film's damping grows beyond all bounds as it gets thin; bristles give way within a micrometre
     par = Parameters(parameters(scene)[0])
-    friction = scene.effects.friction.law
-    contact_law = getattr(scene.effects.contact, "law", "hertz")
     is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
-    ramp = par.friction * par.inverse_ramp * (friction != "none")
-    damping = par.damping * (contact_law != "hertz")
-    stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
+    ramp = par.steepness * (scene.effects.friction.law != "none")
+    stiff = (ramp >= STIFF_RAMP) | (par.damping >= STIFF_DAMPING)
     return "stiff" if (stiff & is_open).any() else "never"
 
 
 def _bars_of(scene: Scene) -> Mechanism:
     """The mechanism whose bars bend."""
     return planar.linkage_of(scene).mechanism if scene.is_planar else slider_crank_mechanism(scene)
-
-
-def takes_collocation(scene: Scene) -> bool:
-    """Whether samples are integrated one by one, by collocation: where ``numerics.method`` names it.
-
-    "auto" never chooses it, so that a response and the sample of the same design are the same number.
-
-    Raises
-    ------
-    InputError
-        If it is named with Baumgarte's formulation, which has Runge-Kutta pairs alone.
-    """
-    if scene.numerics.method != "lobatto":
-        return False
-    if scene.numerics.formulation != "minimal":
-        raise InputError(
-            "numerics.method", "lobatto", "works in minimal coordinates only",
-            'set numerics.formulation = "minimal" or another method',
-        )  # fmt: skip
-    return True
 
 
 def _cells_of_curves(
@@ -349,10 +316,8 @@ def _cells_of_curves(
     )
 
 
-def problem_of(
-    scene: Scene, *, series: bool = False, ledger: bool | None = None, single: bool = False
-) -> Problem:
-    """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
+def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+    """What is common to all samples of a scene."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
     drive: Any = main_drive(planar.tables_of(scene)) if scene.is_planar else scene.drive
@@ -380,8 +345,6 @@ def problem_of(
         torque_table=cells(torque) if isinstance(torque, tuple) else None,
         load_table=cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
-        collocation=takes_collocation(scene),
-        single=single,
         cycle=at.TURN if linkage is None else linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
         linkage=linkage,
@@ -395,7 +358,5 @@ def integrator_of(scene: Scene) -> str:
     """Name of the method that a scene's responses and samples are integrated by."""
     if coordinate_count(scene) == 0:
         return "closed form"
-    if takes_collocation(scene):
-        return "lobatto"
     name = tableau_of(scene).name
     return {"never": name, "stiff": f"{name} and radau", "always": "radau"}[implicit_method(scene)]

@@ -232,7 +232,7 @@ def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> 
 
 
 def _together(book: Book, good: list[int]) -> Part:
-    """Leave out all at once what is within the tolerance singly; where that fails, in pairs, then all but what these refuse."""
+    """Leave out all at once what is within the tolerance singly, pairs where that fails; then all but what pairs refuse."""
     plan = book.plan
     cheap = [k for k in good if book.work((k,)) <= MORE_WORK]
     explicit = plan.implicit(()) and not plan.implicit(_set(book, good))

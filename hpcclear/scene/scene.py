@@ -7,10 +7,12 @@ import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError, unboxed
+from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
+from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
@@ -24,6 +26,10 @@ class Scene(SceneTables):
 
     _text: str = PrivateAttr("")
     _readings: tuple[str, ...] = PrivateAttr(())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As its content: laws are functions, which are found again where they are needed."""
+        return _unpickled, (self.resolved(), self._text, self._readings)
 
     @model_validator(mode="after")
     def _study_fits_mechanism(self) -> Self:
@@ -76,7 +82,7 @@ class Scene(SceneTables):
         """Each bound of each variable, widened by what is random about it, must still make a
         mechanism."""
         assert self.study is not None
-        names = (*PHYSICAL, "numerics")
+        names = (*PHYSICAL, "numerics", "plugins")
         content = {name: plain(table) for name in names if (table := getattr(self, name))}
         reach = {row.name: row.span for row in self.study.random if not row.absolute}
         spans = {
@@ -135,7 +141,7 @@ class Scene(SceneTables):
 
     def to_toml(self) -> str:
         """TOML text of the resolved content; loading it gives an equal scene."""
-        return tomli_w.dumps(self.resolved())
+        return tomli_w.dumps(self.resolved(), multiline_strings=True)
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> "Scene":
         """A new, validated scene with some entries replaced.
@@ -168,12 +174,25 @@ class Scene(SceneTables):
         return hash(self.hash)
 
 
+def _unpickled(content: Mapping[str, Any], text: str, readings: tuple[str, ...]) -> Scene:
+    """A scene from what `Scene.__reduce__` gives."""
+    scene = scene_of(content)
+    scene._text, scene._readings = text, readings
+    return scene
+
+
 def scene_of(content: Mapping[str, Any]) -> Scene:
-    """The scene of a file's tables, with the readings of its units; errors as `load_scene`."""
+    """The scene of a file's tables, with the readings of its units; errors as `load_scene`.
+
+    Source text that it carries is run: `load_scene` sees to it that it may be.
+    """
     content, former = renewed(content)
     read: dict[str, str] = {}
-    with noting(read.__setitem__):
+    with noting(read.__setitem__), using(texts_of(content)) as packages:
         scene = validated(Scene, content)
+        rows = {name: {"version": version} for name, version in sorted(packages.items())}
+        if rows != content.get("plugins", {}).get("packages", {}):
+            scene = validated(Scene, replace(content, "plugins.packages", rows))
     scene._readings = (*former, *(_placed(content, read) if read else ()))
     return scene
 

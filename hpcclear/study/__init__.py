@@ -152,8 +152,9 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
     kriging = run.stage("kriging", surrogates.fit_all)
     _write_samples(run)
 
-    model = surrogates.models_of(kriging)[-1]
-    surrogates.write(run, kriging)
+    models = surrogates.models_of(run.scene, kriging)
+    model = models[-1]
+    surrogates.write(run, kriging, models)
     found = run.stage("optimisation", optimisation.optimise, model)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], model)

@@ -7,15 +7,13 @@ import numpy as np
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.results import dataset
 from hpcclear.scene.domain import to_physical
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import most_of, names_of
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
 
 
-def write(
-    run: StudyRun, fronts: Result, verified: Sequence[Choice], model: PiecewiseKriging
-) -> None:
+def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piecewise) -> None:
     """Write front.nc: every run's front of every case, and which solutions were simulated."""
     cases = [case.name for case in run.study.cases]
     names = run.study.optimisation

@@ -26,12 +26,12 @@ from hpcclear.statistics.random.distributions import (
     Uniform,
 )
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
-from hpcclear.statistics.random.moments import RobustObjective, separable
+from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import ends_in_all, excess, guessed
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate
@@ -101,7 +101,7 @@ class Problem:
         return found
 
 
-def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
+def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
     """The problem of one case on a surrogate of its objective.
 
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
@@ -136,7 +136,7 @@ def problem_of(scene: Scene, case: str, model: PiecewiseKriging) -> Problem:
         def joint(count: int, rng: np.random.Generator) -> dict[str, Array]:
             return offsets(scene, random, list(rng.random((len(random), count)) + 2.0**-54))
 
-    elif study.swarm.statistics == "quadrature" and not separable(model):
+    elif study.swarm.statistics == "quadrature" and not model.separable:
         draws = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
     elif askew or study.swarm.statistics == "monte-carlo":
         draws = (study.swarm.monte_carlo_samples, rng)
@@ -201,7 +201,7 @@ def _ratio(scene: Scene, inertia: str) -> Derived:
     return Derived(coordinate(study.variable(variable[inertia])), tuple(of), function)
 
 
-def optimise(run: StudyRun, model: PiecewiseKriging) -> Result:
+def optimise(run: StudyRun, model: Piecewise) -> Result:
     """All runs of the swarm on all cases.
 
     Returns

@@ -1,20 +1,21 @@
-"""Kriging models of the objective: fitted, checked on fresh points, written and read back."""
+"""Surrogates of the objective: fitted, checked on fresh points, written and read back."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from hpcclear.results import dataset
+from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
+from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
-from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import PIECEWISE_FIELDS, PiecewiseKriging
-from hpcclear.statistics.surrogate.stored import KERNEL, SCALARS, models_in
+from hpcclear.statistics.surrogate.piecewise import Piecewise, stored_fields
+from hpcclear.statistics.surrogate.stored import rows_of
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 from hpcclear.study.run import Result, StudyRun
 
@@ -33,6 +34,12 @@ def domain(run: StudyRun, names: Sequence[str]) -> Box:
     return box(run.scene, names, sorted(widen) if tuple(names) == run.study.optimisation else ())
 
 
+def method_of(scene: Scene) -> Method:
+    """The kind of surrogate that a study asks for."""
+    settings = scene.required_study.surrogate
+    return KrigingMethod(settings.restarts, settings.kernel or SQUARED_EXPONENTIAL)
+
+
 def fit_all(run: StudyRun) -> Result:
     """Fit every model of the study (method: `hpcclear.statistics.surrogate.subintervals`), and check each.
 
@@ -42,6 +49,7 @@ def fit_all(run: StudyRun) -> Result:
         For `models_of` and `write`.
     """
     result: Result = {}
+    method = method_of(run.scene)
     for k, names in enumerate(run.study.models):
         region, settings = domain(run, names), run.study.surrogate
         model = fit_subintervals(
@@ -54,9 +62,8 @@ def fit_all(run: StudyRun) -> Result:
                 rmae_max=settings.rmae,
                 max_resamples=settings.resamplings,
                 max_depth=settings.cuts,
-                restarts=settings.restarts,
-                kernel=settings.kernel or SQUARED_EXPONENTIAL,
             ),
+            method=method,
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
         )
@@ -74,22 +81,28 @@ def _tests(study: Study) -> int:
     return max(study.test_samples, 2)
 
 
-def models_of(result: Mapping[str, np.ndarray]) -> list[PiecewiseKriging]:
-    """The models in a result of `fit_all` (arrays of any shape, by name), in the order of the study's."""
-    found: list[PiecewiseKriging] = []
+def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]:
+    """The models in a result of `fit_all` (arrays of any shape, by name), in the order of the study's.
+
+    Raises
+    ------
+    InputError
+        A model that is fitted again comes out as another one.
+    """
+    found: list[Piecewise] = []
+    method = method_of(scene)
     while f"model{len(found)}_names" in result:
         start = f"model{len(found)}_"
-        found.append(
-            PiecewiseKriging.from_arrays({name: result[start + name] for name in PIECEWISE_FIELDS})
-        )
+        arrays = {name: result[start + name] for name in stored_fields(method)}
+        found.append(Piecewise.from_arrays(arrays, method))
     return found
 
 
-def _packed(k: int, model: PiecewiseKriging) -> Result:
+def _packed(k: int, model: Piecewise) -> Result:
     return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
 
 
-def _checked(run: StudyRun, k: int, model: PiecewiseKriging) -> Result:
+def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:
     """Accuracy over the whole domain on fresh points, which decided nothing."""
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
@@ -100,36 +113,12 @@ def _checked(run: StudyRun, k: int, model: PiecewiseKriging) -> Result:
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}
 
 
-def write(run: StudyRun, result: Result) -> None:
-    """Write kriging.nc: a row for each subinterval's model."""
-    models = models_of(result)
+def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
+    """Write kriging.nc: a row for each subinterval's model, of whatever kind."""
     leaves = [(k, leaf) for k, model in enumerate(models) for leaf in model.leaves]
     parameters = list(dict.fromkeys(name for _, leaf in leaves for name in leaf.names))
-    points = max(len(leaf.values) for _, leaf in leaves)
     families = [" ".join(model.names) for model in models]
-    shape = (len(leaves), points)
-    data: dict[str, np.ndarray] = {
-        name: np.full(shape, np.nan) for name in ("training_output", "weight", *parameters)
-    }
-    data["length_scale"] = np.full((len(leaves), len(parameters)), np.nan)
-    data["used"] = np.zeros((len(leaves), len(parameters)), np.int8)
-    for name in parameters:
-        data |= {f"{name}_{end}": np.full(len(leaves), np.nan) for end in ("lower", "upper")}
-    for row, (_, leaf) in enumerate(leaves):
-        data["training_output"][row, : len(leaf.values)] = leaf.values
-        data["weight"][row, : len(leaf.values)] = leaf.alpha
-        for column, name in enumerate(leaf.names):
-            place = parameters.index(name)
-            data["length_scale"][row, place] = leaf.length_scales[column]
-            data["used"][row, place] = 1
-            data[name][row, : len(leaf.values)] = leaf.inputs[:, column]
-            data[f"{name}_lower"][row] = leaf.lower[column]
-            data[f"{name}_upper"][row] = leaf.upper[column]
-    for name, field in SCALARS.items():
-        data[name] = np.array([getattr(leaf, field) for _, leaf in leaves])
-    if any(leaf.kernel != SQUARED_EXPONENTIAL for _, leaf in leaves):
-        data[KERNEL] = np.array([leaf.kernel for _, leaf in leaves])
-    data["points"] = np.array([len(leaf.values) for _, leaf in leaves])
+    data = rows_of([leaf for _, leaf in leaves], parameters)
     data["accepted"] = np.concatenate([model.accepted for model in models]).astype(np.int8)
     checks = np.array([result[f"model{k}_check"] for k, _ in leaves])
     data |= {name: checks[:, column] for column, name in enumerate(_CHECKS)}
@@ -137,7 +126,7 @@ def write(run: StudyRun, result: Result) -> None:
     names = [_label(models[k], families[k], leaf) for k, leaf in leaves]
     coords = {
         "model": np.array(names),
-        "point": np.arange(points),
+        "point": np.arange(data["training_output"].shape[1]),
         "parameter": np.array(parameters),
     }
     content = dataset.dataset(
@@ -146,7 +135,7 @@ def write(run: StudyRun, result: Result) -> None:
     run.write(content, "kriging.nc")
 
 
-def _label(model: PiecewiseKriging, family: str, leaf: Kriging) -> str:
+def _label(model: Piecewise, family: str, leaf: Leaf) -> str:
     return family if len(model.leaves) == 1 else f"{family} {model.leaves.index(leaf) + 1}"
 
 
@@ -158,14 +147,3 @@ def _units(run: StudyRun) -> dict[str, str]:
         else variable.unit
         for variable in run.study.variables
     }
-
-
-def read_kriging(path: str | Path) -> dict[str, PiecewiseKriging]:
-    """The models in a kriging.nc, by their inputs ("m2 m3 u2 I2_ratio C"), ready to predict.
-
-    Raises
-    ------
-    InputError
-        The file is not one, or is damaged.
-    """
-    return models_in(dataset.read(path, "kriging"))

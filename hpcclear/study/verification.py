@@ -11,7 +11,7 @@ from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import excess, most_of, names_of
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
@@ -30,7 +30,7 @@ def original(run: StudyRun) -> list[Choice]:
     return found
 
 
-def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging) -> Array:
+def predicted(run: StudyRun, choices: Sequence[Choice], model: Piecewise) -> Array:
     """Mean and deviation by the surrogate, (n, 2); NaN outside its domain."""
     problems = {case.name: problem_of(run.scene, case.name, model) for case in run.study.cases}
     found = [
@@ -42,9 +42,7 @@ def predicted(run: StudyRun, choices: Sequence[Choice], model: PiecewiseKriging)
     return np.array(found).reshape(-1, 2)
 
 
-def missed(
-    run: StudyRun, choices: Sequence[Choice], true: Result, model: PiecewiseKriging
-) -> list[str]:
+def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecewise) -> list[str]:
     """Where the surrogate of f is further from the truth than the study allows at the ends of fronts, in words."""
     settings, texts = run.study.verification, []
     rows = [k for k, one in enumerate(choices) if one.name in run.study.case(one.case).ends]
@@ -189,7 +187,7 @@ def write(
     run: StudyRun,
     table: Table,
     true: Result,
-    model: PiecewiseKriging,
+    model: Piecewise,
     remarks: Sequence[str],
     printed: Mapping[str, Array],
     over_life: Mapping[str, Array],
@@ -202,7 +200,7 @@ def write(
     table : Table
     true : dict of arrays, shape (n, ...)
         Of `hpcclear.study.truth.simulate`, over the same designs.
-    model : PiecewiseKriging
+    model : Piecewise
         The surrogate that was searched.
     remarks : sequence of str
         What a reader should know, a sentence each.

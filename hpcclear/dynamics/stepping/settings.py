@@ -38,14 +38,19 @@ STRICT = 1e-6
 COUNTERS = 4
 
 # ---- numbers by which a stepper asks for what is compiled apart from it
-(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT, PROFILE) = range(9)
-RULES = 9  # the first of them
+(
+    ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT, OBSERVING, OBSERVING_EIGHT, PROFILE,
+    RULES,  # the first of them
+) = range(12)  # fmt: skip
 NUMBERS = RULES + len(at.Rules._fields)
 
 
 def numbers_of(rules: at.Rules, width: int, n: int, measures: int) -> Integers:
     """Those of a stepper of `width` lanes, whose motions have no addresses yet."""
-    return np.array([0, 0, 0, width, n, measures, 0, 0, 0, *rules], np.int64)
+    numbers = np.zeros(NUMBERS, np.int64)
+    numbers[WIDTH], numbers[COORDINATES], numbers[MEASURES] = width, n, measures
+    numbers[RULES:] = rules
+    return numbers
 
 
 @lane_function
@@ -53,6 +58,6 @@ def rules_in(numbers):
     """The rules among such numbers."""
     r = RULES
     return at.Rules(
-        numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4],
-        numbers[r + 5], numbers[r + 6], numbers[r + 7], numbers[r + 8], numbers[r + 9],
+        numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4], numbers[r + 5],
+        numbers[r + 6],
     )  # fmt: skip

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+    from hpcclear.statistics.surrogate.piecewise import Piecewise
 
 
 @style.drawn
@@ -211,7 +211,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     return figure
 
 
-def _fields(model: "PiecewiseKriging", main: int) -> tuple[Any, Any, Any, Any]:
+def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
     """Predictions over the two inputs that are not the clearance: grids (n,), values (2, n, n), clearances (2,)."""
     lower, upper = model.lower, model.upper
     x, y = (np.linspace(lower[i], upper[i], 41) for i in range(3) if i != main)
@@ -226,7 +226,7 @@ def _fields(model: "PiecewiseKriging", main: int) -> tuple[Any, Any, Any, Any]:
 
 @style.drawn
 def parity_figure(kriging: xr.Dataset) -> "Figure":
-    """Surrogate against dynamics, every Kriging model (the paper's Figs. 6 and 8).
+    """Surrogate against dynamics, every model (the paper's Figs. 6 and 8).
 
     Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
     points of the study stands in the titles.
@@ -236,7 +236,6 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     kriging : xarray.Dataset
         Kind ``kriging``.
     """
-    from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
     found = models_in(kriging)
@@ -250,8 +249,9 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
         fits.mark(panel, known[name], 0.12)
-        kernels = {leaf.kernel for leaf in model.leaves} - {SQUARED_EXPONENTIAL}
-        told = "".join(f", {kernel}" for kernel in sorted(kernels))
+        told = "".join(
+            f", {label}" for label in sorted({leaf.label for leaf in model.leaves} - {""})
+        )
         panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{told}")
     limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(limits)[0], max(high for _, high in limits))

@@ -13,17 +13,21 @@ and I2. Inputs that share a random source form a group with a tensor rule of its
 is still a product over the groups.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
-from hpcclear.statistics.surrogate.kriging import inside
+from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.leaf import inside
+
+MOST_PLACES = 2**16
+"""Points at which a surrogate is asked at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,24 +72,19 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
     return SampledMoments(mean, deviation, deviation / sqrt(count), np.sqrt(spread) / twice)
 
 
-def separable(model: Surrogate) -> bool:
-    """Whether the model's kernel is a product over its inputs, which tensor rules need."""
-    return all(leaf.kernel == SQUARED_EXPONENTIAL for leaf in model.leaves)
-
-
 class RobustObjective:
     """Mean and deviation of a surrogate under random inputs, for whole swarms of designs.
 
     Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
-    On a `PiecewiseKriging` the rules are split at the borders of the boxes (each piece is smooth);
+    On a `Piecewise` model the rules are split at the borders of the boxes (each piece is smooth);
     this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
     `draws`.
 
     Parameters
     ----------
-    model : Kriging or PiecewiseKriging
+    model : Kriging or Piecewise
     design_names : sequence of str
         Names of the design variables, in the order of their columns.
     random_inputs : sequence of RandomVariable
@@ -140,20 +139,20 @@ class RobustObjective:
             self._draws = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
         elif draws is not None:
             self._draws = self._drawn(*draws)
-        elif not separable(model):
-            kernel = model.leaves[0].kernel
-            raise InputError("kernel", kernel, "no product of the inputs", 'use "monte-carlo"')
+        elif not model.separable:
+            label = model.leaves[0].label
+            raise InputError("surrogate", label, "no product of the inputs", 'use "monte-carlo"')
         else:
             self._rules = tuple(
-                TensorRule(leaf, model, self._wiring, tolerance, probes) for leaf in model.leaves
+                TensorRule(leaf, model, self._wiring, tolerance, probes)  # type: ignore[arg-type]
+                for leaf in model.leaves
             )
         self.nodes = tuple(rule.counts for rule in self._rules)
 
     def __call__(self, designs: np.ndarray) -> np.ndarray:
         designs = self._checked(designs)
         if self._draws is not None:
-            moments = sample_moments(self._sampled(designs, self._draws))
-            return np.stack([moments.mean, moments.deviation], axis=1)
+            return self._averaged(designs, self._draws)
         share, mean, variance = (np.zeros((len(self._rules), len(designs))) for _ in range(3))
         for k, rule in enumerate(self._rules):
             share[k], mean[k], variance[k] = rule.moments(designs)
@@ -183,12 +182,13 @@ class RobustObjective:
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
         """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
         designs = self._checked(designs)
-        simple = len(self.model.leaves) == 1 and separable(self.model)
+        leaf, *others = self.model.leaves
+        simple = isinstance(leaf, Kriging) and leaf.separable and not others
         if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
                 "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
             )
-        return np.array([self._closed(design) for design in designs]).reshape(-1, 2)
+        return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
 
     def _drawn(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Draws of every random input, ``(1, samples)`` each."""
@@ -211,18 +211,36 @@ class RobustObjective:
             inside(ends, model.names, model.lower, model.upper)
         return designs
 
+    def _averaged(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Mean and deviation over draws, ``(n, 2)``: the model's own, if it has any."""
+        found = []
+        for places in self._places(designs, draws):
+            own = self.model.moments(places)
+            if own is None:
+                values = self.model.predict(places.reshape(-1, places.shape[2]))
+                moments = sample_moments(values.reshape(places.shape[:2]))
+                own = np.stack([moments.mean, moments.deviation], axis=1)
+            found.append(own)
+        return np.concatenate(found) if found else np.empty((0, 2))
+
     def _sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The surrogate at all draws of each design, ``(n, s)``, design by design for memory."""
+        """The surrogate at all draws of each design, ``(n, s)``."""
+        found = [
+            self.model.predict(places.reshape(-1, places.shape[2])).reshape(places.shape[:2])
+            for places in self._places(designs, draws)
+        ]
+        return np.concatenate(found) if found else np.empty((0, 1))
+
+    def _places(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> Iterator[np.ndarray]:
+        """Model inputs of all draws, ``(k, s, d)``, of so many designs at a time as memory holds."""
         dims = range(len(self.model.names))
         size = max((array.shape[1] for array in draws.values()), default=1)
-        values = np.empty((len(designs), size))
-        for k in range(len(designs)):
-            places = self._wiring.places(dims, designs[k : k + 1], draws)
-            values[k] = self.model.predict(places[0])
-        return values
+        step = max(MOST_PLACES // size, 1)
+        for k in range(0, len(designs), step):
+            yield self._wiring.places(dims, designs[k : k + step], draws)
 
-    def _closed(self, design: np.ndarray) -> tuple[float, float]:
-        leaf, wiring = self.model.leaves[0], self._wiring
+    def _closed(self, leaf: Any, design: np.ndarray) -> tuple[float, float]:
+        wiring = self._wiring
         weights = leaf.scale * leaf.signal_variance * leaf.alpha
         lengths = leaf.length_scales * (leaf.upper - leaf.lower)
         single, double = np.ones(weights.size), np.ones((weights.size, weights.size))

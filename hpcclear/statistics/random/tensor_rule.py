@@ -10,10 +10,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.distributions import nodes_needed, piece_rule
 from hpcclear.statistics.random.inputs import Group, Wiring, tensor
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import tensor_moments
 
-Surrogate = Kriging | PiecewiseKriging
+Surrogate = Kriging | Piecewise
 MOST_NODES = 48
 """For one random input; needing more means that it spans many length scales of the surrogate."""
 MOST_TENSOR = 200_000

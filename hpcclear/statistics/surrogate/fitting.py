@@ -1,14 +1,15 @@
 """Kriging models fitted by maximum likelihood (`likelihood`); sources: `kriging`."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.kernels import KERNELS, SQUARED_EXPONENTIAL, Kernel
-from hpcclear.statistics.surrogate.kriging import Kriging, inside
+from hpcclear.statistics.surrogate.kriging import FIELDS, Kriging
+from hpcclear.statistics.surrogate.leaf import checked_samples
 from hpcclear.statistics.surrogate.likelihood import maximise
 
 LENGTH_BOUNDS = (1e-2, 1e2)
@@ -17,6 +18,38 @@ SIGNAL_BOUNDS = (1e-3, 1e3)
 """Signal variance, in units of the variance of the values."""
 NOISE_BOUNDS = (1e-8, 1e1)
 """Noise variance, in the same units; the lower end keeps the covariance matrix invertible."""
+
+
+@dataclass(frozen=True)
+class KrigingMethod:
+    """Kriging as a `hpcclear.statistics.surrogate.leaf.Method`; the settings are those of `fit_kriging`."""
+
+    restarts: int = 3
+    kernel: Kernel = SQUARED_EXPONENTIAL
+    fields = FIELDS
+
+    @property
+    def label(self) -> str:
+        """Kriging and its kernel, where that is not the squared exponential."""
+        return "" if self.kernel == SQUARED_EXPONENTIAL else f"Kriging, {self.kernel}"
+
+    def fit(
+        self,
+        points: np.ndarray,
+        values: np.ndarray,
+        bounds: np.ndarray,
+        *,
+        rng: np.random.Generator,
+        names: Sequence[str] | None = None,
+    ) -> Kriging:
+        """See `fit_kriging`."""
+        return fit_kriging(
+            points, values, bounds, rng=rng, names=names, restarts=self.restarts, kernel=self.kernel
+        )
+
+    def restored(self, arrays: Mapping[str, np.ndarray]) -> Kriging:
+        """See `Kriging.from_arrays`."""
+        return Kriging.from_arrays(arrays)
 
 
 def fit_kriging(
@@ -64,8 +97,8 @@ def fit_kriging(
     if kernel not in KERNELS:
         raise InputError("kernel", kernel, "not known", f"take {' or '.join(KERNELS)}")
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
-    labels = _check_shapes(points, values, bounds, names)
-    valid = _check_samples(points, values, labels, bounds)
+    needed = points.shape[-1] + 3  # length scales, signal, noise, mean
+    labels, valid = checked_samples(points, values, bounds, names, needed)
     inputs, outcomes = points[valid], values[valid]
     mean, scale = float(outcomes.mean()), float(outcomes.std())
     if scale <= 10 * np.finfo(float).eps * abs(mean):  # all equal but for round-off
@@ -74,7 +107,11 @@ def fit_kriging(
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
     found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel)
-    samples = {"inputs": inputs, "values": values[valid], "dropped": int((~valid).sum())}
+    samples: dict[str, Any] = {
+        "inputs": inputs,
+        "values": values[valid],
+        "dropped": int((~valid).sum()),
+    }
     return Kriging(labels, lower, upper, **found, mean=mean, scale=scale, **samples, kernel=kernel)
 
 
@@ -97,47 +134,3 @@ def _maximise_likelihood(
     with threadpool_limits(limits=1, user_api="blas"):
         found = maximise(unit, normalised, start, bounds, restarts, seed, kernel=kernel)
     return asdict(found)
-
-
-def _check_shapes(
-    points: np.ndarray, values: np.ndarray, bounds: np.ndarray, names: Sequence[str] | None
-) -> tuple[str, ...]:
-    """The inputs' names, after checking that the arrays fit together."""
-    if points.ndim != 2 or points.shape[1] == 0:
-        raise InputError("points", points.shape, "not a table of points", "give shape (n, d)")
-    dims = points.shape[1]
-    if values.shape != points.shape[:1]:
-        raise InputError("values", values.shape, "not one per point", f"give {points.shape[0]}")
-    if bounds.shape != (dims, 2):
-        raise InputError("bounds", bounds.shape, "wrong shape", f"give shape ({dims}, 2)")
-    labels = tuple(f"x{k + 1}" for k in range(dims)) if names is None else tuple(names)
-    if len(labels) != dims or len(set(labels)) != dims:
-        raise InputError("names", labels, "not one distinct name per input", f"give {dims} names")
-    for name, (low, high) in zip(labels, bounds, strict=True):
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            raise InputError(
-                name, (low, high), "bounds are crossed or not finite", "give lower < upper"
-            )
-    return labels
-
-
-def _check_samples(
-    points: np.ndarray, values: np.ndarray, names: Sequence[str], bounds: np.ndarray
-) -> np.ndarray:
-    """Which samples count, ``(n,)`` bool; NaN values are failed samples."""
-    inside(points, names, *bounds.T)
-    if np.isinf(values).any():
-        index = int(np.isinf(values).argmax())
-        raise InputError(
-            f"values[{index}]", values[index], "infinite", "mark failed samples with NaN"
-        )
-    valid = np.isfinite(values)
-    needed = points.shape[1] + 3  # length scales, signal, noise, mean
-    if valid.sum() < needed:
-        raise InputError(
-            "values",
-            int(valid.sum()),
-            f"too few valid samples for {points.shape[1]} inputs ({values.size} given)",
-            f"give at least {needed}, better ten times the number of inputs",
-        )
-    return valid

@@ -15,7 +15,7 @@ Sources: J. Sacks et al., "Design and analysis of computer experiments", Statist
 Machine Learning" (2006), section 2.2 and algorithm 2.1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,9 +31,10 @@ from hpcclear.statistics.surrogate.kernels import (
     Kernel,
     correlation,
 )
+from hpcclear.statistics.surrogate.leaf import Columns, Fields, inside
 from hpcclear.statistics.surrogate.predictor import kernel_sum, matern_sum, pad
 
-FIELDS: dict[str, tuple[str, ...]] = {
+FIELDS: Fields = {
     "names": ("parameter",),
     "lower": ("parameter",),
     "upper": ("parameter",),
@@ -49,6 +50,16 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "kernel": (),
 }
 """What a stored model consists of, and the dimensions of each array."""
+COLUMNS: Columns = {
+    "weight": ("point", "alpha"),
+    "length_scale": ("parameter", "length_scales"),
+    "signal_variance": ("", "signal_variance"),
+    "noise_variance": ("", "noise_variance"),
+    "output_mean": ("", "mean"),
+    "output_scale": ("", "scale"),
+    "dropped": ("", "dropped"),
+}
+"""What the rows of a dataset hold of a model (`hpcclear.statistics.surrogate.leaf.Columns`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +112,35 @@ class Kriging:
 
     @property
     def leaves(self) -> tuple["Kriging", ...]:
-        """The models this one consists of: itself (see `PiecewiseKriging`)."""
+        """The models this one consists of: itself (see `hpcclear.statistics.surrogate.piecewise.Piecewise`)."""
         return (self,)
+
+    @property
+    def fields(self) -> Fields:
+        """`FIELDS`."""
+        return FIELDS
+
+    @property
+    def label(self) -> str:
+        """The kernel, where it is not the squared exponential."""
+        return "" if self.separable else self.kernel
+
+    @property
+    def separable(self) -> bool:
+        """Whether the kernel is a product over the inputs, which tensor rules need."""
+        return self.kernel == SQUARED_EXPONENTIAL
+
+    @property
+    def columns(self) -> Columns:
+        """What is stored of it; the kernel is left out where it is the squared exponential."""
+        return COLUMNS if self.separable else {**COLUMNS, "kernel": ("", "kernel")}
+
+    def steepest(self) -> int:
+        """The input with the shortest length scale."""
+        return int(np.argmin(self.length_scales))
+
+    def moments(self, points: np.ndarray) -> None:
+        """None: averages of `predict`, where there is no tensor rule."""
 
     def to_unit(self, points: np.ndarray) -> np.ndarray:
         """Points ``(..., d)`` in the user's units as points of the unit cube."""
@@ -215,35 +253,6 @@ class Kriging:
             raise InputError("kernel", fields["kernel"], "not known", f"use {' or '.join(KERNELS)}")
         fields["dropped"] = int(fields["dropped"])
         return cls(**fields)
-
-
-def inside(
-    points: np.ndarray, names: Sequence[str], lower: np.ndarray, upper: np.ndarray
-) -> np.ndarray:
-    """Points ``(n, d)`` as floats, after checking that none lies outside the box.
-
-    Raises
-    ------
-    InputError
-        Naming the first variable and value outside.
-    """
-    points = np.asarray(points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != lower.size:
-        raise InputError(
-            "points", points.shape, "wrong shape", f"give an array of shape (n, {lower.size})"
-        )
-    slack = 8 * np.finfo(float).eps * np.maximum(abs(lower), abs(upper))
-    good = (points >= lower - slack) & (points <= upper + slack)  # False for NaN too
-    if not good.all():
-        row, column = np.argwhere(~good)[0]
-        raise InputError(
-            names[column],
-            float(points[row, column]),
-            f"outside the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]; "
-            "it does not extrapolate",
-            "ask inside the domain, or fit the surrogate on a wider one",
-        )
-    return points
 
 
 def _check_array(

@@ -1,4 +1,4 @@
-"""Kriging over a wide domain as a product of models, each on its own subinterval of the inputs.
+"""A surrogate over a wide domain as a set of models, each on its own subinterval of the inputs.
 
 The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's interval, L'_i that of
 its subintervals). A query uses the model of the box it is in. A single model is the case of one box.
@@ -11,23 +11,19 @@ from functools import cached_property
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.kriging import FIELDS, Kriging, inside
+from hpcclear.statistics.surrogate.leaf import Leaf, Method, inside
 
-SHARED = ("names",)
-RAGGED = ("inputs", "values", "alpha")
-PIECEWISE_FIELDS: dict[str, tuple[str, ...]] = {
-    name: dims if name in SHARED + RAGGED else ("leaf", *dims) for name, dims in FIELDS.items()
-} | {"training_points": ("leaf",), "r2": ("leaf",), "rmae": ("leaf",), "accepted": ("leaf",)}
-"""What is stored, with dimensions; the leaves' training points lie end to end."""
+RAGGED = ("training_point",)
+JUDGED = ("r2", "rmae", "accepted")
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseKriging:
-    """Kriging models on boxes that tile a domain.
+class Piecewise:
+    """Models of one kind on boxes that tile a domain.
 
     Attributes
     ----------
-    leaves : tuple of Kriging
+    leaves : tuple of Leaf
         One model a box, all with the same names.
     r2, rmae : (l,) arrays
         Accuracy of each on its own test points (NaN where the test values do not vary).
@@ -40,7 +36,7 @@ class PiecewiseKriging:
         No boxes, different names, or boxes that overlap or leave gaps.
     """
 
-    leaves: tuple[Kriging, ...]
+    leaves: tuple[Leaf, ...]
     r2: np.ndarray
     rmae: np.ndarray
     accepted: np.ndarray
@@ -48,7 +44,7 @@ class PiecewiseKriging:
     def __post_init__(self) -> None:
         if not self.leaves or any(leaf.names != self.leaves[0].names for leaf in self.leaves):
             raise InputError("leaves", len(self.leaves), "no models of one kind", "give some")
-        for name in ("r2", "rmae", "accepted"):
+        for name in JUDGED:
             if np.shape(getattr(self, name)) != (len(self.leaves),):
                 raise InputError(name, np.shape(getattr(self, name)), "not one per box", "give all")
         lower, upper = self._corners
@@ -93,37 +89,37 @@ class PiecewiseKriging:
             index[((points >= low) & below).all(axis=1)] = k
         return index
 
+    @property
+    def separable(self) -> bool:
+        """Whether moments have tensor rules."""
+        return all(leaf.separable for leaf in self.leaves)
+
     def predict(self, points: np.ndarray) -> np.ndarray:
-        """Kriging mean at ``(n, d)`` points, each by its box's model; see `Kriging.predict`."""
-        return self._by_leaf(points, lambda leaf, part: leaf.predict(part))
-
-    def variance(self, points: np.ndarray, *, noise: bool = False) -> np.ndarray:
-        """Kriging variance at ``(n, d)`` points; see `Kriging.variance`."""
-        return self._by_leaf(points, lambda leaf, part: leaf.variance(part, noise=noise))
-
-    def _by_leaf(self, points: np.ndarray, answer) -> np.ndarray:  # type: ignore[no-untyped-def]
+        """Values at ``(n, d)`` points, each by its box's model; InputError outside the domain."""
         index = self.locate(points)
         points, out = np.asarray(points, dtype=np.float64), np.empty(len(index))
         for k in np.unique(index):
             leaf, here = self.leaves[k], index == k
-            out[here] = answer(leaf, np.clip(points[here], leaf.lower, leaf.upper))
+            out[here] = leaf.predict(np.clip(points[here], leaf.lower, leaf.upper))
         return out
 
+    def moments(self, points: np.ndarray) -> np.ndarray | None:
+        """Mean and deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else None."""
+        return self.leaves[0].moments(points) if len(self.leaves) == 1 else None
+
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """The models as plain arrays, without pickle; `PIECEWISE_FIELDS` names their dimensions."""
+        """The models as plain arrays, without pickle; `stored_fields` names their dimensions."""
         parts = [leaf.to_arrays() for leaf in self.leaves]
-        arrays = {
-            name: np.stack([part[name] for part in parts]) for name in FIELDS if name not in RAGGED
-        }
-        arrays["names"] = parts[0]["names"]
-        arrays |= {name: np.concatenate([part[name] for part in parts]) for name in RAGGED}
+        arrays = {"names": parts[0]["names"]}
+        for name, dims in self.leaves[0].fields.items():
+            if name != "names":
+                joined = np.concatenate if dims[:1] == RAGGED else np.stack
+                arrays[name] = joined([part[name] for part in parts])
         arrays["training_points"] = np.array([part["values"].size for part in parts])
-        return arrays | {
-            name: np.asarray(getattr(self, name)) for name in ("r2", "rmae", "accepted")
-        }
+        return arrays | {name: np.asarray(getattr(self, name)) for name in JUDGED}
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "PiecewiseKriging":
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray], method: Method) -> "Piecewise":
         """The models that `to_arrays` stored; they predict the same to the last bit.
 
         Raises
@@ -132,25 +128,36 @@ class PiecewiseKriging:
             An array is missing, has the wrong shape, or is not finite; the boxes do not tile.
         """
         remedy = "use a file written by this package"
-        for name in PIECEWISE_FIELDS:
+        for name in stored_fields(method):
             if name not in arrays:
                 raise InputError(name, None, "missing from the stored model", remedy)
         counts = np.asarray(arrays["training_points"])
-        stored = np.shape(arrays["values"])
         if counts.ndim != 1 or counts.dtype.kind not in "iu" or (counts < 1).any():
             raise InputError("training_points", counts, "not one count per box", remedy)
+        stored = np.shape(arrays["values"])
         if stored != (counts.sum(),):
             raise InputError("values", stored, "not as many as training_points says", remedy)
         ends = np.cumsum(counts)
         leaves = []
         for k, (count, end) in enumerate(zip(counts, ends, strict=True)):
-            part = {name: np.asarray(arrays[name]) for name in SHARED}
-            part |= {name: np.asarray(arrays[name])[end - count : end] for name in RAGGED}
-            for name in FIELDS:
-                if name not in part:
-                    if np.shape(arrays[name])[:1] != counts.shape:
-                        raise InputError(name, np.shape(arrays[name]), "not one per box", remedy)
-                    part[name] = np.asarray(arrays[name])[k]
-            leaves.append(Kriging.from_arrays(part))
+            part = {"names": np.asarray(arrays["names"])}
+            for name, dims in method.fields.items():
+                array = np.asarray(arrays[name])
+                if dims[:1] == RAGGED:
+                    part[name] = array[end - count : end]
+                elif name != "names":
+                    if np.shape(array)[:1] != counts.shape:
+                        raise InputError(name, np.shape(array), "not one per box", remedy)
+                    part[name] = array[k]
+            leaves.append(method.restored(part))
         r2, rmae = (np.asarray(arrays[name], dtype=np.float64) for name in ("r2", "rmae"))
         return cls(tuple(leaves), r2, rmae, np.asarray(arrays["accepted"], dtype=bool))
+
+
+def stored_fields(method: Method) -> dict[str, tuple[str, ...]]:
+    """What is stored, with dimensions; the leaves' training points lie end to end."""
+    own = {
+        name: dims if name == "names" or dims[:1] == RAGGED else ("leaf", *dims)
+        for name, dims in method.fields.items()
+    }
+    return own | dict.fromkeys(("training_points", *JUDGED), ("leaf",))

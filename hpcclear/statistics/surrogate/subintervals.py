@@ -1,4 +1,4 @@
-"""Piecewise Kriging fitted box by box, until each is accepted or a limit is reached.
+"""Surrogates fitted box by box, until each is accepted or a limit is reached.
 
 A box is accepted by R2 and RMAE on test points of its own; a refused one gets more training points,
 then is cut in half across the input that varies fastest, down to a stated depth.
@@ -11,12 +11,13 @@ from itertools import product
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
-from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.fitting import KrigingMethod
+from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.piecewise import PiecewiseKriging
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.response_surface import Evaluate, Sampler, latin_hypercube
+
+KRIGING = KrigingMethod()
 
 
 @dataclass(eq=False)
@@ -45,8 +46,6 @@ class SubintervalSettings:
     rmae_max: float = 0.3  # and at most this
     max_resamples: int = 1  # how often a refused box gets `samples` further points before it is cut
     max_depth: int = 3  # how often it may be cut in half; refused there it stays, not accepted
-    restarts: int = 3  # of `fit_kriging`, as is the kernel
-    kernel: Kernel = SQUARED_EXPONENTIAL
 
 
 def fit_subintervals(
@@ -57,8 +56,9 @@ def fit_subintervals(
     rng: np.random.Generator,
     names: Sequence[str] | None = None,
     sample: Sampler = latin_hypercube,
-) -> PiecewiseKriging:
-    """Fit Kriging models on subintervals until each is accepted or a limit is reached.
+    method: Method = KRIGING,
+) -> Piecewise:
+    """Fit models on subintervals until each is accepted or a limit is reached.
 
     Boxes of one generation are evaluated in a single call, so that many ranks can share it.
 
@@ -75,17 +75,20 @@ def fit_subintervals(
         Names of the inputs.
     sample : callable
         ``sample(n, bounds, rng)`` draws points in a box.
+    method : Method
+        What is fitted.
 
     Returns
     -------
-    PiecewiseKriging
+    Piecewise
 
     Raises
     ------
     InputError
-        As `fit_kriging` and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
+        As the method's fit and `accuracy`: crossed bounds, or a box whose samples (nearly) all failed.
     """
-    pending, done = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng), []
+    pending = _first_boxes(np.asarray(bounds, dtype=np.float64), settings.cuts, rng)
+    done: list[tuple[Leaf, Accuracy, bool]] = []
     counts = settings.samples, settings.test_samples
     for box in pending:
         box.wanted = [sample(n, box.bounds, box.rng) for n in counts]
@@ -93,15 +96,7 @@ def fit_subintervals(
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
         for box in pending:
-            model = fit_kriging(
-                box.points,
-                box.values,
-                box.bounds,
-                rng=box.rng,
-                names=names,
-                restarts=settings.restarts,
-                kernel=settings.kernel,
-            )
+            model = method.fit(box.points, box.values, box.bounds, rng=box.rng, names=names)
             reached = accuracy(box.truths, model.predict(box.tests))
             accepted = reached.meets(settings.r2_min, settings.rmae_max)
             if not accepted and box.resampled < settings.max_resamples:
@@ -109,7 +104,7 @@ def fit_subintervals(
                 box.wanted = [sample(settings.samples, box.bounds, box.rng), box.tests[:0]]
                 following.append(box)
             elif not accepted and box.depth < settings.max_depth:
-                for half in _halves(box, int(np.argmin(model.length_scales))):
+                for half in _halves(box, model.steepest()):
                     half.wanted = [sample(n, half.bounds, half.rng) for n in counts]
                     following.append(half)
             else:
@@ -200,10 +195,10 @@ def _halves(box: _Box, dim: int) -> list[_Box]:
     return halves
 
 
-def _joined(done: list[tuple[Kriging, Accuracy, bool]]) -> PiecewiseKriging:
+def _joined(done: list[tuple[Leaf, Accuracy, bool]]) -> Piecewise:
     """One object, boxes in the order of their lower corners."""
     done = sorted(done, key=lambda item: tuple(item[0].lower))
-    return PiecewiseKriging(
+    return Piecewise(
         leaves=tuple(model for model, _, _ in done),
         r2=np.array([reached.r2 for _, reached, _ in done]),
         rmae=np.array([reached.rmae for _, reached, _ in done]),

@@ -1,0 +1,316 @@
+"""Surrogates made of anything that fits and predicts as scikit-learn's regressors do.
+
+A regressor gets inputs scaled to the unit cube of its box and outputs of mean 0 and standard deviation 1, so that its own
+settings need no units. Shapes and numbers of its answers are checked. Each fit must
+come out again bit for bit, because a study that goes on after an interruption fits it again to the stored training points.
+"""
+
+import copy
+import inspect
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.surrogate.leaf import Columns, Fields, checked_samples, inside
+
+KEY = "study.surrogate.model"
+FOLDS = 5
+"""Parts of the training points that are left out one after the other; also the fewest points there may be."""
+LEVELS = 5
+"""Values of an input at which it is seen how much predictions vary with it."""
+
+FIELDS: Fields = {
+    "names": ("parameter",),
+    "lower": ("parameter",),
+    "upper": ("parameter",),
+    "inputs": ("training_point", "parameter"),
+    "values": ("training_point",),
+    "fitted": ("training_point",),
+    "left_out": ("training_point",),
+    "seed": (),
+    "dropped": (),
+}
+COLUMNS: Columns = {
+    "cross_validated": ("point", "left_out"),
+    "dropped": ("", "dropped"),
+    "surrogate": ("", "label"),
+}
+
+
+@dataclass(frozen=True)
+class RegressionMethod:
+    """A regressor as a `hpcclear.statistics.surrogate.leaf.Method`.
+
+    Attributes
+    ----------
+    source : object
+        A class or a function that needs no arguments, or an object that is copied for each fit. What it makes has
+        ``fit(X, y)`` and ``predict(X)``, X of shape (n, d), y of shape (n,); it may have ``moments(X)``, for X of shape
+        (n, s, d) mean and standard deviation over the s equally likely points of each of n designs, shape (n, 2). A
+        `random_state` that is None is set, as scikit-learn's `set_params` does, or as an argument of that name.
+    label : str
+        What it is called.
+    """
+
+    source: Any
+    label: str
+    fields = FIELDS
+
+    def fit(
+        self,
+        points: Array,
+        values: Array,
+        bounds: Array,
+        *,
+        rng: np.random.Generator,
+        names: Sequence[str] | None = None,
+    ) -> "Regression":
+        """Fit a new regressor.
+
+        Raises
+        ------
+        InputError
+            As `hpcclear.statistics.surrogate.leaf.checked_samples`, or the regressor failed; the message says in what.
+        """
+        points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
+        labels, valid = checked_samples(points, values, bounds, names, FOLDS)
+        seed, lost = int(rng.integers(2**31)), int((~valid).sum())
+        (lower, upper), kept = bounds.T, (points[valid], values[valid])
+        return Regression(labels, lower, upper, *kept, lost, self.label, seed, self.source)
+
+    def restored(self, arrays: Mapping[str, np.ndarray]) -> "Regression":
+        """Fit again to stored training points.
+
+        Raises
+        ------
+        InputError
+            The fit does not come out as it did.
+        """
+        found = restored({**arrays, "label": np.array(self.label)}, self.source)
+        if not np.array_equal(found.fitted, arrays["fitted"]):
+            raise InputError(
+                KEY,
+                self.label,
+                "fitted twice to the same points it is two models",
+                "Give it a fixed random_state, and let nothing else in it be random",
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """A regressor fitted in a box (`hpcclear.statistics.surrogate.leaf.Leaf`); without a source it only knows what was stored.
+
+    Attributes
+    ----------
+    names, lower, upper, inputs, values, dropped, label
+        As every leaf has them.
+    seed : int
+        Of the regressor's own random numbers.
+    source : object
+        Of `RegressionMethod`.
+    stored : mapping of str to array
+        What need not be computed again.
+    """
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    inputs: Array
+    values: Array
+    dropped: int = 0
+    label: str = ""
+    seed: int = 0
+    source: Any = None
+    stored: Mapping[str, Array] = field(default_factory=dict)
+
+    separable = False
+    fields = FIELDS
+    columns = COLUMNS
+
+    @cached_property
+    def _scale(self) -> tuple[float, float]:
+        """Mean and standard deviation of the training values, 1 if they are all equal."""
+        mean, scale = float(self.values.mean()), float(self.values.std())
+        return mean, scale if scale > 10 * np.finfo(float).eps * abs(mean) else 1.0
+
+    @cached_property
+    def _model(self) -> Any:
+        return self._fitted_to(np.ones(len(self.values), bool))
+
+    def _fitted_to(self, rows: Array) -> Any:
+        """A new regressor fitted to some of the training points."""
+        if self.source is None:
+            reason = "the file holds its training points, but no model that predicts"
+            raise InputError("surrogate", self.label, reason, "Fit it to them again")
+        model = made(self.source, self.label, self.seed)
+        mean, scale = self._scale
+        points = self._to_unit(self.inputs[rows])
+        _ask(model, self.label, "fit", points, (self.values[rows] - mean) / scale)
+        return model
+
+    def _to_unit(self, points: Array) -> Array:
+        return (points - self.lower) / (self.upper - self.lower)
+
+    def predict(self, points: Array) -> Array:
+        """Values at points, (n, d) to (n,).
+
+        Raises
+        ------
+        InputError
+            A point outside the box, or the regressor failed.
+        """
+        return self._predicted(self._model, inside(points, self.names, self.lower, self.upper))
+
+    def _predicted(self, model: Any, points: Array) -> Array:
+        mean, scale = self._scale
+        found = _ask(model, self.label, "predict", self._to_unit(points))
+        return mean + scale * _numbers(found, (len(points),), self.label, "predict")
+
+    @cached_property
+    def fitted(self) -> Array:
+        """Predictions at the training points."""
+        return self.predict(self.inputs)
+
+    @cached_property
+    def left_out(self) -> Array:
+        """At each training point what a model without a fifth of the points, this one among them, predicts."""
+        if "left_out" in self.stored:
+            return self.stored["left_out"]
+        fold, found = np.arange(len(self.values)) % FOLDS, np.empty(len(self.values))
+        for k in range(FOLDS):
+            model = self._fitted_to(fold != k)
+            found[fold == k] = self._predicted(model, self.inputs[fold == k])
+        return found
+
+    def leave_one_out(self) -> Array:
+        """See `left_out`."""
+        return self.left_out
+
+    def steepest(self) -> int:
+        """The input with which predictions vary most, the others as in the training points."""
+        spread = []
+        for column, ends in enumerate(zip(self.lower, self.upper, strict=True)):
+            rows = np.repeat(self.inputs[None], LEVELS, axis=0)
+            rows[:, :, column] = np.linspace(*ends, LEVELS)[:, None]
+            found = self.predict(rows.reshape(-1, len(self.names)))
+            spread.append(found.reshape(LEVELS, -1).std(axis=0).mean())
+        return int(np.argmax(spread))
+
+    def moments(self, points: Array) -> Array | None:
+        """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2), by the regressor if it has them."""
+        if not hasattr(self._model, "moments"):
+            return None
+        mean, scale = self._scale
+        shape = (len(points), 2)
+        found = _ask(self._model, self.label, "moments", self._to_unit(points))
+        return scale * _numbers(found, shape, self.label, "moments") + [mean, 0.0]
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """The training points and what came of them; `FIELDS` names the dimensions."""
+        return {name: np.asarray(getattr(self, name)) for name in FIELDS}
+
+
+def restored(arrays: Mapping[str, np.ndarray], source: Any = None) -> Regression:
+    """The model of stored arrays, and its label; without a source it does not predict."""
+    found = {
+        name: np.asarray(arrays[name], np.float64)
+        for name in FIELDS
+        if FIELDS[name] and name in arrays and name != "names"
+    }
+    return Regression(
+        tuple(str(name) for name in arrays["names"]),
+        found["lower"],
+        found["upper"],
+        found["inputs"],
+        found["values"],
+        dropped=int(arrays["dropped"]),
+        label=str(arrays["label"]),
+        seed=int(arrays["seed"]) if "seed" in arrays else 0,
+        source=source,
+        stored={"left_out": found["left_out"]},
+    )
+
+
+def made(source: Any, label: str, seed: int) -> Any:
+    """A regressor that is not fitted yet.
+
+    Raises
+    ------
+    InputError
+        It cannot be made without arguments, or has no `fit` or no `predict`.
+    """
+    if isinstance(source, type) or not hasattr(source, "predict"):
+        model = _called(source, label, seed)
+    else:
+        model = copy.deepcopy(source)
+    missing = [name for name in ("fit", "predict") if not callable(getattr(model, name, None))]
+    if missing:
+        raise InputError(
+            KEY, label, f"has no {' and no '.join(missing)}", "Give it fit(X, y) and predict(X)"
+        )
+    if hasattr(model, "get_params") and hasattr(model, "set_params"):
+        free = [
+            name
+            for name, value in model.get_params().items()
+            if name.rpartition("__")[2] == "random_state" and value is None
+        ]
+        model.set_params(**dict.fromkeys(free, seed))
+    return model
+
+
+def _called(source: Any, label: str, seed: int) -> Any:
+    """What a class or a function makes."""
+    if not callable(source):
+        reason = "is no class, no function and has no predict"
+        raise InputError(KEY, label, reason, "Give it fit(X, y) and predict(X)")
+    try:
+        own = inspect.signature(source).parameters
+        if "random_state" in own and own["random_state"].default in (None, inspect.Parameter.empty):
+            return source(random_state=seed)
+        return source()
+    except Exception as error:
+        raise _failed(label, "could not be made", error) from error
+
+
+def _ask(model: Any, label: str, what: str, *arguments: Array) -> Any:
+    """What a method of the regressor returns, with one thread: more would change last bits."""
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    try:
+        with threadpool_limits(limits=1):
+            return getattr(model, what)(*arguments)
+    except Exception as error:
+        raise _failed(label, f"failed in {what}", error) from error
+
+
+def _failed(label: str, what: str, error: Exception) -> InputError:
+    """What is said of an exception out of a user's code, with the last line of it."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
+    return InputError(KEY, label, reason, "Mend it, or leave the entry out")
+
+
+def _numbers(found: Any, shape: tuple[int, ...], label: str, what: str) -> Array:
+    """What a method returned, as finite numbers of this shape."""
+    remedy = f"Let it return an array of shape {shape}, finite everywhere in the unit cube"
+    try:
+        array = np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            KEY, label, f"its {what} returned {type(found).__name__}", remedy
+        ) from None
+    if array.shape != shape:
+        reason = f"its {what} returned shape {array.shape}, not {shape}"
+        raise InputError(KEY, label, reason, remedy)
+    if not np.isfinite(array).all():
+        count = int(np.count_nonzero(~np.isfinite(array)))
+        reason = f"its {what} returned {count} of {array.size} numbers that are not finite"
+        raise InputError(KEY, label, reason, remedy)
+    return array
