@@ -158,7 +158,8 @@ def lengthen(
 def contested(
     run: StudyRun, choices: Sequence[Choice], made: list[Array], stage: str, purpose: str
 ) -> list[Array]:
-    """Designs doubled further while the ends of a front are not decided, the shortest first."""
+    """Designs doubled further while the ends of a front are not decided, the shortest first; `made`, shape (2, replicates,
+    values) each, as `doubled` returns it."""
     settings = run.study.verification
     most = [min(one[0].size * settings.contest, settings.most_samples) for one in made]
     while True:
