@@ -16,7 +16,9 @@ from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST, Swarm
 from hpcclear.statistics.search import foreign
+from hpcclear.statistics.search.asking import Task, minimise
 from hpcclear.statistics.search.pareto import Front, hypervolume
+from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
@@ -28,9 +30,8 @@ UNIT = np.array([[0.0, 1.0]] * 6)
 
 def search(name: str, function=dtlz2, seed: int = 1, bounds=UNIT, objectives: int = 3) -> Front:
     rng = np.random.default_rng(seed)
-    return foreign.minimise(
-        name, function, bounds, objectives, iterations=50, particles=40, rng=rng, size=60
-    )
+    task = Task(bounds, objectives, rng, 50, SwarmSettings(particles=40))
+    return minimise(getattr(foreign, name)(task), function, task, 60)
 
 
 def test_the_scene_knows_all_of_them_and_no_others():
@@ -171,5 +172,3 @@ def test_what_it_cannot_be_is_refused(entry, key, reason):
         scene_of(entry)
     assert caught.value.key == key
     assert reason in caught.value.reason
-    with pytest.raises(InputError, match="not known"):
-        foreign.check("NSGA5")

@@ -1,8 +1,8 @@
 """Searches through ask and tell: what is asked of them, how they are carried out, and the front of what they met.
 
-Whatever a search keeps for itself, the front is made here, alike for all: the archive of the feasible designs that no other one
-dominates, cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose objectives
-are not all finite is infeasible, without limit if no violation was given.
+Whatever a search keeps for itself, the front is made here, alike for all: the archive of the feasible designs that no other
+one dominates, cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose
+objectives are not all finite is infeasible, without limit if no violation was given.
 """
 
 import traceback
@@ -68,7 +68,7 @@ class Search(Protocol):
         """Designs to evaluate next, (n, d), within the bounds; None or none: it has come to its end."""
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
-        """Take objectives (n, m), NaN or infinite where they failed, and total violations (n,), 0 where no constraint is broken."""
+        """Take objectives (n, m), not finite where they failed, and total violations (n,), 0 where no constraint is broken."""
 
 
 def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:

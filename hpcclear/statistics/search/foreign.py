@@ -91,7 +91,7 @@ class Pymoo:
         worst = np.max(objectives, axis=0, initial=-np.inf, where=finite)
         values = np.where(finite, objectives, np.where(np.isfinite(worst), worst, 0.0))
         good = finite.all(axis=1)
-        broken = np.where(good, constraints, np.maximum(constraints, UNKNOWN))
+        broken = np.where(good, constraints, UNKNOWN)
         answer = StaticProblem(self._algorithm.problem, F=values, G=broken[:, None])
         self._algorithm.evaluator.eval(answer, asked)
         self._algorithm.tell(infills=asked)
@@ -110,7 +110,7 @@ def adapted(source: Any, task: Task) -> Pymoo:
 def _begun(name: str, task: Task) -> Pymoo:
     """An algorithm with its own settings."""
     try:
-        module = importlib.import_module(f"pymoo.algorithms.moo.{ALGORITHMS[name]}")
+        importlib.import_module("pymoo")
     except ModuleNotFoundError:
         raise InputError(
             KEY,
@@ -118,6 +118,7 @@ def _begun(name: str, task: Task) -> Pymoo:
             "is an algorithm of pymoo, which is not installed",
             "Install it with: pip install 'hpcclear[pymoo]', or leave the entry out",
         ) from None
+    module = importlib.import_module(f"pymoo.algorithms.moo.{ALGORITHMS[name]}")
     entries: dict[str, Any] = {"pop_size": task.particles}
     if name in DIRECTED:
         entries = {"ref_dirs": _directions(task.objectives, task.particles)}
