@@ -286,3 +286,10 @@ def lane_motion(effects, crank_rod, rod_slider, work, par, i, W):
             crank_rod_open(effects, work, par, phi, omega, i, W)
     else:
         rod_slider_open(effects, work, par, phi, omega, i, W)
+
+
+@lane_function
+def all_by_hand(effects, work, par, W):
+    """`lane_motion` of each of W lanes."""
+    for i in range(W):
+        lane_motion(effects, effects.crank_rod, effects.rod_slider, work, par, i, W)

@@ -5,6 +5,8 @@ import types
 
 import numpy as np
 from dense_linkage import Contact, Jet, admissible, assembled, turned
+from some_laws import effects_with
+from some_laws import row as row_of_law
 
 from hpcclear.base import bits
 from hpcclear.dynamics import layout as at
@@ -16,10 +18,10 @@ from hpcclear.dynamics.physics import angles, friction
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
-EFFECTS = at.Effects(fixed=1, coulomb=1, ledger=1, series=1)
 EVERYTHING = On(friction=True, gravity=True, ledger=True, series=True)
 CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
 FREE = 500  # rows of what the joints write
+BLOCKS = 700  # of their parameters
 
 
 PLAIN = {
@@ -44,11 +46,21 @@ def plain(function, made=None):
     return made[code]
 
 
+def plain_law(law):
+    """A law in the lanes as ordinary Python."""
+    own = {name: plain(one) for name, one in vars(law).items() if hasattr(one, "py_func")}
+    return types.SimpleNamespace(latched=law.latched, bristled=law.bristled, **own)
+
+
+_ON = effects_with({"fixed", "coulomb", "ledger", "series"})
+EFFECTS = _ON._replace(contact=plain_law(_ON.contact), friction=plain_law(_ON.friction))
+
+
 def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
     return tuple(
-        at.Joint(k, 10 * k, 0, *(FREE + 20 * k + j - at.RATE_NOW for j in range(6)),
-                 FREE + 20 * k + 6, FREE + 20 * k + 7)
+        at.Joint(k, BLOCKS + at.JOINT_ROWS * k, 0, *(FREE + 20 * k + j - at.RATE_NOW for j in range(8)),
+                 FREE + 20 * k + 8, FREE + 20 * k + 9)
         for k, _ in enumerate(mechanism.clearances)
     )  # fmt: skip
 
@@ -78,13 +90,15 @@ class Lane:
         for row, value in row_of(self.text, base).items():
             self.par[row] = value
         for k, joint in enumerate(mechanism.clearances):
-            block = self.par[10 * k : 10 * k + 10]
+            first = BLOCKS + at.JOINT_ROWS * k
+            block = self.par[first : first + at.JOINT_ROWS]
             block[at.CLEARANCE] = joint.clearance
-            block[at.CONTACT_STIFFNESS] = joint.stiffness
-            block[at.DAMPING] = CHI
+            block[row_of_law("contact", "hunt-crossley", "stiffness")] = joint.stiffness
+            block[row_of_law("contact", "hunt-crossley", "damping")] = CHI
             block[at.BEARING_RADIUS] = joint.bearing_radius
             block[at.JOURNAL_RADIUS] = joint.bearing_radius - joint.clearance
-            block[at.FRICTION], block[at.INVERSE_RAMP] = MU, 1 / RAMP
+            block[row_of_law("friction", "coulomb", "coefficient")] = MU
+            block[row_of_law("friction", "coulomb", "inverse_ramp")] = 1 / RAMP
 
     def __call__(self, q, v, t):
         work = np.zeros(2000)

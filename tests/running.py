@@ -209,7 +209,7 @@ def energy(scene: Scene, par, q, v, active) -> float:
         if name in scene.clearance_joints():
             depth = max(abs(e) - par[base + at.CLEARANCE], 0.0)
             on = active[k] if latched else 1.0
-            total += 0.4 * par[base + at.CONTACT_STIFFNESS] * on * depth**2.5
+            total += 0.4 * par[base + at.CONTACT_NUMBERS] * on * depth**2.5
     return float(total)
 
 

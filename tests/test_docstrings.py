@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcclear.dynamics.physics import contact
+from hpcclear.dynamics.laws import laws
 
 PACKAGE = Path(__file__).resolve().parent.parent / "hpcclear"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name != "__main__.py")
@@ -118,5 +118,5 @@ def test_laws_name_their_source(path):
 
 
 def test_contact_laws_cite_their_paper():
-    for name, law in contact.LATCHED_LAWS.items():
-        assert "doi:10." in (law.__doc__ or ""), name
+    for name, law in laws("contact").items():
+        assert "doi:10." in law.source, name

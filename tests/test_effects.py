@@ -113,8 +113,12 @@ def test_every_pair_of_effects_runs(row):
 
 
 ZEROS = {
-    "coulomb": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
-    "ambrosio": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
+    "coulomb": dict.fromkeys(
+        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
+    ),
+    "ambrosio": dict.fromkeys(
+        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
+    ),
     "gravity": {at.GRAVITY: 0.0},
     "load": {at.LOAD: 0.0},
     "load_table": {at.LOAD: 0.0},
@@ -248,7 +252,7 @@ def test_what_a_scene_leaves_out_is_off():
     on = {
         name for name, value in effects_of(load_scene(SCENE))._asdict().items() if value is not None
     }
-    assert on == {"crank_rod", "rod_slider", "latched", "coulomb"}
+    assert on == {"crank_rod", "rod_slider", "contact", "friction"}
     bare = scene_with(
         {"joints.crank_rod": IDEAL, "joints.rod_slider": IDEAL, "effects.friction": {"law": "none"}}
     )

@@ -1,5 +1,6 @@
 """Generated motions: against a dense model that shares no formula, and the slider-crank's against those written by hand."""
 
+import hashlib
 import sys
 from pathlib import Path
 
@@ -7,23 +8,22 @@ import numpy as np
 import pytest
 from dense_linkage import Dense
 from linkages import LINKAGES, four_bar, six_bar, slider_crank
-from motions_by_hand import lane_motion
+from motions_by_hand import all_by_hand
 from numba import njit
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from plain_lane import joints_of as joints_of_lane
 from scipy.integrate import solve_ivp
+from some_laws import STIFFNESS, effects_with
 
 from hpcclear.base.bits import beyond
-from hpcclear.base.jit import lane_function
+from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.one_text import module_of, one_text
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage import motion
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.elements import sign_of
+from hpcclear.dynamics.linkage.compiled import _HEAD
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.parts import ConstantSpeed
 from hpcclear.dynamics.linkage.slider_crank import joints_of, motion_of
-from hpcclear.dynamics.physics.angles import sincos
-from hpcclear.dynamics.physics.friction import saturated
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 from assembly import executed_arithmetic
@@ -111,23 +111,29 @@ TWO, O12, O23 = {"crank_rod": 1, "rod_slider": 1}, {"crank_rod": 1}, {"rod_slide
 LENGTH, CRANK = 0.12, 0.05
 
 
-def compiled(lane, effects, W):
+def loop_over(source, joints):
+    """A function that runs a generated lane for each of W lanes, ready to be written out."""
+    rows = "".join(f"at.{joint!r}, " for joint in joints)
+    text = f"{_HEAD}\nJOINTS = ({rows})\n\n\n@apart\n@lane_function\n{source}\n{LOOP}"
+    name = f"tried_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    return module_of(name, lambda: text).one_after_the_other
+
+
+LOOP = """
+@lane_function
+def one_after_the_other(effects, work, par, W):
+    for i in range(W):
+        lane(effects, JOINTS, work, par, i, W)
+"""
+
+
+def compiled(text, effects, W):
     """Both motions over W lanes."""
-    joints = joints_of(effects)
-
-    @njit(error_model="numpy")
-    def generated(effects, joints, work, par):
-        for i in range(W):
-            lane(effects, joints, work, par, i, W)
-
-    @njit(error_model="numpy")
-    def by_hand(effects, joints, work, par):
-        for i in range(W):
-            lane_motion(effects, effects.crank_rod, effects.rod_slider, work, par, i, W)
-
-    return [
-        lambda work, par, run=run: run(effects, joints, work, par) for run in (generated, by_hand)
+    generated = loop_over(text.source, joints_of(effects))
+    texts = [
+        one_text(run, f"compared_{W}", effects=effects, W=W) for run in (generated, all_by_hand)
     ]
+    return [njit(error_model="numpy", fastmath=FASTMATH)(text) for text in texts]
 
 
 def slider_crank_lanes(effects, coordinates, rng, W):
@@ -139,7 +145,7 @@ def slider_crank_lanes(effects, coordinates, rng, W):
         at.ROD_NEAR: near, at.ROD_FAR: LENGTH - near,
     }  # fmt: skip
     for base in (at.JOINT_12, at.JOINT_23):
-        given |= {base + at.CLEARANCE: 3e-4, base + at.CONTACT_STIFFNESS: 1e9}
+        given |= {base + at.CLEARANCE: 3e-4, base + STIFFNESS: 1e9}
     for row, value in given.items():
         par[row] = value
     for mass in (at.ROD_MASS, at.ROD_INERTIA, at.SLIDER_MASS):
@@ -190,16 +196,9 @@ def slider_crank_lanes(effects, coordinates, rng, W):
     ],
 )  # fmt: skip
 def test_the_slider_crank_has_the_bits_of_the_motions_by_hand(W, on):
-    effects = at.Effects(**on)
+    effects = effects_with(on)
     text = motion_of(effects)
-    names = {
-        "joint_force": motion.joint_force,
-        "sincos": sincos,
-        "saturated": saturated,
-        "sign_of": sign_of,
-    }
-    exec(text.source, names)
-    generated, by_hand = compiled(lane_function(names["lane"]), effects, W)
+    generated, by_hand = compiled(text, effects, W)
     rng = np.random.default_rng(1)
     moved = 0.0
     for _ in range(20):
@@ -271,19 +270,15 @@ def test_whole_motions_are_the_dense_model_s_and_conserve_energy(mechanism, end)
 def test_generated_motions_are_packed(mechanism):
     lane = Lane(mechanism, On(friction=True))
     joints, W = joints_of_lane(mechanism), 32
-    names = {"joint_force": motion.joint_force, "sincos": sincos}
-    exec(lane.text.source, names)
-    compiled_lane = lane_function(names["lane"])
-    effects = at.Effects(fixed=1, coulomb=1)
+    effects = effects_with({"fixed", "coulomb"})
+    text = one_text(loop_over(lane.text.source, joints), f"packed_{W}", effects=effects, W=W)
+    inside = lane_function(text)
 
     @njit(error_model="numpy")
     def run(lanes):
-        par = beyond(lanes, 51200)
-        for i in range(W):
-            compiled_lane(effects, joints, lanes, par, i, W)
+        inside(lanes, beyond(lanes, 51200))
 
-    lanes = np.ones(51200 + 32000)
-    run(lanes)
+    run(np.ones(51200 + 32000))
     found = executed_arithmetic(run.inspect_asm(run.signatures[0]))
     assert found.packed.total() > 100
     assert found.packed_share >= 0.9

@@ -13,10 +13,12 @@ import struct
 import numpy as np
 import pytest
 from numba import njit, types
+from some_laws import STIFFNESS, effects_with, row
 
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.linkage.rhs import written_by
 from hpcclear.dynamics.physics.angles import sincos
 
@@ -37,7 +39,7 @@ def compiled(function, *argument_types):
 def compiled_motion(effects, W=1):
     """The kernel's right-hand side with these effects on."""
 
-    flags = at.Effects(**dict.fromkeys(effects, 1))
+    flags = effects_with(effects)
     text = one_text(written_by(flags).accelerations, f"looked_at_{W}", effects=flags, W=W)
     return compiled(text, FLAT, FLAT, FLAT)
 
@@ -50,20 +52,29 @@ def work(row):
     return ("work", row)
 
 
+def rubbing(law):
+    """Rows of a friction law's numbers in both joints."""
+    names = laws("friction")[law].read
+    blocks = (at.JOINT_12, at.JOINT_23)
+    return {par(block + row("friction", law, name)) for block in blocks for name in names}
+
+
+DAMPING = row("contact", "hunt-crossley", "damping")
+
 # effect: what is on besides it and the bare scene, and the markers of its law
 MARKERS = {
     "crank_rod": (
         set(),
-        {par(at.JOINT_12 + at.CLEARANCE), par(at.JOINT_12 + at.CONTACT_STIFFNESS)},
+        {par(at.JOINT_12 + at.CLEARANCE), par(at.JOINT_12 + STIFFNESS)},
     ),
     "rod_slider": (
         set(),
-        {par(at.JOINT_23 + at.CLEARANCE), par(at.JOINT_23 + at.CONTACT_STIFFNESS)},
+        {par(at.JOINT_23 + at.CLEARANCE), par(at.JOINT_23 + STIFFNESS)},
     ),
-    "fixed": (set(), {par(at.JOINT_12 + at.DAMPING)}),
+    "fixed": (set(), {par(at.JOINT_12 + DAMPING)}),
     "latched": (set(), {work(at.INVERSE_IMPACT), work(at.ACTIVE + 1)}),
-    "coulomb": (set(), {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)}),
-    "ambrosio": (set(), {par(at.JOINT_12 + at.DEAD_SPEED), par(at.JOINT_23 + at.DEAD_SPEED)}),
+    "coulomb": (set(), rubbing("coulomb")),
+    "ambrosio": (set(), rubbing("ambrosio") - rubbing("coulomb")),
     "torque": (set(), {par(at.TORQUE), par(at.CRANK_INERTIA)}),
     "torque_table": ({"torque"}, {("constant", PER_TURN)}),
     "torque_falls": ({"torque"}, {par(at.TORQUE_FALL)}),
@@ -105,18 +116,15 @@ MARKERS = {
             par(at.O23.finite + at.FINITE_ROWS - 1),
         },
     ),
-    "lugre": (
-        set(),
-        {par(row) for row in range(at.BRISTLE_STIFFNESS, at.BRISTLE_INVERSE_SPEED + 1)},
-    ),
+    "lugre": (set(), rubbing("lugre") - rubbing("ambrosio")),
     "bending": (set(), {par(at.BENDING), par(at.BENDING + 3)}),
     "long_film": ({"film"}, {par(at.JOINT_12 + at.FILM_LONG), par(at.JOINT_23 + at.FILM_LONG)}),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {
-    "latched": {par(at.JOINT_12 + at.DAMPING)},
-    "ambrosio": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
-    "lugre": {par(at.JOINT_12 + at.FRICTION), par(at.JOINT_23 + at.FRICTION)},
+    "latched": {par(at.JOINT_12 + DAMPING)},
+    "ambrosio": rubbing("coulomb"),
+    "lugre": rubbing("ambrosio"),
     "series": set(),
     "film": {par(at.JOINT_12 + at.FILM_SHORT), par(at.JOINT_23 + at.FILM_SHORT)},
     "baumgarte": set(),
@@ -176,7 +184,7 @@ def hertz_by_hand(work, par, W):
         nx, ny = ex * inverse, ey * inverse
         gap = (ex * ex + ey * ey + 1e-300) * inverse - par[(at.JOINT_12 + at.CLEARANCE) * W + i]
         depth = 0.5 * (gap + abs(gap))
-        force = par[(at.JOINT_12 + at.CONTACT_STIFFNESS) * W + i] * (depth * math.sqrt(depth))
+        force = par[(at.JOINT_12 + STIFFNESS) * W + i] * (depth * math.sqrt(depth))
         fx, fy = force * nx, force * ny
         work[(at.RATE_NOW + at.GAP_12) * W + i] = gap
         work[(at.RATE_NOW + at.FORCE_12) * W + i] = force
@@ -187,7 +195,7 @@ def hertz_by_hand(work, par, W):
         nx, ny = ex * inverse, ey * inverse
         gap = (ex * ex + ey * ey + 1e-300) * inverse - par[(at.JOINT_23 + at.CLEARANCE) * W + i]
         depth = 0.5 * (gap + abs(gap))
-        force = par[(at.JOINT_23 + at.CONTACT_STIFFNESS) * W + i] * (depth * math.sqrt(depth))
+        force = par[(at.JOINT_23 + STIFFNESS) * W + i] * (depth * math.sqrt(depth))
         gx, gy = force * nx, force * ny
         work[(at.RATE_NOW + at.GAP_23) * W + i] = gap
         work[(at.RATE_NOW + at.FORCE_23) * W + i] = force
@@ -238,10 +246,9 @@ def test_the_kernel_by_hand_computes_the_same():
     values = np.abs(rng.normal(size=at.PARAMETERS * W)) + 0.1
     mine[:] = hers[:] = rng.normal(size=at.WORK * W)
     njit(hertz_by_hand)(mine, values, W)
-    effects = at.Effects(crank_rod=1, rod_slider=1)
-    accelerations = written_by(effects).accelerations
-    run = njit(lambda *arguments: accelerations(*arguments, W))
-    run(effects, hers, values, np.zeros(at.TABLES))
+    effects = effects_with(BARE)
+    text = one_text(written_by(effects).accelerations, f"compared_{W}", effects=effects, W=W)
+    njit(text)(hers, values, np.zeros(at.TABLES))
     written = slice(at.ACC * W, (at.RATE_NOW + at.RATE_23 + 1) * W)
     np.testing.assert_allclose(mine[written], hers[written], rtol=1e-11, atol=1e-11)
     np.testing.assert_array_equal(mine[: at.ACC * W], hers[: at.ACC * W])

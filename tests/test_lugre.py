@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 import running
 from scipy.integrate import solve_ivp
+from some_laws import row
 
 from hpcclear import simulate
 from hpcclear.base.bits import falling
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.laws.friction import lugre
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.physics.friction import bristle_rate, bristle_ratio, stribeck
 from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.scene import Scene, load_scene
@@ -54,12 +55,12 @@ def test_the_exponential_is_as_good_as_the_library_s():
 @pytest.mark.parametrize("speed", [-3.0, -0.01, -1e-5, 1e-5, 0.004, 0.02, 10.0])
 def test_steady_bristles_are_stribecks_curve(speed):
     curve = 0.1 + 0.05 * math.exp(-((speed / 0.01) ** 2))
-    held = stribeck(0.1, 0.15, 100.0, speed)
+    held = lugre.stribeck(speed, 0.1, 0.15, 100.0)
     assert held == pytest.approx(curve, rel=1e-14)
     deflection = math.copysign(curve / 1e5, speed)
-    rate = bristle_rate(1e5, held, deflection, speed)
+    rate = lugre.deflection(deflection, speed, 0.1, 0.15, 100.0, 1e5)
     assert abs(rate) <= 1e-14 * abs(speed)
-    ratio = bristle_ratio(1e5, 0.3, 0.02, deflection, rate, speed)
+    ratio = lugre.ratio(deflection, rate, speed, 1e5, 0.3, 0.02)
     assert ratio == pytest.approx(math.copysign(curve, speed) + 0.02 * speed, rel=1e-13)
 
 
@@ -338,8 +339,8 @@ def test_units_of_bristles_are_converted():
         bristle_stiffness="100 mm^-1", stribeck_speed="1 cm/s", bristle_damping="2 s/m"
     )
     friction = scene.effects.friction
-    assert (friction.bristle_stiffness, friction.stribeck_speed) == (1e5, 0.01)
-    assert (friction.bristle_damping, friction.viscous_coefficient) == (2.0, 0.0)
+    assert (friction.value("bristle_stiffness"), friction.value("stribeck_speed")) == (1e5, 0.01)
+    assert (friction.value("bristle_damping"), friction.value("viscous_coefficient")) == (2.0, 0.0)
 
 
 def test_points_keep_friction_at_rest_above_that_of_sliding():
@@ -351,7 +352,9 @@ def test_points_keep_friction_at_rest_above_that_of_sliding():
             check_points(scene, points)
     points = Points(("mu",), np.array([[0.05], [0.15]]), ((paths[0],),))
     check_points(scene, points)
-    assert parameters(scene, points)[:, at.JOINT_12 + at.FRICTION].tolist() == [0.05, 0.15]
+    assert parameters(scene, points)[
+        :, at.JOINT_12 + row("friction", "lugre", "coefficient")
+    ].tolist() == [0.05, 0.15]
 
 
 def test_a_scene_tells_of_its_bristles():

@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
+from some_laws import STIFFNESS, effects_with, row
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.linkage import baumgarte as bg
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.linkage.rhs import motion_of
@@ -22,6 +24,16 @@ MU, RAMP = 0.1, 0.3
 DEAD = 0.05
 FILM = {"short": 8.0, "long": 20.0, "shear": 0.03, "floor": 0.04}
 BRISTLES = {"stiffness": 3e4, "damping": 0.7, "viscous": 0.02, "static": 0.16, "speed": 6.0}
+RUBBING = {
+    "coefficient": MU,
+    "inverse_ramp": 1 / RAMP,
+    "dead_speed": DEAD,
+    "bristles": BRISTLES["stiffness"],
+    "damper": BRISTLES["damping"],
+    "viscous_coefficient": BRISTLES["viscous"],
+    "static_coefficient": BRISTLES["static"],
+    "inverse_speed": 1 / BRISTLES["speed"],
+}
 DEFLECTIONS = np.array([4e-6, -2e-6])  # of the bristles in both joints, m
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
@@ -87,26 +99,18 @@ def row_of_parameters(effects, rng):
     for base, clearance in ((at.JOINT_12, 3e-4), (at.JOINT_23, 5e-4)):
         values |= {
             base + at.CLEARANCE: clearance,
-            base + at.CONTACT_STIFFNESS: 3e9 * (1 + clearance),
-            base + at.DAMPING: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
+            base + STIFFNESS: 3e9 * (1 + clearance),
+            base + STIFFNESS + 1: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
             base + at.BEARING_RADIUS: 0.02,
             base + at.JOURNAL_RADIUS: 0.02 - clearance,
-            base + at.FRICTION: MU,
-            base + at.INVERSE_RAMP: 1 / RAMP,
-            base + at.DEAD_SPEED: DEAD,
             base + at.FILM_SHORT: FILM["short"],
             base + at.FILM_LONG: FILM["long"],
             base + at.FILM_SHEAR: FILM["shear"],
             base + at.FILM_FLOOR: FILM["floor"],
         }
-    if "lugre" in effects:  # else rows of films of finite length or of nothing
-        values |= {
-            at.BRISTLE_STIFFNESS: BRISTLES["stiffness"],
-            at.BRISTLE_DAMPING: BRISTLES["damping"],
-            at.BRISTLE_VISCOUS: BRISTLES["viscous"],
-            at.BRISTLE_STATIC: BRISTLES["static"],
-            at.BRISTLE_INVERSE_SPEED: 1 / BRISTLES["speed"],
-        }
+        for law in {"coulomb", "ambrosio", "lugre"} & effects:
+            for name in laws("friction")[law].read:
+                values[base + row("friction", law, name)] = RUBBING[name]
     for place, value in values.items():
         par[place] = value
     return par
@@ -142,7 +146,7 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
             return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
-    clearance, stiffness = par[base + at.CLEARANCE], par[base + at.CONTACT_STIFFNESS]
+    clearance, stiffness = par[base + at.CLEARANCE], par[base + STIFFNESS]
     factors = {name: FILM[name] * (f"{name}_film" in effects) for name in ("short", "long")}
     return Joint(
         clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,
@@ -199,7 +203,7 @@ def reduced(effects, values):
 
 def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
-    flags = at.Effects(**dict.fromkeys(effects, 1))
+    flags = effects_with(effects)
     if "lugre" in effects:
         z = deflected(effects)
         q, v = np.concatenate([np.full(len(z), 7.0), q]), np.concatenate([z, v])

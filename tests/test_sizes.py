@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 from running import scene_with
+from some_laws import effects_with
 
 import hpcclear.dynamics
 from hpcclear.base.jit import FASTMATH, lane_function
@@ -120,7 +121,7 @@ def test_what_is_measured_goes_by_the_effects():
     assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
         at.FORCE + k for k in range(3)
     ]
-    assert len(at.measures_of(at.Effects(crank_rod=1, latched=1))) == 0
+    assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
     worn = at.Effects(rod_slider=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
     assert max(one.rate for one in at.MEASURES) < 64  # `control.measure` keeps six bits
@@ -130,8 +131,8 @@ def test_rules_are_numbers_of_one_kind():
     """So that one compiled stepper serves all effects."""
     for effects, on in (
         (at.Effects(), set()),
-        (at.Effects(latched=1, torque=1), {"latched", "free", "turning"}),
-        (at.Effects(baumgarte=1, coulomb=1, gravity=1), {"turning", "coulomb"}),
+        (effects_with({"latched", "torque"}), {"latched", "free", "turning"}),
+        (effects_with({"baumgarte", "coulomb", "gravity"}), {"turning"}),
     ):
         rules = at.rules_of(effects)
         assert {name for name in rules._fields[:-2] if getattr(rules, name)} == on

@@ -1,14 +1,16 @@
 """Errors a user can mend: one message with key, value, reason and remedy."""
 
+import difflib
 import errno
 import os
 import re
 import resource
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from hpcclear.base.plain import plain
 
+MOST_LISTED = 20
 LONGEST_SHOWN = 400  # characters of a value; a path may have four thousand
 
 _NO_HANDLES = (errno.EMFILE, errno.ENFILE)
@@ -58,6 +60,17 @@ class InputError(ValueError):
             shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
         # texts that were made of sequences of NumPy's numbers
         return plain(_BOXED.sub(r"\1\2", f"{self.key} = {shown}: {self.reason}. {self.remedy}"))
+
+
+def nearest(word: str, words: Sequence[str]) -> str:
+    """A sentence that points to the nearest of `words`, or lists them."""
+    close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)
+    if close:
+        return f"Did you mean {close[0]!r}?"
+    if not words:
+        return "Remove it"
+    more = len(words) - MOST_LISTED
+    return "Use one of: " + ", ".join(words[:MOST_LISTED]) + (f" ({more} more)" if more > 0 else "")
 
 
 class StorageError(RuntimeError):

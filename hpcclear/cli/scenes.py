@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
+TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
+
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
@@ -146,15 +148,18 @@ def simulate(written: Written, output: Path) -> int:
 
 @click.command(short_help="Write figures and an HTML page.")
 @click.argument("directory", type=PATH)
+@TRUST
 @of_one_process
-def report(directory: Path) -> int:
+def report(directory: Path, trust: bool) -> int:
     """Write figures and a self-contained HTML page about a directory of results.
 
     Example: hpcclear report results/quickstart
     """
+    from hpcclear.plugins import trusting
     from hpcclear.report.html.page import write_report
 
-    show(f"report  {write_report(directory)}")
+    with trusting(trust):
+        show(f"report  {write_report(directory)}")
     return Exit.DONE
 
 
@@ -167,8 +172,9 @@ def report(directory: Path) -> int:
     show_default=True,
     help="Samples of each file, spread over it.",
 )
+@TRUST
 @of_one_process
-def reproduce(place: Path, samples: int) -> int:
+def reproduce(place: Path, samples: int, trust: bool) -> int:
     """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
 
     PLACE is a file or a directory of results. Versions and processors that differ from those that made them are named. Exit
@@ -177,8 +183,10 @@ def reproduce(place: Path, samples: int) -> int:
     Example: hpcclear reproduce results/quickstart
     """
     from hpcclear.ensemble.repeating import repeated
+    from hpcclear.plugins import trusting
 
-    found = list(repeated(place, samples))
+    with trusting(trust):
+        found = list(repeated(place, samples))
     for one in found:
         said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
         show(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))

@@ -7,11 +7,11 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bending import bent_motion
+from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.linkage import baumgarte, geometry
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.parameters import topology
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.planar.response import contacts_on, elastic_energy
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
 
@@ -55,16 +55,14 @@ def energies(
     total = kinetic + geometry.potential_energy(m, par.T, scene.effects.gravity)
     if bar is not None:
         total = total + bar.strain + scene.effects.gravity * bar.raised(m.rod_angle)
-    latched = scene.effects.contact is not None and scene.effects.contact.latched
     for k, is_open in enumerate((first, second)):
         if is_open:
             gap = np.hypot(m.eccentricity_x[:, k], m.eccentricity_y[:, k])
             direction = np.arctan2(m.eccentricity_y[:, k], m.eccentricity_x[:, k])
             turns = (m.rod_angle, m.crank_angle if k == 0 else 0.0)
             gap = gap - p.clearance[..., k] - _depth(scene, par, k, direction, turns)
-            gap = np.maximum(gap, 0.0)
-            on = active[:, k] if latched else 1.0
-            total = total + 0.4 * p.stiffness[..., k] * on * gap**2.5
+            on = active[:, [k]]
+            total = total + stored_energy(scene, par, gap[:, None], on, [k])
     return kinetic, total
 
 
@@ -96,8 +94,8 @@ def _of_linkage(
             turns = tuple(angles.get(split(one)[0], 0.0) for one in (joint.bearing, joint.journal))
             direction = np.arctan2(eccentricity[k, 1], eccentricity[k, 0])
             gaps[:, k] -= _depth(scene, par, k, direction, turns)
-    on = contacts_on(scene, active, count)
-    return kinetic, kinetic + potential + elastic_energy(p.stiffness[..., :count], gaps, on)
+    elastic = stored_energy(scene, par, gaps, active[:, :count], range(count))
+    return kinetic, kinetic + potential + elastic
 
 
 def of_starts(scene: Scene, par: Array, start: Start, n: int) -> Array:

@@ -94,13 +94,6 @@ COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
 times the largest difference of nine others in 4 % of cases, by more than 1.7 times that of three others in 8 %."""
 
-HERTZ_RANGE = 0.25
-"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged.
-
-Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
-the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
-"""
-
 
 class Evaluator:
     """Simulates points of one scene as a stream: submit some, advance, submit more while others run.
@@ -295,9 +288,7 @@ def sliding_work(outcome: Outcome) -> Array:
 
 
 def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
-    """Whether a penetration in the averaged revolutions left the range of Hertz theory, shape (m,)."""
-    p = Parameters(par)
-    # places without a joint have neither radii nor penetration
-    ratio = p.journal_radius / np.maximum(p.bearing_radius, 1e-300)
-    beyond: Booleans = np.any(outcome.deepest > HERTZ_RANGE * ratio * p.clearance, axis=1)
+    """Whether a penetration in the averaged revolutions left the range of its law, shape (m,)."""
+    # places without a joint have no penetration
+    beyond: Booleans = np.any(outcome.deepest > Parameters(par).deepest_valid, axis=1)
     return beyond

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
+from hpcclear.dynamics.laws.declared import MOST_NUMBERS
 
 TURN = 6.283185307179586  # rad
 
@@ -21,10 +22,8 @@ class Effects(NamedTuple):
     crank_rod: Any = None  # clearance at O12
     rod_slider: Any = None  # clearance at O23
     joints: Any = None  # of a linkage other than the slider-crank: how many have clearance
-    fixed: Any = None  # fixed damping factor (Hunt-Crossley)
-    latched: Any = None  # damping by restitution, impact speed latched
-    coulomb: Any = None
-    ambrosio: Any = None
+    contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
+    friction: Any = None
     torque: Any = None  # the crank is free, driven by a torque
     torque_table: Any = None
     torque_falls: Any = None  # with the speed
@@ -36,7 +35,7 @@ class Effects(NamedTuple):
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
-    sliding: Any = None  # sliding speeds, for the implicit method
+    sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
     waves: Any = (
@@ -50,8 +49,17 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
-    lugre: Any = None  # friction by bristles, a coordinate for each joint with clearance
     bending: Any = None  # of a slider-crank's rod: how many modes, each a coordinate
+
+    @property
+    def latched(self) -> Any:
+        """Whether the normal force's law asks for the impact speed, which is latched."""
+        return None if self.contact is None else self.contact.latched
+
+    @property
+    def bristled(self) -> Any:
+        """Whether friction has bristles, a coordinate for each joint with clearance."""
+        return None if self.friction is None else self.friction.bristled
 
 
 class Open(NamedTuple):
@@ -72,7 +80,7 @@ def bristles_of(effects: Effects) -> int:
 
     A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
     """
-    return 0 if effects.lugre is None else sum(flag is not None for flag in open_of(effects))
+    return 0 if effects.bristled is None else sum(flag is not None for flag in open_of(effects))
 
 
 def open_of(effects: Effects) -> Open:
@@ -139,38 +147,36 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
     TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
 ) = range(30)
-JOINT_ROWS = 14
+JOINT_ROWS = 30
+LAW_NUMBERS = MOST_NUMBERS
+"""Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
 JOINT_BLOCKS = 30  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,
-    CONTACT_STIFFNESS,
-    DAMPING,
     BEARING_RADIUS,
     JOURNAL_RADIUS,
-    FRICTION,
-    INVERSE_RAMP,
-    DEAD_SPEED,
+    EXPONENT,  # of the depth in the normal force, and the factor of its rate: what peaks between steps are found by
+    DAMPING,
+    DEEPEST_VALID,  # m, from where on a result is flagged
+    INVERSE_RAMP,  # s/m, one over the sliding speed within which friction changes most
+    STEEPNESS,  # s/m, largest slope of friction over normal force
+) = range(8)
+CONTACT_NUMBERS = 8
+FRICTION_NUMBERS = CONTACT_NUMBERS + LAW_NUMBERS
+(
     FILM_SHORT,  # mu R L^3/c^3, N s/m; 0 where there is no such film
     FILM_FINITE,  # as of a short one
     FILM_LONG,  # 12 mu L R^3/c^3, N s/m
     FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
     FILM_FLOOR,  # least thickness over the clearance
     FILM_STEEPNESS,  # s/m, of the film's force over that of inertia; with bristles next to nothing, but not nothing
-) = range(14)
+) = range(FRICTION_NUMBERS + LAW_NUMBERS, JOINT_ROWS)
 JOINT_12 = JOINT_BLOCKS
 JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
 """First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
-(
-    BRISTLE_STIFFNESS,  # 1/m; these only with bristles, before all others of its own
-    BRISTLE_DAMPING,  # s/m
-    BRISTLE_VISCOUS,  # s/m
-    BRISTLE_STATIC,  # friction over normal force at rest
-    BRISTLE_INVERSE_SPEED,  # s/m, one over Stribeck's
-) = range(OWN, OWN + 5)
-BRISTLE_ROWS = 5
-BENDING = OWN + BRISTLE_ROWS
+BENDING = OWN
 """First row of what a slider-crank's rod that bends has, in the order of `linkage.bending.entries`."""
 WAVES = OWN + 192
 """First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
@@ -194,9 +200,13 @@ GAP_RATE = FORCE + MAX_JOINTS
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-SLIDINGS = DRIVE_MOMENT + 1  # of each joint, for the implicit method only
+FORCE_KINKS = DRIVE_MOMENT + 1
+"""Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
+sides of friction's ramp."""
+LOW_KINKS = FORCE_KINKS + MAX_JOINTS
+HIGH_KINKS = LOW_KINKS + MAX_JOINTS
 FOLLOWED_ACCELERATION = (
-    SLIDINGS + MAX_JOINTS
+    HIGH_KINKS + MAX_JOINTS
 )  # of the slider, or of a point along x; for responses only
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
 FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
@@ -385,7 +395,9 @@ class Joint(NamedTuple):
     force: int
     rate: int
     friction: int
-    sliding: int
+    force_kink: int
+    low_kink: int
+    high_kink: int
     sliding_power: int
     active: int  # rows of `work`
     inverse_impact: int
@@ -394,7 +406,7 @@ class Joint(NamedTuple):
 JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
-        SLIDINGS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
+        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip
@@ -437,9 +449,6 @@ class Rules(NamedTuple):
     """What a stepper has to know of the effects, as numbers 0 and 1: none of them has it compiled anew."""
 
     latched: Any  # impacts are located, and their speed is kept
-    fixed: Any  # the three: where the forces have kinks
-    coulomb: Any
-    ambrosio: Any
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
@@ -452,7 +461,7 @@ def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
-    flags = (e.latched, e.fixed, e.coulomb, e.ambrosio, e.torque, turning, e.responses, e.profile)
+    flags = (e.latched, e.torque, turning, e.responses, e.profile)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

@@ -1,7 +1,5 @@
 """Kernel parameters of a scene's samples."""
 
-from typing import Any
-
 import numpy as np
 
 from hpcclear.base.arrays import Array
@@ -9,12 +7,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bearing import correction
+from hpcclear.dynamics.joint_laws import fill, swing
 from hpcclear.dynamics.linkage.bending import entries
-from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar.problem import linkage_of, parameters_of
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import speed_entry
-from hpcclear.scene.effects import LUGRE_ENTRIES
 from hpcclear.scene.points import Points
 
 SAME_LENGTH = 0.01
@@ -73,13 +70,11 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
         for k, joint in enumerate(scene.clearance_joints()):
             key = scene.joint_key(joint)
             block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
-            _joint_parameters(scene, get, key, f"{key}.materials", p[:, block:])
+            fill(scene, get, key, f"{key}.materials", _inertia(scene, get, p), p[:, block:])
             _film_parameters(scene, get, joint, p, block)
-        _bristle_parameters(scene, get, p)
         return p
     p = np.ones((get.size, _own_rows(scene)))
     p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
-    _bristle_parameters(scene, get, p)
     bending.fill(scene, get, p)
     body = {
         name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
@@ -111,7 +106,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
         p[:, base + at.FILM_SHORT : base + at.JOINT_ROWS] = 0.0
         if joint in scene.clearance_joints():
             key = scene.joint_key(joint)
-            _joint_parameters(scene, get, key, key, p[:, base:])
+            fill(scene, get, key, key, _inertia(scene, get, p), p[:, base:])
             _film_parameters(scene, get, joint, p, base)
     return p
 
@@ -127,42 +122,6 @@ def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
     if scene.effects.guide_friction is not None:
         p[:, at.GUIDE_COEFFICIENT] = get("effects.guide_friction.coefficient")
         p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")
-
-
-def _joint_parameters(scene: Scene, get: Numbers, key: str, materials: str, p: Array) -> None:
-    """Fill one joint's block of parameters (a view, first column its first entry) from the tables at these paths."""
-    clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
-    h_bearing, h_journal = (
-        contact.reduced_compliance(
-            get(f"{materials}.{part}.youngs_modulus"), get(f"{materials}.{part}.poisson_ratio")
-        )
-        for part in ("bearing", "journal")
-    )
-    p[:, at.CLEARANCE] = clearance
-    p[:, at.CONTACT_STIFFNESS] = contact.contact_stiffness(h_bearing, h_journal, bearing, clearance)
-    p[:, at.BEARING_RADIUS] = bearing
-    p[:, at.JOURNAL_RADIUS] = bearing - clearance
-    law: Any = scene.effects.contact
-    if law.law == "hunt-crossley":
-        p[:, at.DAMPING] = get("effects.contact.damping")
-    elif law.law in contact.LATCHED_LAWS:
-        p[:, at.DAMPING] = contact.LATCHED_LAWS[law.law](get("effects.contact.restitution"))
-    friction = scene.effects.friction
-    if friction.law != "none":
-        p[:, at.FRICTION] = get("effects.friction.coefficient")
-    if friction.law == "coulomb":
-        p[:, at.INVERSE_RAMP] = 1.0 / get("effects.friction.ramp_speed")
-    elif friction.law == "ambrosio" and friction.speeds is not None:
-        p[:, at.DEAD_SPEED] = friction.speeds[0]
-        p[:, at.INVERSE_RAMP] = 1.0 / (friction.speeds[1] - friction.speeds[0])
-    elif friction.law == "lugre":
-        p[:, at.INVERSE_RAMP] = 0.0
-
-
-def _bristle_parameters(scene: Scene, get: Numbers, p: Array) -> None:
-    """Fill what bristles have besides their joints' rows."""
-    if scene.bristles:
-        bristles.fill({name: get(f"effects.friction.{name}") for name in LUGRE_ENTRIES}, p)
 
 
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
@@ -195,23 +154,35 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     friction and contact forces.
 
     There errors grow until they meet the tolerance. Half of friction's ramp at most: beyond it the direction of friction is
-    chance. And what swings in a contact under the forces of inertia, at the frequency w of small motions in Hertz' force, w^2 =
-    1.5 K^(2/3) F^(1/3) / m, may add `OF_FORCE` of these.
+    chance. And what swings in a contact under the forces of inertia, at the frequency w of small motions, w^2 = F'(d)/m,
+    may add `OF_FORCE` of these.
     """
-    turning = np.abs(p[:, at.SPEED])
-    pin = turning * p[:, at.CRANK_LENGTH]
-    mass = sum(get(path) for path in scene.numeric_paths() if path.endswith(".mass"))
-    force = np.maximum(mass * pin * turning, 1e-300)
+    pin = np.abs(p[:, at.SPEED]) * p[:, at.CRANK_LENGTH]
+    mass, force = _mass(scene, get), _inertia(scene, get, p)
     needed = np.ones(len(p))
     if scene.effects.guide_friction is not None:
         needed = p[:, at.GUIDE_INVERSE_RAMP] / OF_RAMP
     for joint in scene.clearance_joints():
-        own = p[:, at.JOINT_BLOCKS + _place(scene, joint) * at.JOINT_ROWS :]
+        place = _place(scene, joint)
+        own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
-        swing = np.sqrt(1.5 * own[:, at.CONTACT_STIFFNESS] ** (2 / 3) * force ** (1 / 3) / mass)
-        needed = np.maximum(needed, mass * swing / (OF_FORCE * force))
+        frequency = np.sqrt(swing(scene, p, place, force) / mass)
+        needed = np.maximum(needed, mass * frequency / (OF_FORCE * force))
     return (1.0 + pin) * needed
+
+
+def _mass(scene: Scene, get: Numbers) -> Array:
+    """All masses together, kg, (samples,)."""
+    total: Array = sum(get(path) for path in scene.numeric_paths() if path.endswith(".mass"))  # type: ignore[assignment]
+    return total
+
+
+def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:
+    """What the forces of inertia come to, N, (samples,)."""
+    turning = np.abs(p[:, at.SPEED])
+    pin = turning * p[:, at.CRANK_LENGTH]
+    return np.maximum(_mass(scene, get) * pin * turning, 1e-300)
 
 
 def _own_rows(scene: Scene) -> int:
@@ -220,7 +191,7 @@ def _own_rows(scene: Scene) -> int:
         return linkage_of(scene).parameter_rows
     if scene.modes:
         return at.BENDING + len(entries(scene.modes))
-    return at.OWN + (at.BRISTLE_ROWS if scene.bristles else 0)
+    return at.OWN
 
 
 def parameter_rows(scene: Scene) -> int:

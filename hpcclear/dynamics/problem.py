@@ -15,13 +15,13 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
+from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
 from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text, written_by
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters, topology
-from hpcclear.dynamics.physics import contact
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of, slider_crank_mechanism
 from hpcclear.dynamics.stepping.settings import STRICT
@@ -205,8 +205,6 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         swings = not main.advance
     else:
         first, second, free = topology(scene)
-    contact_law = e.contact.law if e.contact is not None and count else None
-    friction_law = e.friction.law if count else None
     torque_is_table = isinstance(getattr(scene.drive, "torque", None), tuple)
     load_is_table = isinstance(e.slider_load, tuple)
     waves = scene.waves()
@@ -216,11 +214,8 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         rod_slider=_flag(second),
         joints=count if scene.is_planar else None,
         swinging=_flag(swings),
-        fixed=_flag(contact_law == "hunt-crossley"),
-        latched=_flag(contact_law in contact.LATCHED_LAWS),
-        coulomb=_flag(friction_law == "coulomb"),
-        ambrosio=_flag(friction_law == "ambrosio"),
-        lugre=_flag(friction_law == "lugre"),
+        contact=in_lanes(e.contact.declared) if e.contact is not None and count else None,
+        friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         bending=None if scene.is_planar else scene.modes or None,
         torque=_flag(free),
         torque_table=_flag(free and torque_is_table),
@@ -300,12 +295,9 @@ def implicit_method(scene: Scene) -> str:
     if scene.films() or scene.bristles:
         return "stiff"  # a film's damping grows beyond all bounds as it gets thin; bristles give way within a micrometre
     par = Parameters(parameters(scene)[0])
-    friction = scene.effects.friction.law
-    contact_law = getattr(scene.effects.contact, "law", "hertz")
     is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
-    ramp = par.friction * par.inverse_ramp * (friction != "none")
-    damping = par.damping * (contact_law != "hertz")
-    stiff = (ramp >= STIFF_RAMP) | (damping >= STIFF_DAMPING)
+    ramp = par.steepness * (scene.effects.friction.law != "none")
+    stiff = (ramp >= STIFF_RAMP) | (par.damping >= STIFF_DAMPING)
     return "stiff" if (stiff & is_open).any() else "never"
 
 

@@ -15,6 +15,7 @@ from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records, records_by
 from hpcclear.dynamics.evaluator import KICKS, Evaluator, alone, outcome_records, responses_told
+from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
 from hpcclear.dynamics.linkage.bending import Bent
@@ -335,10 +336,9 @@ def _series(
     """Every time series of the response but those of modes."""
     open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
     gaps = np.where(open_, rates.gap[:, :2], 0.0)
-    stiffness = np.where(open_, Parameters(par).stiffness[:2], 0.0)
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
-    elastic = geometry.elastic_energy(gaps, active, stiffness)
+    elastic = stored_energy(scene, par, gaps[:, open_], active[:, open_], np.flatnonzero(open_))
     kinetic = geometry.kinetic_energy(m, par)
     potential = geometry.potential_energy(m, par, scene.effects.gravity)
     strain: Array | float = 0.0

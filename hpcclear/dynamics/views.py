@@ -229,17 +229,33 @@ class Parameters(View):
     gravity = Column(at.GRAVITY)
     # of all joints, shape (..., MAX_JOINTS)
     clearance = _entry(at.CLEARANCE)
-    stiffness = _entry(at.CONTACT_STIFFNESS)
     damping = _entry(at.DAMPING)
+    deepest_valid = _entry(at.DEEPEST_VALID)  # m
     bearing_radius = _entry(at.BEARING_RADIUS)
     journal_radius = _entry(at.JOURNAL_RADIUS)
-    friction = _entry(at.FRICTION)
     inverse_ramp = _entry(at.INVERSE_RAMP)
+    steepness = _entry(at.STEEPNESS)  # s/m
     film_short = _entry(at.FILM_SHORT)
     film_finite = _entry(at.FILM_FINITE)
     film_long = _entry(at.FILM_LONG)
     film_shear = _entry(at.FILM_SHEAR)
     film_floor = _entry(at.FILM_FLOOR)
+
+    @property
+    def contact_numbers(self) -> Array:
+        """Numbers of the law of contact, shape (..., MAX_JOINTS, LAW_NUMBERS), in the order of its ``read``."""
+        return self._law_numbers(at.CONTACT_NUMBERS)
+
+    @property
+    def friction_numbers(self) -> Array:
+        """Numbers of the law of friction, likewise."""
+        return self._law_numbers(at.FRICTION_NUMBERS)
+
+    def _law_numbers(self, first: int) -> Array:
+        blocks = self.rows[..., at.JOINT_BLOCKS : at.OWN]
+        blocks = blocks.reshape(*blocks.shape[:-1], at.MAX_JOINTS, at.JOINT_ROWS)
+        found: Array = blocks[..., first : first + at.LAW_NUMBERS]
+        return found
 
 
 class Rates(View):

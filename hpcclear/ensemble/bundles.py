@@ -53,7 +53,7 @@ class Bundles:
     """
 
     def __init__(self, payload: Mapping[str, Any]) -> None:
-        scene = load_scene(payload["design"])
+        scene = load_scene(payload["design"], trust=True)
         points = MonteCarloPoints(scene, payload["total"])
         self.points: Points = points
         files = raw_files(payload["raw"], scene, points)

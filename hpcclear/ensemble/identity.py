@@ -3,6 +3,7 @@
 import hashlib
 import json
 
+from hpcclear.plugins.sources import digest
 from hpcclear.results.dataset import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import flatten
@@ -18,6 +19,8 @@ def run_key(scene: Scene, command: str) -> dict[str, str]:
     """
     origin = provenance(scene.text, scene.hash)
     entries = {path: json.dumps(value) for path, value in flatten(scene.resolved())}
+    for module, text in scene.plugin_texts.items():
+        entries[f"plugins.files.{module}.source"] = f"SHA-256 {digest(text)}"
     made_by = {name: origin[name] for name in ("hpcclear_version", "versions", "processor")}
     return {"command": command, **made_by, **entries}
 

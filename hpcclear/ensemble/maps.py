@@ -100,7 +100,9 @@ def make_mapper(payload: Mapping[str, Any], ranks: Ranks) -> "SteadyEvaluator":
 
     nothing = np.empty((0, len(payload["names"])))
     columns = Points(payload["names"], nothing, payload["paths"])
-    worker = SteadyEvaluator(load_scene(payload["scene"]), columns, payload["lanes"], mapped)
+    worker = SteadyEvaluator(
+        load_scene(payload["scene"], trust=True), columns, payload["lanes"], mapped
+    )
     return first_compiled(worker, ranks)
 
 

@@ -193,7 +193,7 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     from hpcclear.scene.sampling import MonteCarloPoints
 
     worker = payload["make"](payload["samples"], ranks)
-    scene = load_scene(payload["design"])
+    scene = load_scene(payload["design"], trust=True)
     points = MonteCarloPoints(scene, payload["total"])
     files = raw_files(payload["raw"], scene, points)
     return Summariser(worker, points, payload["edges"], None if files is None else files.write)

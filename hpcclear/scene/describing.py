@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from hpcclear.plugins.sources import digest
 from hpcclear.scene.mechanism import TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar, PlanarSlide
@@ -32,7 +33,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"
     if effects.friction.law != "none":
-        yield f"friction {effects.friction.law}, coefficient {effects.friction.coefficient:g}"
+        coefficient = effects.friction.value("coefficient")
+        size = "" if coefficient is None else f", coefficient {coefficient:g}"
+        yield f"friction {effects.friction.law}{size}"
     if isinstance(scene.drive, TorqueDrive):
         falls = "" if scene.drive.no_load_speed is None else ", torque falling with speed"
         rest = ", from rest" if scene.drive.initial_speed == 0.0 else ""
@@ -113,7 +116,10 @@ def unused(scene: SceneTables) -> Iterator[str]:
 def differences(first: SceneTables, second: SceneTables) -> list[str]:
     """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
     equal."""
-    ours, theirs = dict(flatten(first.resolved())), dict(flatten(second.resolved()))
+    ours, theirs = (
+        {k: f"SHA-256 {digest(v)}" if k.startswith("plugins.files.") else v for k, v in entries}
+        for entries in (flatten(first.resolved()), flatten(second.resolved()))
+    )
     lines = [
         f"{key}: {ours.get(key, '(not set)')!r} -> {theirs.get(key, '(not set)')!r}"
         for key in {**ours, **theirs}

@@ -1,10 +1,9 @@
 """The building blocks of scene models: strict frozen tables, quantities with a unit and bounds,
 counts, curves."""
 
-import difflib
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -17,12 +16,12 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from hpcclear.base.errors import nearest as nearest
 from hpcclear.scene.units import UnitError, to_si
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
 LONGEST_CURVE = 10_000
-MOST_LISTED = 20
 
 
 def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
@@ -39,17 +38,6 @@ def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
     """An error for validators unless just one of the two is given; `key` is that of `value`."""
     if (value is None) == (other is None):
         raise invalid("is given twice, or not at all", remedy, key=key, value=value)
-
-
-def nearest(word: str, words: Sequence[str]) -> str:
-    """A sentence that points to the nearest of `words`, or lists them."""
-    close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)
-    if close:
-        return f"Did you mean {close[0]!r}?"
-    if not words:
-        return "Remove it"
-    more = len(words) - MOST_LISTED
-    return "Use one of: " + ", ".join(words[:MOST_LISTED]) + (f" ({more} more)" if more > 0 else "")
 
 
 class Table(BaseModel):

@@ -8,10 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from hpcclear.base.errors import InputError
 from hpcclear.scene.measured import files_named, with_values
 from hpcclear.scene.paths import replace
+from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene, scene_of
+from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import DEEPEST, dotted
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
@@ -26,7 +30,9 @@ _NOTE = "# set: "  # before each override, at the head of a scene's text
 _CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
-def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Scene:
+def load_scene(
+    source: str | Path | Mapping[str, Any], overrides: Sequence[str] = (), *, trust: bool = False
+) -> Scene:
     """Read and validate a scene.
 
     Parameters
@@ -36,6 +42,9 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     overrides : sequence of str
         ``"key.path=value"`` entries that replace what the file says; the value is read as TOML if
         it can be, else as a string, so ``joints.crank_rod.clearance=0.5 mm`` needs no quotes.
+    trust : bool
+        Whether Python text that the content itself carries may be run, as results carry that of plug-ins. Files beside the
+        scene file that it names are run without it.
 
     Raises
     ------
@@ -53,26 +62,33 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     named = files_named(content)
     content = dict(with_values(content, folder))
+    own_plugins = "plugins" in content
+    if not trust:
+        check_trust(content, "mapping" if text is None else str(source))
+    if text is not None and not own_plugins:
+        content = with_texts(content, lambda module: _beside(folder, module))
     scene = scene_of(content)
     notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
-    if text is None or named:  # results carry the values: whoever has one need not have the file
+    if (
+        text is None or named or own_plugins
+    ):  # results carry the values: whoever has one need not have the file
         scene._text = scene.to_toml()
     else:
         # an empty line ends the notes, whatever a file's own first comment says
         own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
-        scene._text = notes + own
+        scene._text = notes + own + _plugins(scene)
     return scene
 
 
 def scene_of_text(text: str, name: str) -> Scene:
     """Return the scene of a text that a result file carries, with what was set or changed noted at its head.
 
-    No file is opened, whatever the text names: it may be somebody else's.
+    No file is opened, whatever the text names: it may be somebody else's. Python text in it is run in a `trusting` block only.
 
     Raises
     ------
     InputError
-        As `load_scene`, or if values are in a file.
+        As `load_scene`, or if values are in a file, or nobody has said that Python text in it may be run.
     """
     content = parse(text, name)
     notes = list(
@@ -86,7 +102,12 @@ def scene_of_text(text: str, name: str) -> Scene:
     for key in (*files_named(content), *files):
         reason = "its scene names a file of values, which the result does not carry"
         raise InputError(key, name, reason, "Make the result again with this version")
-    scene = load_scene(content)
+    changed = content
+    for path, value in changes.items():
+        changed = replace(changed, path, value)
+    check_trust(content, name)
+    check_trust(changed, name)
+    scene = load_scene(content, trust=True)
     return scene.with_(changes) if changes else scene
 
 
@@ -100,23 +121,39 @@ def _change(line: str) -> tuple[str, Any]:
         raise InputError("scene", line, reason, "Mend the line, or remove it") from None
 
 
-def _read(path: Path) -> str:
+def _plugins(scene: Scene) -> str:
+    """Where plug-ins of a scene come from, to stand below the tables of its file."""
+    if scene.plugins is None:
+        return ""
+    return "\n\n" + tomli_w.dumps({"plugins": plain(scene.plugins)}, multiline_strings=True)
+
+
+def _beside(folder: Path, module: str) -> str | None:
+    """The text of a Python file beside the scene file, None where there is none."""
+    path = folder / f"{module}.py"
+    if not path.exists():
+        return None
+    return _read(path, "Python file", "Give a plug-in in Python").replace("\r\n", "\n")
+
+
+def _read(
+    path: Path, what: str = "scene file", remedy: str = "Give the path of a TOML scene file"
+) -> str:
     name = str(path)
-    remedy = "Give the path of a TOML scene file"
     try:
         if not path.is_file():
             reason = "is not a regular file" if path.exists() else "there is no such file"
-            raise InputError("scene file", name, reason, remedy)
+            raise InputError(what, name, reason, remedy)
         with path.open("rb") as stream:
             data = stream.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError("scene file", name, f"cannot be read ({reason})", remedy) from None
+        raise InputError(what, name, f"cannot be read ({reason})", remedy) from None
     if len(data) > LARGEST_FILE:
         raise InputError(
-            "scene file",
+            what,
             name,
             f"is larger than {LARGEST_FILE} bytes",
             "A scene needs a few thousand",
@@ -125,7 +162,7 @@ def _read(path: Path) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
-            "scene file", name, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8"
+            what, name, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8"
         ) from None
 
 

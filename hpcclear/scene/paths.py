@@ -10,6 +10,7 @@ from pydantic.fields import FieldInfo
 
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import CurveOf, NamedRows, Quantity
+from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 from hpcclear.scene.planar import Planar
 
@@ -63,9 +64,14 @@ class Quantities(dict[str, Quantity]):
         return ".".join(parts)
 
     def __contains__(self, path: object) -> bool:
-        return dict.__contains__(self, path) or dict.__contains__(self, self._general(path))
+        general = self._general(path)
+        return any(path in known for known in (dict.keys(self), ENTRIES)) or general in dict.keys(
+            self
+        )
 
     def __missing__(self, path: str) -> Quantity:
+        if path in ENTRIES:
+            return ENTRIES[path]
         general = self._general(path)
         if general == path:
             raise KeyError(path)
@@ -83,9 +89,12 @@ _NAMED = ("bodies", "joints", "drives", "loads", "points")
 def quantities() -> Mapping[str, Quantity]:
     """Every path of a physical number that some scene may have, with its unit and bounds."""
     tables = [*PHYSICAL.items(), ("mechanism", Planar)]
-    return Quantities(
+    found = Quantities(
         (path, quantity) for top, model in tables for path, quantity in _entries(model, top)
     )
+    for kind in ("contact", "friction"):
+        found |= dict(law_entries(kind))
+    return found
 
 
 _WORDS = {

@@ -43,9 +43,9 @@ def implausible(scene: SceneTables) -> Iterator[str]:
     if effects.gravity > 100.0:
         yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
     for name in ("coefficient", "static_coefficient"):
-        if (getattr(effects.friction, name) or 0.0) > 1.0:
+        if (effects.friction.value(name) or 0.0) > 1.0:
             yield (
-                f"effects.friction.{name} = {getattr(effects.friction, name):g} is above 1; "
+                f"effects.friction.{name} = {effects.friction.value(name):g} is above 1; "
                 "lubricated bearings have 0.001 to 0.1"
             )
 

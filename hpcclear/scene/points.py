@@ -94,20 +94,33 @@ def check_points(
         )
         gap = np.broadcast_to(np.asarray(upper - lower), len(points))
         _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
+    _check_laws(scene, points, label)
 
-    if scene.effects.friction.law == "lugre":
-        sliding, static = (
-            np.asarray(entries(scene, points.paths, points.values, f"effects.friction.{name}"))
-            for name in ("coefficient", "static_coefficient")
-        )
-        alone = np.broadcast_to((sliding == 0) & (static > 0), len(points))
-        held = np.broadcast_to(static, len(points))
-        _refuse(
-            alone, held, "static_coefficient", "is friction at rest alone, which is no law", label
-        )
-        less = np.broadcast_to(static - sliding, len(points))
-        reason = "makes friction at rest less than sliding"
-        _refuse(less < 0, less, "static_coefficient - coefficient", reason, label)
+
+def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
+    """Refuse values that a law does not take together."""
+    for kind in ("contact", "friction"):
+        table = getattr(scene.effects, kind)
+        driven = {path for paths in points.paths for path in paths}
+        if table is None or table.declared.check is None:
+            continue
+        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
+        if not names:
+            continue
+        columns = {
+            name: np.broadcast_to(
+                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
+            )
+            for name in names
+        }
+        for row in range(len(points)):
+            own = {name: float(column[row]) for name, column in columns.items()}
+            wrong = table.declared.check({**table.values(), **own})
+            if wrong is not None:
+                reason, remedy, name = wrong
+                raise InputError(
+                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
+                )
 
 
 def _refuse(

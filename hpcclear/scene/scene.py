@@ -7,9 +7,11 @@ import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError, unboxed
+from hpcclear.plugins.sources import using
 from hpcclear.scene import budget, citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
+from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
@@ -76,7 +78,7 @@ class Scene(SceneTables):
         """Each bound of each variable, widened by what is random about it, must still make a
         mechanism."""
         assert self.study is not None
-        names = (*PHYSICAL, "numerics")
+        names = (*PHYSICAL, "numerics", "plugins")
         content = {name: plain(table) for name in names if (table := getattr(self, name))}
         reach = {row.name: row.span for row in self.study.random if not row.absolute}
         spans = {
@@ -135,7 +137,7 @@ class Scene(SceneTables):
 
     def to_toml(self) -> str:
         """TOML text of the resolved content; loading it gives an equal scene."""
-        return tomli_w.dumps(self.resolved())
+        return tomli_w.dumps(self.resolved(), multiline_strings=True)
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> "Scene":
         """A new, validated scene with some entries replaced.
@@ -169,10 +171,16 @@ class Scene(SceneTables):
 
 
 def scene_of(content: Mapping[str, Any]) -> Scene:
-    """The scene of a file's tables, with the readings of its units; errors as `load_scene`."""
+    """The scene of a file's tables, with the readings of its units; errors as `load_scene`.
+
+    Source text that it carries is run: `load_scene` sees to it that it may be.
+    """
     read: dict[str, str] = {}
-    with noting(read.__setitem__):
+    with noting(read.__setitem__), using(texts_of(content)) as packages:
         scene = validated(Scene, content)
+        rows = {name: {"version": version} for name, version in sorted(packages.items())}
+        if rows != content.get("plugins", {}).get("packages", {}):
+            scene = validated(Scene, replace(content, "plugins.packages", rows))
     scene._readings = tuple(_placed(content, read)) if read else ()
     return scene
 

@@ -124,27 +124,27 @@ def _frictions(scene: Scene) -> Iterator[Switch]:
     if not scene.clearance_joints() or law.law == "none":
         return
     yield Switch("friction in joints", {key: {"law": "none"}})
-    assert law.coefficient is not None  # by validation
-    gentle = law.coefficient / GENTLE_RAMP
-    if law.law == "lugre":
-        assert law.stribeck_speed is not None
-        ramp = max(law.stribeck_speed, gentle)
-        sliding = {"law": "coulomb", "coefficient": law.coefficient, "ramp_speed": ramp}
-        kept = f"{key}.coefficient"
-        yield Switch("sticking in joints", {key: sliding}, {kept: kept})
-    if law.ramp_speed is not None and law.ramp_speed < 0.5 * gentle:
-        yield Switch("steepness of friction", {f"{key}.ramp_speed": gentle})
-    if law.speeds is not None and law.speeds[1] < 0.5 * gentle:
-        wider = [law.speeds[0] / law.speeds[1] * gentle, gentle]
-        yield Switch("steepness of friction", {f"{key}.speeds": wider})
+    if law.declared.simpler is None:
+        return
+    for words, table in law.declared.simpler(law.values(), lambda c: c / GENTLE_RAMP):
+        if "law" not in table:
+            yield Switch(words, {f"{key}.{name}": value for name, value in table.items()})
+            continue
+        kept = {name for name in table if law.value(name) == table[name]}
+        yield Switch(words, {key: table}, {f"{key}.{name}": f"{key}.{name}" for name in kept})
 
 
 def _contacts(scene: Scene) -> Iterator[Switch]:
     """What the contact law does beside its elastic force."""
-    law = scene.effects.contact if scene.clearance_joints() else None
-    if law is not None and (law.damping or (law.restitution is not None and law.restitution < 1)):
+    table = scene.effects.contact if scene.clearance_joints() else None
+    if table is None or not table.declared.without_loss:
+        return
+    if table.declared.lossless is None or not table.declared.lossless(table.values()):
         floor = "effects.contact.minimum_impact_speed"
-        elastic = {"law": "hertz", "minimum_impact_speed": law.minimum_impact_speed}
+        elastic = {
+            "law": table.declared.without_loss,
+            "minimum_impact_speed": table.minimum_impact_speed,
+        }
         yield Switch("contact damping", {"effects.contact": elastic}, {floor: floor})
 
 

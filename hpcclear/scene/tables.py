@@ -18,6 +18,7 @@ from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance
+from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import SHORT_NAMES
 from hpcclear.scene.wear import Lives
@@ -40,6 +41,7 @@ class SceneTables(Table):
     output: Output = Output()
     study: Study | None = None
     wear: Lives | None = None
+    plugins: Plugins | None = None
 
     elsewhere: ClassVar = {
         key: (f"belongs to [{part}]", f"Write {part}.{key}")
@@ -133,7 +135,7 @@ class SceneTables(Table):
                 "the nine coordinates of Baumgarte's slider-crank have no place for bristles",
                 'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
                 key="effects.friction.law",
-                value="lugre",
+                value=self.effects.friction.law,
             )
         return self
 
@@ -227,9 +229,14 @@ class SceneTables(Table):
         return {name: film for name, film in tables.items() if film is not None}
 
     @property
+    def plugin_texts(self) -> dict[str, str]:
+        """Source texts of the Python files that this scene names, by module."""
+        return {} if self.plugins is None else {row.name: row.source for row in self.plugins.files}
+
+    @property
     def bristles(self) -> int:
         """Joints whose friction has bristles, each with a state of its own."""
-        return len(self.clearance_joints()) if self.effects.friction.law == "lugre" else 0
+        return len(self.clearance_joints()) if self.effects.friction.bristled else 0
 
     def bending(self) -> dict[str, Bending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
@@ -404,4 +411,5 @@ def plain(value: Any) -> Any:
             entry = {row.pop("name"): row for row in entry}
         if entry is not None:
             content[name] = entry
-    return content
+    own = {name: plain(entry) for name, entry in (value.__pydantic_extra__ or {}).items()}
+    return {"law": content["law"], **own, **content} if own else content

@@ -21,7 +21,7 @@ from hpcclear.dynamics.collocation.lobatto import STAGES
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, leave_rates
-from hpcclear.dynamics.stepping.peaks import NEAR, damping, keep_peak
+from hpcclear.dynamics.stepping.peaks import NEAR, keep_peak, shape
 from hpcclear.dynamics.stepping.record import no_room, record_nodes, record_step
 from hpcclear.dynamics.stepping.sample import OK, failure
 from hpcclear.dynamics.stepping.settings import (
@@ -223,7 +223,7 @@ def may_hold_peaks(work, m, p):
 def peaks_between(rules, work, par, m, p):
     """Extremes of joint p at the nodes of an accepted step and between them, its end left to `commit`."""
     if work[at.AVERAGING] == 1.0 and may_hold_peaks(work, m, p):
-        c = damping(rules, work, par, p, 0, 1)
+        exponent, c = shape(rules, work, par, p, 0, 1)
         force = work[at.RATE_OLD + at.FORCE + p]
         for i in range(STAGES):
             before, force = force, m[(at.RATE_NOW + at.FORCE + p) * STAGES + i]
@@ -234,7 +234,7 @@ def peaks_between(rules, work, par, m, p):
             high = NEAR * max(before, force) > work[at.PEAK + p]
             if high or NEAR * max(d0, d1) > work[at.DEEPEST + p]:
                 h = length * work[at.STEP]
-                keep_peak(work, p, 0, 1, d0, m0 / h, d1, m1 / h, 0.0, c, h, before, force)
+                keep_peak(work, p, 0, 1, d0, m0 / h, d1, m1 / h, 0.0, exponent, c, h, before, force)
 
 
 @lane_function

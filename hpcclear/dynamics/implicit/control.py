@@ -87,7 +87,7 @@ def fit_to_ramp(par, lane, W, m, i, settings):
         block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
         inverse = par[(block + at.INVERSE_RAMP) * W + lane]
         steepest = max(steepest, inverse)
-        slope = max(slope, par[(block + at.FRICTION) * W + lane] * inverse)
+        slope = max(slope, par[(block + at.STEEPNESS) * W + lane])
         film = max(film, par[(block + at.FILM_STEEPNESS) * W + lane])
     ramp = 1.0 / steepest
     speed = par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]

@@ -1,11 +1,11 @@
-"""Kinks of the forces: where sliding leaves or enters the friction ramp, and where damping stops a contact's force.
+"""Kinks of the forces: where sliding leaves or enters the friction ramp, and where a contact's force is cut at 0.
 
 Across a kink the solution is hardly more than once differentiable and Newton's iteration with one Jacobian for all
 stages does not converge, so an implicit step is cut to end just beyond the first kink its first guess shows, or its
-solution. Each kink is the zero of a smooth function: damping factor, sliding speed at one side of the ramp, at the other, gap.
+solution. Each kink is the zero of a smooth function: three of the laws, which the motion writes down, and the gap.
 """
 
-from hpcclear.base.eight import above, fetch, put, size, spread
+from hpcclear.base.eight import above, fetch, put, spread
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
@@ -33,40 +33,17 @@ def entry(m, p, entry):
 
 
 @lane_function
-def damping_part(rules, m, p, rate):
-    """Damping factor of the normal force; 1 without damping or contact."""
-    damping = entry(m, p, at.DAMPING)
-    if rules.latched:
-        return 1.0 + damping * fetch(m, at.INVERSE_IMPACT + p) * rate
-    elif rules.fixed:
-        return 1.0 + damping * rate
-    else:
-        return spread(1.0)
-
-
-@lane_function
-def ramp_sides(rules, m, p, sliding):
-    """Functions that vanish where friction's ramp begins and ends."""
-    inverse_ramp = entry(m, p, at.INVERSE_RAMP)
-    if rules.coulomb:
-        return sliding * inverse_ramp + 1.0, sliding * inverse_ramp - 1.0
-    elif rules.ambrosio:
-        ramp = (size(sliding) - entry(m, p, at.DEAD_SPEED)) * inverse_ramp
-        return ramp, ramp - 1.0
-    else:
-        return spread(0.0), spread(0.0)
-
-
-@lane_function
 def kinks_of_joint(rules, m, p, row):
     """The four functions of joint p at the states of all lanes, into rows from `row` on; 0 where no kink can be felt."""
     gap = fetch(m, at.RATE_NOW + at.GAP + p)
     nothing = spread(0.0)
     # in flight no force is transmitted, and a change of the gap's sign is the stepper's to find: an impact to be located
     touching = above(fetch(m, at.ACTIVE + p), gap, nothing) if rules.latched else gap
-    factor = damping_part(rules, m, p, fetch(m, at.RATE_NOW + at.GAP_RATE + p))
-    factor = above(touching, factor, nothing)
-    low, high = ramp_sides(rules, m, p, fetch(m, at.RATE_NOW + at.SLIDINGS + p))
+    factor = above(touching, fetch(m, at.RATE_NOW + at.FORCE_KINKS + p), nothing)
+    low, high = (
+        fetch(m, at.RATE_NOW + at.LOW_KINKS + p),
+        fetch(m, at.RATE_NOW + at.HIGH_KINKS + p),
+    )
     put(m, row, factor)
     put(m, row + 1, above(factor, low, nothing))
     put(m, row + 2, above(factor, high, nothing))

@@ -90,8 +90,3 @@ def kinetic_energy(m: Motion, par: Array) -> Array:
 def potential_energy(m: Motion, par: Array, gravity: float) -> Array:
     """Potential energy in J against y = 0, shape (t,)."""
     return gravity * (par[at.CRANK_MOMENT] * np.sin(m.crank_angle) + par[at.ROD_MASS] * m.rod_y)
-
-
-def elastic_energy(gaps: Array, active: Array, stiffness: Array) -> Array:
-    """Energy in J stored in the contacts, 0.4 K d^2.5 each, shape (t,); arguments (t, 2), (t, 2), (2,)."""
-    return (0.4 * stiffness * active * np.maximum(gaps, 0.0) ** 2.5).sum(axis=1)

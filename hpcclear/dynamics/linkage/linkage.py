@@ -55,7 +55,7 @@ class Linkage:
         self._on = On(friction=friction, gravity=gravity, follow=follow, waves=waves)
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
-        self._free = at.OWN + at.BRISTLE_ROWS * bristled
+        self._free = at.OWN
         for ledger in (False, True):
             for series in (False, True):
                 for responses in (False, True):

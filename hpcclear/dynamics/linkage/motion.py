@@ -15,7 +15,7 @@ import math
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.bristles import ratio_of
+from hpcclear.dynamics.linkage.friction import ratio_of, sides_of
 from hpcclear.dynamics.linkage.lubrication import film_of, pressed
 from hpcclear.dynamics.linkage.roundness import (
     less,
@@ -24,7 +24,6 @@ from hpcclear.dynamics.linkage.roundness import (
     waves_here,
 )
 from hpcclear.dynamics.physics.angles import sincos
-from hpcclear.dynamics.physics.contact import elastic_force, normal_force
 from hpcclear.dynamics.physics.friction import saturated, share_of
 
 _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
@@ -52,7 +51,7 @@ def product(flag, a, b):
 
 @lane_function
 def either_product(flag, other, a, b):
-    """`product` for an effect with two forms: friction laws, constant and tabulated loads."""
+    """`product` for an effect with two forms: constant and tabulated loads."""
     if flag is not None:
         return a * b
     else:
@@ -142,16 +141,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
     depth = no_less(gap, 0.0)
-    stiffness = par[(block + at.CONTACT_STIFFNESS) * W + i]
-    normal = normal_force(
-        effects.fixed,
-        effects.latched,
-        stiffness,
-        par[(block + at.DAMPING) * W + i],
-        depth,
-        rate,
-        inverse_impact,
-    )
+    law, row = effects.contact, block + at.CONTACT_NUMBERS
+    normal = law.force(par, row, depth, rate, inverse_impact, active, i, W)
     normal = switched(effects.latched, normal, active)
     radius = less(effects.waves, par[(block + at.BEARING_RADIUS) * W + i], -here.bearing)
     arm_bearing = radius + 0.5 * depth
@@ -159,17 +150,17 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     arm_journal = radius - 0.5 * depth
     across = vy * nx - vx * ny
     sliding = across + swept(spin_journal, arm_journal) - swept(spin_bearing, arm_bearing)
-    coulomb = effects.coulomb
-    other = effects.lugre if effects.ambrosio is None else effects.ambrosio
-    ratio = ratio_of(effects, work, par, joint, sliding, i, W)
-    tangential = either_product(coulomb, other, normal, ratio)
-    fx = normal * nx - either_product(coulomb, other, tangential, ny)
-    fy = normal * ny + either_product(coulomb, other, tangential, nx)
-    moment_bearing = either_product(coulomb, other, tangential, arm_bearing)
-    moment_journal = either_product(coulomb, other, tangential, arm_journal)
+    rubs = effects.friction
+    ratio = ratio_of(effects, work, par, joint, sliding, normal, i, W)
+    tangential = product(rubs, normal, ratio)
+    fx = normal * nx - product(rubs, tangential, ny)
+    fy = normal * ny + product(rubs, tangential, nx)
+    moment_bearing = product(rubs, tangential, arm_bearing)
+    moment_journal = product(rubs, tangential, arm_journal)
     side = tilted(effects.waves, here, (nx, ny, inverse), normal)
-    elastic = switched(effects.latched, elastic_force(stiffness, depth), active)
-    loss = (normal - elastic) * rate + either_product(coulomb, other, tangential, sliding)
+    elastic = law.elastic(par, row, depth, rate, inverse_impact, active, i, W)
+    elastic = switched(effects.latched, elastic, active)
+    loss = (normal - elastic) * rate + product(rubs, tangential, sliding)
     oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
     work[(at.RATE_NOW + joint.force) * W + i] = pressed(
@@ -177,7 +168,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     )
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
-    store_rate(effects.sliding, work, joint.sliding, sliding, i, W)
+    store_kinks(effects, work, par, joint, (depth, rate, inverse_impact, active), sliding, i, W)
     wearing = force_that_wears(effects.threshold, par, joint, normal, i, W)
     store_rate(effects.wear, work, joint.sliding_power, wearing * abs(sliding), i, W)
     store_angles(effects, work, joint, here, i, W)
@@ -188,6 +179,20 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
         oil[3] - moment_journal + side[3],
         loss + oil[4],
     )
+
+
+@lane_function
+def store_kinks(effects, work, par, joint, contact, sliding, i, W):
+    """Write down the functions that change their signs where the laws' forces have kinks, for the implicit method."""
+    if effects.sliding is not None:
+        depth, rate, inverse_impact, active = contact
+        row = joint.block + at.CONTACT_NUMBERS
+        cut = effects.contact.kink(par, row, depth, rate, inverse_impact, active, i, W)
+        work[(at.RATE_NOW + joint.force_kink) * W + i] = cut
+        row = joint.block + at.FRICTION_NUMBERS
+        low, high = sides_of(effects.friction, par, row, sliding, i, W)
+        work[(at.RATE_NOW + joint.low_kink) * W + i] = low
+        work[(at.RATE_NOW + joint.high_kink) * W + i] = high
 
 
 @lane_function

@@ -95,7 +95,7 @@ def joints_of(effects: at.Effects) -> tuple[at.Joint, ...]:
 def motion_of(effects: at.Effects) -> Motion:
     """Its text, in the rows of the layout."""
     on = On(
-        friction=bool(effects.coulomb or effects.ambrosio or effects.lugre or effects.film),
+        friction=bool(effects.friction or effects.film),
         gravity=bool(effects.gravity),
         ledger=bool(effects.ledger),
         series=bool(effects.series),

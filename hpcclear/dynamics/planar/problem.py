@@ -170,9 +170,6 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     p[:, at.CRANK_LENGTH] = driven_length(linkage.mechanism)
     n = scene.numerics
     linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
-    for k, joint in enumerate(sample.clearances):
-        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        p[:, block + at.CONTACT_STIFFNESS] = joint.stiffness
     return p
 
 

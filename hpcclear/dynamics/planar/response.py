@@ -8,6 +8,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.poses import Pose
@@ -41,7 +42,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     count = len(mechanism.clearances)
     active = contacts_on(scene, seen.contacts, count)
     gaps = seen.rates.gap[:, :count]
-    elastic = elastic_energy(Parameters(par).stiffness[:count], gaps, active)
+    elastic = stored_energy(scene, par, gaps, active, range(count))
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
     strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
     stored = (kinetic, elastic, potential - strain, strain)
@@ -102,12 +103,6 @@ def contacts_on(scene: Scene, contacts: Array, count: int) -> Array:
     """Whether a penetration of each joint counts, (t, joints): under latched laws only while in contact."""
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     return contacts[:, :count] if latched else np.ones((len(contacts), count))
-
-
-def elastic_energy(stiffness: Array, gaps: Array, active: Array) -> Array:
-    """Energy stored in the contacts, J, (t,); stiffness (joints,), gaps and contact flags (t, joints)."""
-    stored: Array = (0.4 * stiffness * active * np.maximum(gaps, 0.0) ** 2.5).sum(axis=-1)
-    return stored
 
 
 def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> dict[str, Array]:

@@ -8,10 +8,10 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.curves import angle_cells
+from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
 from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.physics.contact import contact_stiffness, reduced_compliance
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,

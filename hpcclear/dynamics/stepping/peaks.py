@@ -1,7 +1,7 @@
 """Peaks of contact forces and penetrations inside a step: at its ends they are too low by a fifth of a per cent, and more.
 
-Between two instants a gap is the cubic through its values and rates there. The contact force goes with d**1.5 (1 + c d'),
-c from the law's damping, so that its largest value inside is known from that at either end.
+Between two instants a gap is the cubic through its values and rates there. The contact force goes with d**n (1 + c d') or
+nearly so, n and c from the law, so that its largest value inside is known from that at either end.
 """
 
 import math
@@ -19,31 +19,32 @@ TURNS = 4
 
 
 @lane_function
-def damping(rules, work, par, p, i, W):
-    """Factor c of the gap's rate in joint p's force, s/m; 0 without damping."""
-    c = par[(at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.DAMPING) * W + i]
+def shape(rules, work, par, p, i, W):
+    """Exponent n of the depth in joint p's force, and factor c of the gap's rate, s/m."""
+    block = at.JOINT_BLOCKS + at.JOINT_ROWS * p
+    c = par[(block + at.DAMPING) * W + i]
     impact = work[(at.INVERSE_IMPACT + p) * W + i]
-    return c * (impact if rules.latched else (1.0 if rules.fixed else 0.0))
+    return par[(block + at.EXPONENT) * W + i], c * (impact if rules.latched else 1.0)
 
 
 @lane_function
-def force_slope(d, rate, bend, c, h):
+def force_slope(d, rate, bend, n, c, h):
     """What has the sign of the force's rate at a gap d > 0, with its rate and its second derivative over the step h."""
-    return 1.5 * h * h * rate * (1.0 + c * rate) + c * d * bend
+    return n * h * h * rate * (1.0 + c * rate) + c * d * bend
 
 
 @lane_function
-def slopes_at_ends(d0, r0, d1, r1, c, h):
+def slopes_at_ends(d0, r0, d1, r1, n, c, h):
     """That at the start and at the end, by the cubic."""
     rise, m0, m1 = d1 - d0, h * r0, h * r1
-    first = force_slope(d0, r0, 6.0 * rise - 4.0 * m0 - 2.0 * m1, c, h)
-    return first, force_slope(d1, r1, 2.0 * m0 + 4.0 * m1 - 6.0 * rise, c, h)
+    first = force_slope(d0, r0, 6.0 * rise - 4.0 * m0 - 2.0 * m1, n, c, h)
+    return first, force_slope(d1, r1, 2.0 * m0 + 4.0 * m1 - 6.0 * rise, n, c, h)
 
 
 @lane_function
-def has_peak(d0, r0, d1, r1, c, h):
+def has_peak(d0, r0, d1, r1, n, c, h):
     """1 where the force rises at the start and falls at the end, both in contact."""
-    first, last = slopes_at_ends(d0, r0, d1, r1, c, h)
+    first, last = slopes_at_ends(d0, r0, d1, r1, n, c, h)
     return 1.0 if (first > 0.0) & (last < 0.0) & (min(d0, d1) > 0.0) else 0.0
 
 
@@ -54,7 +55,7 @@ def is_deepest(d0, r0, d1, r1):
 
 
 @scalar_function
-def peak_force(d0, r0, d1, r1, lift, c, h, f0, f1):
+def peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1):
     """Largest force over a time h in contact with a peak inside: gaps, their rates and forces at both ends.
 
     `lift` makes a quartic of the gap's cubic: of s^2 (1 - s)^2.
@@ -63,7 +64,7 @@ def peak_force(d0, r0, d1, r1, lift, c, h, f0, f1):
     c2 = 3.0 * (d1 - d0) - 2.0 * m0 - m1
     c3 = 2.0 * (d0 - d1) + m0 + m1
     low, high = 0.0, 1.0
-    above, below = slopes_at_ends(d0, r0, d1, r1, c, h)
+    above, below = slopes_at_ends(d0, r0, d1, r1, n, c, h)
     d, rate = d0, r0
     for _ in range(TURNS):
         s = low + (high - low) * above / (above - below)
@@ -72,7 +73,7 @@ def peak_force(d0, r0, d1, r1, lift, c, h, f0, f1):
         d = hermite(d0, m0, d1, m1, s) + lift * turn * turn
         rate = (m0 + s * (2.0 * c2 + s * 3.0 * c3) + 2.0 * lift * turn * tilt) / h
         bend = 2.0 * c2 + 6.0 * s * c3 + 2.0 * lift * (tilt * tilt - 2.0 * turn)
-        slope = force_slope(d, rate, bend, c, h)
+        slope = force_slope(d, rate, bend, n, c, h)
         if slope > 0.0:
             low, above, below = (
                 s,
@@ -83,7 +84,8 @@ def peak_force(d0, r0, d1, r1, lift, c, h, f0, f1):
             high, below, above = s, slope, 0.5 * above
     force, end, rate_there = (f0, d0, r0) if f0 > f1 else (f1, d1, r1)
     ratio = d / end
-    inside = force * ratio * math.sqrt(ratio) * (1.0 + c * rate) / (1.0 + c * rate_there)
+    grown = ratio * math.sqrt(ratio) if n == 1.5 else ratio**n
+    inside = force * grown * (1.0 + c * rate) / (1.0 + c * rate_there)
     # not where a film adds to the force: what is found then is no peak of this law
     return inside if max(f0, f1) <= inside <= NEAR * max(f0, f1) else max(f0, f1)
 
@@ -95,10 +97,10 @@ def lane_has_peak(rules, work, par, p, i, W):
     r0 = work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
     r1 = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
     f0, f1 = work[(at.RATE_OLD + at.FORCE + p) * W + i], work[(at.RATE_NOW + at.FORCE + p) * W + i]
-    c = damping(rules, work, par, p, i, W)
+    n, c = shape(rules, work, par, p, i, W)
     high = 1.0 if NEAR * max(f0, f1) > work[(at.PEAK + p) * W + i] else 0.0
     deep = 1.0 if NEAR * max(d0, d1) > work[(at.DEEPEST + p) * W + i] else 0.0
-    peak = has_peak(d0, r0, d1, r1, c, work[at.STEP * W + i])
+    peak = has_peak(d0, r0, d1, r1, n, c, work[at.STEP * W + i])
     found = max(high * peak, deep * is_deepest(d0, r0, d1, r1))
     return found * work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i]
 
@@ -111,18 +113,18 @@ def take_peak(rules, work, par, p, i, W):
     r0 = work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
     r1 = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
     f0, f1 = work[(at.RATE_OLD + at.FORCE + p) * W + i], work[(at.RATE_NOW + at.FORCE + p) * W + i]
-    c = damping(rules, work, par, p, i, W)
+    n, c = shape(rules, work, par, p, i, W)
     # the mean over the step, better than the cubic's, tells how far the gap bulges between its ends
     mean = work[(at.RATE_SUM + at.GAP + p) * W + i]
     lift = 30.0 * (mean - hermite_integral(d0, h * r0, d1, h * r1, 1.0))
-    keep_peak(work, p, i, W, d0, r0, d1, r1, lift, c, h, f0, f1)
+    keep_peak(work, p, i, W, d0, r0, d1, r1, lift, n, c, h, f0, f1)
 
 
 @scalar_function
-def keep_peak(work, p, i, W, d0, r0, d1, r1, lift, c, h, f0, f1):
+def keep_peak(work, p, i, W, d0, r0, d1, r1, lift, n, c, h, f0, f1):
     """The same of any two instants of an accepted step, a time h apart."""
-    if has_peak(d0, r0, d1, r1, c, h) == 1.0:
-        force = peak_force(d0, r0, d1, r1, lift, c, h, f0, f1)
+    if has_peak(d0, r0, d1, r1, n, c, h) == 1.0:
+        force = peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1)
         work[(at.PEAK + p) * W + i] = max(work[(at.PEAK + p) * W + i], force)
     if is_deepest(d0, r0, d1, r1) == 1.0:
         m0, m1 = h * r0, h * r1

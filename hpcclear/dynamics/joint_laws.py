@@ -1,0 +1,107 @@
+"""The laws of a scene's joints: their numbers in the kernel's parameters, and the energy that contacts store."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.laws import numbers
+from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
+from hpcclear.dynamics.views import Parameters
+from hpcclear.scene import Scene
+
+Get = Callable[[str], Array]
+
+HERTZ_RANGE = 0.25
+"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
+
+Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
+the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
+"""
+
+
+def joint_numbers(get: Get, key: str, materials: str) -> dict[str, Array]:
+    """Numbers of a joint's samples by the names of `declared.JOINT`, (m,), from the tables at these paths."""
+    clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+    h_bearing, h_journal = (
+        reduced_compliance(
+            get(f"{materials}.{part}.youngs_modulus"), get(f"{materials}.{part}.poisson_ratio")
+        )
+        for part in ("bearing", "journal")
+    )
+    return {
+        "stiffness": contact_stiffness(h_bearing, h_journal, bearing, clearance),
+        "compliance": h_bearing + h_journal,
+        "bearing_radius": bearing,
+        "journal_radius": bearing - clearance,
+        "clearance": clearance,
+    }
+
+
+def _given(get: Get, kind: str, table: Any) -> dict[str, Any]:
+    """A law's parameters of samples, (m,); lists as they are."""
+    values = {one.name: table.value(one.name) for one in table.declared.parameters}
+    return {
+        name: tuple(value) if isinstance(value, tuple) else get(f"effects.{kind}.{name}")
+        for name, value in values.items()
+    }
+
+
+def fill(scene: Scene, get: Get, key: str, materials: str, force: Array, p: Array) -> None:
+    """Fill one joint's block of parameters but for its film (a view, first column its first entry).
+
+    `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
+    """
+    joint = joint_numbers(get, key, materials)
+    p[:, at.CLEARANCE] = joint["clearance"]
+    p[:, at.BEARING_RADIUS] = joint["bearing_radius"]
+    p[:, at.JOURNAL_RADIUS] = joint["journal_radius"]
+    table: Any = scene.effects.contact
+    law = table.declared
+    given = {**joint, **_given(get, "contact", table)}
+    rows = numbers.rows_of(law, given, len(p))
+    p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
+    found = numbers.sample_numbers(law, given)
+    p[:, at.EXPONENT], p[:, at.DAMPING] = numbers.shape_near(law, force, found)
+    if law.deepest is None:
+        ratio = joint["journal_radius"] / joint["bearing_radius"]
+        p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
+    else:
+        p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
+    rubs = scene.effects.friction
+    if rubs.law == "none":
+        return
+    given = {**joint, **_given(get, "friction", rubs)}
+    rows = numbers.rows_of(rubs.declared, given, len(p))
+    p[:, at.FRICTION_NUMBERS : at.FRICTION_NUMBERS + rows.shape[1]] = rows
+    found = numbers.sample_numbers(rubs.declared, given)
+    ramp, slope = numbers.steepness_of(rubs.declared, found, len(p))
+    p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = ramp, slope
+
+
+def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
+    """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
+    law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
+    return found
+
+
+def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
+    """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
+    (t, places): under latched laws a penetration counts only while in contact."""
+    table = scene.effects.contact
+    if table is None or not len(places):
+        return np.zeros(len(gaps))
+    law: Any = table.declared
+    depth = np.maximum(gaps, 0.0)
+    on = active if law.latched else np.ones_like(depth)
+    each = on * numbers.stored(law, depth, _read(law, par, places))
+    total: Array = each.sum(axis=-1)
+    return total
+
+
+def _read(law: Any, par: Array, places: Any, one: int | None = None) -> dict[str, Array]:
+    rows = Parameters(par).contact_numbers[..., places, :]
+    return numbers.read_from(law, rows if one is None else rows[..., one, :])

@@ -1,0 +1,295 @@
+"""Checks of a law that nobody here wrote, before anything runs: what it asks for, its units, its numbers, its energy."""
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from hpcclear.dynamics.laws.declared import (
+    JOINT,
+    MOST_NUMBERS,
+    VARYING,
+    ContactLaw,
+    FrictionLaw,
+    Law,
+)
+from hpcclear.dynamics.laws.numbers import elastic_at, evaluate, sample_numbers, stored, with_words
+from hpcclear.dynamics.laws.translate import LawError
+
+TYPICAL = {
+    "stiffness": 9e8,
+    "compliance": 1.7e-9,
+    "bearing_radius": 0.02,
+    "journal_radius": 0.0197,
+    "clearance": 3e-4,
+}
+"""A joint of the paper's: what laws are tried on."""
+
+DEPTHS = np.logspace(-8, -4.5, 36)
+RATES = np.array([-10.0, -1.0, -0.1, -1e-3, 0.0, 1e-3, 0.1, 1.0, 10.0])
+IMPACT_SPEEDS = np.array([1e-3, 0.1, 1.0, 10.0])
+SPEEDS = np.concatenate([-np.logspace(2, -7, 40), [0.0], np.logspace(-7, 2, 40)])
+
+TOUCHING = 1e-6
+"""Force at no depth, as a part of that at the largest depth tried, up to which it counts as none."""
+
+SAME = 1e-4
+"""Relative, of slopes by differences."""
+
+
+def check_shape(law: Law) -> None:
+    """LawError unless the law's functions ask for what there is, are arithmetic, and fit their rows."""
+    from hpcclear.dynamics.laws.lanes import text_of
+
+    own = {one.name for one in law.parameters}
+    given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
+    for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
+        raise LawError(
+            f"has a parameter {name!r}, a name that the joint's numbers have", "Call it otherwise"
+        )
+    functions = {**law.functions(), **{f.__name__: f for f in law.afterwards()}}
+    for title, function in functions.items():
+        for name in law.arguments(function):
+            if name not in given:
+                raise LawError(
+                    f"{title} asks for {name!r}, which nobody gives",
+                    f"Declare it as a parameter, or in numbers; there are {', '.join(sorted(given))}",
+                )
+    if len(law.read) > MOST_NUMBERS:
+        raise LawError(
+            f"reads {len(law.read)} numbers, and there is room for {MOST_NUMBERS}",
+            "Work more of them out in once",
+        )
+    if isinstance(law, ContactLaw) and law.elastic is not None:
+        for name in {"rate", "impact_speed", "inverse_impact_speed"} & {
+            *law.arguments(law.elastic)
+        }:
+            raise LawError(f"elastic asks for {name!r}, and stored energy goes by the depth alone")
+    if isinstance(law, FrictionLaw) and law.bristled and law.largest is None:
+        raise LawError("has bristles and does not say how far they bend", "Declare largest, m")
+    text_of(law)
+
+
+# ---- units ----------------------------------------------------------------------------------------
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    from pint import UnitRegistry
+
+    return UnitRegistry()
+
+
+def _pure(x: Any) -> Any:
+    return x.to("").magnitude if hasattr(x, "magnitude") else x
+
+
+def _size_and_sign(x: Any, y: Any) -> Any:
+    sign = -1.0 if getattr(y, "magnitude", y) < 0 else 1.0
+    return abs(x) * sign
+
+
+def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda x: _registry().Quantity(float(function(_pure(x))), "")
+
+
+_WORDS = {
+    "sqrt": lambda x: x**0.5,
+    "fabs": abs,
+    "absolute": abs,
+    "copysign": _size_and_sign,
+    "pow": lambda x, y: x ** _pure(y),
+    "power": lambda x, y: x ** _pure(y),
+    "minimum": min,
+    "maximum": max,
+    **{name: _of_pure(getattr(np, name)) for name in ("exp", "log", "tanh", "arctan")},
+    "atan": _of_pure(np.arctan),
+}
+
+
+def check_units(law: Law, values: Mapping[str, Any]) -> None:
+    """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
+    import pint
+
+    made = _registry().Quantity
+    given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
+    given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
+    given["depth"] = made(1e-5, "m")
+    for one in law.parameters:
+        value = values[one.name]
+        try:
+            given[one.name] = (
+                tuple(made(v, one.unit) for v in value)
+                if isinstance(value, tuple)
+                else made(value, one.unit)
+            )
+        except (
+            pint.UndefinedUnitError,
+            pint.DefinitionSyntaxError,
+            ValueError,
+            AttributeError,
+            TypeError,
+        ) as error:
+            raise LawError(
+                f"the unit {one.unit!r} of {one.name} is not known ({error})", "Write, say, s/m"
+            ) from None
+
+    def run(title: str, function: Callable[..., Any], unit: str) -> Any:
+        try:
+            found = with_words(function, _WORDS, {})(
+                *(given[name] for name in law.arguments(function))
+            )
+            return _expected(found, title, unit)
+        except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
+            raise LawError(
+                f"{title} does not fit its units: {error}",
+                "Mend the formula, or the unit of a parameter",
+            ) from None
+
+    def _expected(found: Any, title: str, unit: str) -> Any:
+        if isinstance(found, Mapping):
+            missing = law.numbers.keys() ^ found.keys()
+            if missing:
+                raise LawError(
+                    f"once gives {', '.join(found)}, and numbers declares {', '.join(law.numbers) or 'none'}",
+                    "Declare each with its unit: numbers={...}",
+                )
+            return {
+                name: _expected(value, f"{title}: {name}", law.numbers[name])
+                for name, value in found.items()
+            }
+        if not hasattr(found, "magnitude"):
+            found = made(found, unit) if found == 0 else made(found, "")
+        return found.to(unit or "dimensionless")
+
+    if law.once is not None:
+        given |= run("once", law.once, "")
+    wanted = {"force": "N", "elastic": "N", "ratio": "", "deflection": "m/s"}
+    for title, function in law.functions().items():
+        run(title, function, wanted.get(title, ""))
+    if isinstance(law, ContactLaw) and law.energy is not None:
+        run("energy", law.energy, "J")
+
+
+# ---- numbers --------------------------------------------------------------------------------------
+def check_numbers(law: Law, values: Mapping[str, Any]) -> None:
+    """LawError unless the law is finite, of the right sign, and stores the energy it says, over depths, rates and speeds."""
+    given = sample_numbers(law, {**TYPICAL, **values})
+    for name in law.numbers:
+        if not np.isfinite(np.asarray(given[name], float)).all():
+            raise LawError(
+                f"{name}, worked out once, is not finite", "Mend once, or the parameters"
+            )
+    if isinstance(law, ContactLaw):
+        _check_contact(law, given)
+    else:
+        assert isinstance(law, FrictionLaw)
+        _check_friction(law, given)
+
+
+def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
+    depth, rate, impact = DEPTHS[:, None, None], RATES[None, :, None], IMPACT_SPEEDS[None, None]
+    varying = {
+        "depth": depth,
+        "rate": rate,
+        "impact_speed": impact,
+        "inverse_impact_speed": 1.0 / impact,
+    }
+    shape = (len(DEPTHS), len(RATES), len(IMPACT_SPEEDS))
+    force = np.broadcast_to(evaluate(law.force, {**given, **varying}), shape)
+
+    def where(bad: Any) -> str:
+        i, j, k = np.argwhere(np.broadcast_to(bad, shape))[0]
+        at_speed = f", impact speed {IMPACT_SPEEDS[k]:g} m/s" if law.latched else ""
+        return f"at depth {DEPTHS[i]:.3g} m, rate {RATES[j]:g} m/s{at_speed}"
+
+    bad = ~np.isfinite(force)
+    if bad.any():
+        raise LawError(
+            f"its force is not finite {where(bad)}", "Mend the formula, or the parameters"
+        )
+    pulls = (force < 0.0) & (rate >= 0.0)
+    if pulls.any():
+        raise LawError(
+            f"it pulls, F = {force[pulls][0]:.3g} N, {where(pulls)}",
+            "A contact that deepens only pushes",
+        )
+    at_rest = np.broadcast_to(
+        force[:, [list(RATES).index(0.0)]], (len(DEPTHS), 1, len(IMPACT_SPEEDS))
+    )
+    if np.ptp(at_rest, axis=2).max() > SAME * at_rest.max():
+        raise LawError(
+            "its force at rest goes by the impact speed, and stored energy by the depth alone",
+            "Let the impact speed scale the damping only",
+        )
+    elastic = np.broadcast_to(elastic_at(law, DEPTHS, given), DEPTHS.shape)
+    if not np.allclose(elastic, at_rest[:, 0, 0], rtol=SAME, atol=0.0):
+        raise LawError(
+            "elastic is not the force at a rate of 0", "Mend one of the two, or leave elastic out"
+        )
+    if not (elastic > 0.0).all() or not (np.diff(elastic) > 0.0).all():
+        raise LawError(
+            "its elastic part does not grow with the depth", "A stiffness has to be above 0"
+        )
+    nothing = {**given, **varying, "depth": 0.0 * depth[:1]}
+    touching = np.abs(np.broadcast_to(evaluate(law.force, nothing), (1, *shape[1:])))
+    if not law.latched and not touching.max() <= TOUCHING * elastic.max():
+        raise LawError(
+            f"its force is {touching.max():.3g} N where nothing touches (depth 0)",
+            "Let it vanish with the depth: multiply the damping by the elastic part",
+        )
+    step = 1e-4 * DEPTHS
+    slope = (stored(law, DEPTHS + step, given) - stored(law, DEPTHS - step, given)) / (2.0 * step)
+    off = ~np.isclose(slope, elastic, rtol=SAME, atol=1e-12 * elastic.max())
+    if off.any():
+        k = int(np.argmax(off))
+        raise LawError(
+            f"its energy does not match: at depth {DEPTHS[k]:.3g} m the energy's slope is {slope[k]:.6g} N "
+            f"and the force at rest {elastic[k]:.6g} N",
+            "Mend energy, or leave it out: it is then integrated",
+        )
+
+
+def _check_friction(law: FrictionLaw, given: Mapping[str, Any]) -> None:
+    varying = {
+        "speed": SPEEDS,
+        "force": np.ones_like(SPEEDS),
+        "deflection": 0.0 * SPEEDS,
+        "deflection_rate": 0.0 * SPEEDS,
+    }
+    ratio = np.broadcast_to(evaluate(law.ratio, {**given, **varying}), SPEEDS.shape)
+    bad = ~np.isfinite(ratio)
+    if bad.any():
+        raise LawError(
+            f"its ratio is not finite at {SPEEDS[bad][0]:.3g} m/s",
+            "Mend the formula, or the parameters",
+        )
+    drives = ratio * SPEEDS < -1e-12 * np.abs(ratio * SPEEDS).max()
+    if drives.any():
+        raise LawError(
+            f"it drives sliding on: ratio {ratio[drives][0]:.3g} at {SPEEDS[drives][0]:.3g} m/s",
+            "Give the ratio the sign of the sliding speed",
+        )
+    if law.deflection is not None:
+        rate = np.broadcast_to(evaluate(law.deflection, {**given, **varying}), SPEEDS.shape)
+        if not np.isfinite(rate).all():
+            raise LawError(
+                "its rate of deflection is not finite", "Mend the formula, or the parameters"
+            )
+
+
+@lru_cache(maxsize=256)
+def _checked(law: Law, values: tuple[tuple[str, Any], ...]) -> None:
+    check_shape(law)
+    check_units(law, dict(values))
+    check_numbers(law, dict(values))
+
+
+def check(law: Law, values: Mapping[str, Any]) -> None:
+    """All of them, once for each law and values of its parameters.
+
+    Raises
+    ------
+    LawError
+        The first that fails.
+    """
+    _checked(law, tuple(values.items()))

@@ -1,0 +1,200 @@
+"""What a law declares: its parameters, and plain functions of numbers.
+
+Each function names what it needs by its arguments, and gets it: first what varies (below), then numbers of its own that
+`once` works out for each sample, then the law's parameters, then the joint's numbers (`JOINT`). All in SI units. The functions
+are arithmetic, so that one and the same source is compiled into the lanes, runs on arrays, and is checked with units.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from inspect import signature
+from typing import Any
+
+Function = Callable[..., Any]
+
+JOINT = {
+    "stiffness": "N/m**1.5",
+    "compliance": "1/Pa",
+    "bearing_radius": "m",
+    "journal_radius": "m",
+    "clearance": "m",
+}
+"""A joint's numbers and their units: Hertz's stiffness, (1 - nu^2)/E of both surfaces together, radii, radial clearance."""
+
+VARYING = {
+    "contact": {
+        "depth": "m",
+        "rate": "m/s",
+        "impact_speed": "m/s",
+        "inverse_impact_speed": "s/m",
+    },
+    "friction": {"speed": "m/s", "force": "N", "deflection": "m", "deflection_rate": "m/s"},
+}
+"""What varies from instant to instant, by the kind of law, with units: penetration, its rate, the rate at the start of this
+contact (a law that asks for it is latched) and one over it; the sliding speed, the normal force, and the deflection of
+bristles with its rate."""
+
+MOST_NUMBERS = 8
+"""Numbers of a sample that the functions of a law may read in the lanes."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An entry of the law's table in the scene; a design variable by its path, unless it is a list."""
+
+    name: str
+    unit: str = ""
+    words: str = ""
+    default: Any = None
+    """None: has to be given."""
+    least: float | None = None
+    above: float | None = None
+    most: float | None = None
+    below: float | None = None
+    example: str = ""
+    """What to write where it is missing."""
+    called: str = ""
+    """In messages: "fixed damping factor"; its name, if empty."""
+    count: int = 1
+    """How many numbers: one, or a list of so many."""
+
+    @property
+    def title(self) -> str:
+        """As messages call it."""
+        return self.called or self.name
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """What laws of all kinds declare.
+
+    Raises
+    ------
+    TypeError
+        If a function asks for what nobody gives.
+    """
+
+    words: str
+    """One sentence: what it is."""
+    source: str = ""
+    """Where it was published, with DOI; "" for one's own."""
+    formula: str = ""
+    valid: str = ""
+    """The range it was made for, in words."""
+    parameters: tuple[Parameter, ...] = ()
+    once: Function | None = None
+    """From parameters and the joint's numbers to a mapping of further numbers, worked out once a sample."""
+    numbers: Mapping[str, str] = field(default_factory=dict)
+    """Names and units of what `once` gives."""
+    check: Function | None = None
+    """From the table's values to (reason, remedy, parameter) where they do not fit together, else None."""
+    simpler: Function | None = None
+    """From the table's values to pairs (words, table): laws that this one may be replaced by, with less effect or less cost."""
+    elsewhere: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """Parameters of other laws that a user might write here: reason and remedy."""
+    name: str = ""
+
+    kind = ""
+
+    def arguments(self, function: Function) -> tuple[str, ...]:
+        """Names of what a function asks for."""
+        return tuple(signature(function).parameters)
+
+    def functions(self) -> dict[str, Function]:
+        """Those that run in the lanes, by name."""
+        raise NotImplementedError
+
+    @property
+    def read(self) -> tuple[str, ...]:
+        """Numbers of a sample that they ask for, in the order of their rows."""
+        varying = VARYING[self.kind]
+        functions = [*self.functions().values(), *self.afterwards()]
+        asked = [name for one in functions for name in self.arguments(one)]
+        return tuple(dict.fromkeys(name for name in asked if name not in varying))
+
+    def afterwards(self) -> list[Function]:
+        """Functions that read the same numbers after a run."""
+        return []
+
+    def unit(self, name: str) -> str:
+        """Unit of what a function may ask for; raises KeyError."""
+        own = {one.name: one.unit for one in self.parameters}
+        return {**JOINT, **VARYING[self.kind], **own, **self.numbers}[name]
+
+    def parameter(self, name: str) -> Parameter | None:
+        """That of a name."""
+        return next((one for one in self.parameters if one.name == name), None)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLaw(Law):
+    """A normal force of a joint, of depth, its rate and perhaps the impact speed. It never pulls: what is negative is cut."""
+
+    force: Function = lambda depth: 0.0 * depth
+    """N."""
+    elastic: Function | None = None
+    """Its part that stores energy, N; by default the force at a rate of 0."""
+    energy: Function | None = None
+    """What that stores at a depth, J; by default integrated."""
+    swing: Function | None = None
+    """Stiffness dF/dd, N/m, where the elastic part is ``force`` (an argument of it); by default by differences."""
+    kink: Function | None = None
+    """A function that changes its sign where the cut begins; by default the force before the cut over its elastic part."""
+    exponent: Function | None = None
+    """Of the depth in the elastic part, near a depth; by default by differences."""
+    damping: Function | None = None
+    """Factor of the rate (latched: of the rate over the impact speed), s/m or 1; by default by differences."""
+    deepest: Function | None = None
+    """Depth beyond which a result is flagged, m; by default where theories of small contacts end (`parameters.HERTZ_RANGE`)."""
+    without_loss: str = ""
+    """Name of the law that is left without damping."""
+    lossless: Function | None = None
+    """Whether the table's values leave no damping."""
+
+    kind = "contact"
+
+    def functions(self) -> dict[str, Function]:
+        """Those that run in the lanes."""
+        found = {"force": self.force, "elastic": self.elastic, "kink": self.kink}
+        return {name: one for name, one in found.items() if one is not None}
+
+    def afterwards(self) -> list[Function]:
+        """The stored energy."""
+        return [] if self.energy is None else [self.energy]
+
+    @property
+    def latched(self) -> bool:
+        """Whether it asks for the impact speed."""
+        asked = {name for one in self.functions().values() for name in self.arguments(one)}
+        return bool(asked & {"impact_speed", "inverse_impact_speed"})
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionLaw(Law):
+    """Tangential over normal force of a joint, signed like the sliding speed; perhaps with bristles, which have a state."""
+
+    ratio: Function = lambda speed: 0.0 * speed
+    """Tangential over normal force."""
+    kinks: tuple[Function, ...] = ()
+    """Two functions, or none, that change their signs where the ratio has kinks, of order 1 between them."""
+    inverse_ramp: Function | None = None
+    """One over the sliding speed within which friction changes most, s/m, which steps resolve; by default by differences."""
+    steepness: Function | None = None
+    """Largest slope of the ratio, s/m; by default by differences."""
+    deflection: Function | None = None
+    """Rate of the bristles' deflection, m/s; a law that has it takes a coordinate for each joint with clearance."""
+    largest: Function | None = None
+    """Of a law with bristles: their largest deflection in steady sliding, m, what its tolerance goes by."""
+
+    kind = "friction"
+
+    def functions(self) -> dict[str, Function]:
+        """Those that run in the lanes."""
+        found = {"ratio": self.ratio, "deflection": self.deflection}
+        kinks = {f"kink_{k}": one for k, one in enumerate(self.kinks)}
+        return {name: one for name, one in found.items() if one is not None} | kinks
+
+    @property
+    def bristled(self) -> bool:
+        """Whether it has a state."""
+        return self.deflection is not None

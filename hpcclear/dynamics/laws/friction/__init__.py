@@ -1,0 +1,1 @@
+"""Friction in joints with clearance, one file a law."""

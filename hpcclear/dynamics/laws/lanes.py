@@ -1,0 +1,127 @@
+"""Laws in the lanes: the plain functions of a law as a text that motions have written out, vectorised like all that is here.
+
+A text holds the law's functions in words that vectorise (`hpcclear.base.bits`, `hpcclear.dynamics.physics.powers`), and for
+each one that reads the law's numbers from its joint's rows. It is named by its content.
+"""
+
+import hashlib
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+from hpcclear.base.one_text import module_of
+from hpcclear.dynamics.laws.declared import ContactLaw, Law
+from hpcclear.dynamics.laws.translate import written
+
+_HEAD = '''"""{title}, written by hpcclear.dynamics.laws.lanes."""
+
+import math
+
+from hpcclear.base.bits import no_less, no_more
+from hpcclear.base.jit import lane_function
+from hpcclear.dynamics.physics import powers
+'''
+
+_GIVEN = {
+    "contact": {
+        "depth": "depth",
+        "rate": "rate",
+        "impact_speed": "1.0 / (inverse + (1.0 - active))",  # in flight 1 m/s, of no consequence
+        "inverse_impact_speed": "inverse",
+    },
+    "friction": {
+        "speed": "speed",
+        "force": "force",
+        "deflection": "deflection",
+        "deflection_rate": "deflection_rate",
+    },
+}
+_SIGNATURES = {
+    "contact": "par, row, depth, rate, inverse, active, i, W",
+    "friction": "par, row, speed, force, deflection, deflection_rate, i, W",
+}
+
+
+class InLanes:
+    """A law as effects name it: its functions, each with the arguments of `_SIGNATURES`, and what steppers have to know of it.
+
+    contact: ``force`` (N, cut at 0), ``elastic`` (N), ``kink``; friction: ``ratio``, ``deflection`` (m/s), ``low``, ``high``.
+    """
+
+    def __init__(self, text: str, title: str, latched: bool, bristled: bool) -> None:
+        self._made_of = text, title, latched, bristled
+        self.title = title
+        self.name = f"law_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+        self.latched = 1 if latched else None
+        self.bristled = 1 if bristled else None
+        module: ModuleType = module_of(self.name, lambda: text)
+        for entry, function in vars(module).items():
+            if entry.startswith("joint_"):
+                setattr(self, entry.removeprefix("joint_"), function)
+
+    def __repr__(self) -> str:
+        return f"<{self.title} {self.name}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, InLanes) and self.name == other.name
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    def __reduce__(self) -> Any:
+        return InLanes, self._made_of
+
+
+@cache
+def in_lanes(law: Law) -> InLanes:
+    """A law ready to be written out.
+
+    Raises
+    ------
+    LawError
+        If a function has more in it than arithmetic.
+    """
+    bristled = bool(getattr(law, "bristled", False))
+    return InLanes(text_of(law), law.name, bool(getattr(law, "latched", False)), bristled)
+
+
+def text_of(law: Law) -> str:
+    """The text of a law; raises LawError as `in_lanes`."""
+    parts = [_HEAD.format(title=f"The {law.kind} law {law.name}")]
+    functions = law.functions()
+    for name, function in functions.items():
+        parts += written(function, f"own_{name}", f"{law.name}.{name}")
+    for name, formula in (_contact if isinstance(law, ContactLaw) else _friction)(law).items():
+        parts.append(
+            f"@lane_function\ndef joint_{name}({_SIGNATURES[law.kind]}):\n    return {formula}\n"
+        )
+    return "\n\n".join(parts)
+
+
+def _call(law: Law, name: str, **others: str) -> str:
+    """The call of one of its functions, in words of `_SIGNATURES`; `others`: what is given otherwise."""
+    rows = {number: f"par[(row + {k}) * W + i]" for k, number in enumerate(law.read)}
+    given = {**rows, **_GIVEN[law.kind], **others}
+    asked = law.arguments(law.functions()[name])
+    return f"own_{name}({', '.join(given[one] for one in asked)})"
+
+
+def _contact(law: Law) -> dict[str, str]:
+    functions = law.functions()
+    at_rest = _call(law, "force", rate="0.0")
+    elastic = _call(law, "elastic") if "elastic" in functions else at_rest
+    kink = f"{_call(law, 'force')} / ({elastic} + 1e-300)"
+    return {
+        "force": f"no_less({_call(law, 'force')}, 0.0)",
+        "elastic": elastic,
+        "kink": _call(law, "kink") if "kink" in functions else kink,
+    }
+
+
+def _friction(law: Law) -> dict[str, str]:
+    functions = law.functions()
+    sides = [_call(law, f"kink_{k}") if f"kink_{k}" in functions else "0.0" for k in (0, 1)]
+    found = {"ratio": _call(law, "ratio"), "low": sides[0], "high": sides[1]}
+    if "deflection" in functions:
+        found["deflection"] = _call(law, "deflection")
+    return found

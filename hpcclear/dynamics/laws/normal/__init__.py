@@ -1,0 +1,1 @@
+"""Normal contact forces, one file a law."""

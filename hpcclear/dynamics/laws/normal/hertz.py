@@ -1,0 +1,25 @@
+"""Hertz: elastic, without loss."""
+
+from hpcclear.dynamics.laws.declared import ContactLaw
+from hpcclear.dynamics.laws.hertz_contact import HERTZIAN, elastic
+
+
+def no_damping():
+    """None."""
+    return 0.0
+
+
+def no_kink():
+    """It is never cut."""
+    return 1.0
+
+
+LAW = ContactLaw(
+    words="Hertz's elastic contact, without loss",
+    source="Lankarani and Nikravesh 1990, doi:10.1115/1.2912617, for internal contact of spheres",
+    formula="K d^1.5",
+    valid="small contacts: up to 30 degrees to either side",
+    force=elastic,
+    kink=no_kink,
+    **{**HERTZIAN, "damping": no_damping, "without_loss": ""},
+)

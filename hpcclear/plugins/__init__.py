@@ -1,0 +1,32 @@
+"""The one place where laws, objectives, distributions, surrogates and searches are found by their names.
+
+A name in a scene file is one of ours (``"normal"``), that of an installed package's entry point, or ``"module:Name"``: `Name` of
+the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
+"""
+
+from hpcclear.plugins.registry import Registry
+from hpcclear.plugins.sources import run_source, trusting, using
+
+__all__ = [
+    "CONTACT_LAWS",
+    "DISTRIBUTIONS",
+    "FRICTION_LAWS",
+    "KINDS",
+    "OBJECTIVES",
+    "Registry",
+    "SEARCHES",
+    "SURROGATES",
+    "run_source",
+    "trusting",
+    "using",
+]
+
+CONTACT_LAWS = Registry("contact law", "hpcclear.contact_laws")
+FRICTION_LAWS = Registry("friction law", "hpcclear.friction_laws")
+OBJECTIVES = Registry("objective", "hpcclear.objectives")
+DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions")
+SURROGATES = Registry("surrogate", "hpcclear.surrogates")
+SEARCHES = Registry("search", "hpcclear.searches")
+
+KINDS = (CONTACT_LAWS, FRICTION_LAWS, OBJECTIVES, DISTRIBUTIONS, SURROGATES, SEARCHES)
+"""Every registry."""

@@ -1,0 +1,150 @@
+"""What a name in a scene stands for: one of ours, an installed package's, or one from a file beside the scene."""
+
+import importlib
+from collections.abc import Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, NamedTuple
+
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.plugins.sources import REFERENCE, digest, note_package, run_source, texts_in_use
+
+
+class _Offered(NamedTuple):
+    """What an installed package offers."""
+
+    value: Any
+    package: str
+    version: str
+
+
+class Registry:
+    """Plug-ins of one kind by their names.
+
+    Parameters
+    ----------
+    kind : str
+        In messages: "contact law".
+    group : str
+        Of the entry points of installed packages.
+    needs : sequence of str
+        Attributes that every plug-in of this kind has; what lacks one is refused.
+    """
+
+    def __init__(self, kind: str, group: str, needs: tuple[str, ...] = ()) -> None:
+        self.kind, self.group, self.needs = kind, group, needs
+        self._ours: dict[str, Any] = {}
+        self._offered: dict[str, _Offered] = {}
+
+    def add(self, name: str, target: Any) -> None:
+        """Offer one of ours: an object, or where to find it, "package.module:Name", which is imported at its first use."""
+        assert name not in self._ours, f"two {self.kind}s are called {name}"
+        self._ours[name] = target
+
+    def ours(self) -> tuple[str, ...]:
+        """Names that need nothing else to be installed."""
+        return tuple(self._ours)
+
+    def names(self) -> tuple[str, ...]:
+        """Our names, then those of installed packages."""
+        installed = {point.name for point in entry_points(group=self.group)}
+        return (*self._ours, *sorted(installed - self._ours.keys()))
+
+    def get(self, name: str, texts: Mapping[str, str] | None = None) -> Any:
+        """What a name stands for.
+
+        Parameters
+        ----------
+        name : str
+            One of `names`, or ``"module:Name"``.
+        texts : mapping, optional
+            Source texts by module, `Scene.plugin_texts`; while a scene is read, that scene's.
+
+        Raises
+        ------
+        InputError
+            There is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
+        """
+        if name in self._ours:
+            return self._of_ours(name)
+        found = REFERENCE.fullmatch(name)
+        if found is None:
+            value = self._installed(name)
+        else:
+            known = texts_in_use() if texts is None else texts
+            value = self._of_file(name, *found.groups(), known)
+        missing = [one for one in self.needs if not hasattr(value, one)]
+        if missing:
+            reason = f"has no {', no '.join(missing)}: a {self.kind} needs {', '.join(self.needs)}"
+            raise InputError(self.kind, name, reason, "Add what is missing")
+        return value
+
+    def origin(self, name: str, texts: Mapping[str, str] | None = None) -> str:
+        """Where a plug-in that was taken comes from, in words; "" for one of ours."""
+        if name in self._ours:
+            return ""
+        if name in self._offered:
+            return f"{self._offered[name].package} {self._offered[name].version}"
+        module = name.partition(":")[0]
+        text = (texts_in_use() if texts is None else texts)[module]
+        return f"{module}.py, SHA-256 {digest(text)[:12]}"
+
+    def _of_ours(self, name: str) -> Any:
+        target = self._ours[name]
+        if isinstance(target, str):
+            module, _, attribute = target.partition(":")
+            self._ours[name] = target = getattr(importlib.import_module(module), attribute)
+        return target
+
+    def _of_file(self, name: str, module: str, attribute: str, texts: Mapping[str, str]) -> Any:
+        if module not in texts:
+            remedy = f"Write {module}.py into the folder of the scene file. {self._known(name)}"
+            raise InputError(
+                self.kind, name, f"there is no {module}.py beside the scene file", remedy
+            )
+        made = run_source(module, texts[module])
+        if not hasattr(made, attribute):
+            public = tuple(one for one in vars(made) if not one.startswith("_"))
+            raise InputError(
+                self.kind, name, f"{module}.py has no {attribute}", nearest(attribute, public)
+            )
+        return getattr(made, attribute)
+
+    def _installed(self, name: str) -> Any:
+        if name not in self._offered:
+            points = list(entry_points(group=self.group, name=name))
+            if not points:
+                reason = f"is no {self.kind} that is known here"
+                raise InputError(self.kind, name, reason, self._known(name))
+            if len({point.value for point in points}) > 1:
+                packages = " and ".join(sorted(_package(point)[0] for point in points))
+                reason = f"is offered by {packages}"
+                raise InputError(self.kind, name, reason, "Uninstall all but one of them")
+            self._offered[name] = self._loaded(points[0])
+        found = self._offered[name]
+        note_package(found.package, found.version)
+        return found.value
+
+    def _loaded(self, point: EntryPoint) -> _Offered:
+        package, version = _package(point)
+        try:
+            return _Offered(point.load(), package, version)
+        except (Exception, SystemExit) as error:
+            raise InputError(
+                self.kind, point.name,
+                f"{package} {version} offers it, and importing it raised {type(error).__name__}: {error}",
+                "Mend or reinstall that package",
+            ) from error  # fmt: skip
+
+    def _known(self, name: str) -> str:
+        """The nearest name, and all."""
+        names = self.names()
+        close = nearest(name, names)
+        listed = ", ".join(names)
+        return close if not names or close.startswith("Use") else f"{close} Known: {listed}"
+
+
+def _package(point: EntryPoint) -> tuple[str, str]:
+    """Name and version of the package that an entry point belongs to."""
+    if point.dist is None:
+        return point.module, "of unknown version"
+    return point.dist.name, point.dist.version

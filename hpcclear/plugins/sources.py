@@ -1,0 +1,141 @@
+"""Python files beside a scene: their text is read once, at the root, and travels with the scene.
+
+A text is run in a module of its own, named by its hash; the file is not needed again, and `sys.path` has no part in it.
+"""
+
+import contextlib
+import hashlib
+import importlib.abc
+import importlib.util
+import re
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from types import CodeType, ModuleType
+from typing import NamedTuple
+
+from hpcclear.base.errors import InputError
+
+REFERENCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,39}):([A-Za-z_][A-Za-z0-9_]{0,79})")
+"""``"module:Name"``."""
+
+
+class _Reading(NamedTuple):
+    """What names of plug-ins stand for while a scene is read."""
+
+    texts: Mapping[str, str]
+    packages: dict[str, str]
+
+
+_reading: ContextVar[_Reading] = ContextVar("reading", default=_Reading({}, {}))
+_trusted: ContextVar[bool] = ContextVar("trusted", default=False)
+
+
+@contextlib.contextmanager
+def using(texts: Mapping[str, str]) -> Iterator[dict[str, str]]:
+    """In this block ``"module:Name"`` is found in these source texts, by module.
+
+    Yields
+    ------
+    dict
+        Versions of the packages whose plug-ins were taken meanwhile, by package.
+    """
+    packages: dict[str, str] = {}
+    token = _reading.set(_Reading(texts, packages))
+    try:
+        yield packages
+    finally:
+        _reading.reset(token)
+
+
+def texts_in_use() -> Mapping[str, str]:
+    """Source texts by module, as the innermost `using` has them."""
+    return _reading.get().texts
+
+
+def note_package(package: str, version: str) -> None:
+    """Note that a plug-in of this package was taken."""
+    _reading.get().packages[package] = version
+
+
+@contextlib.contextmanager
+def trusting(trust: bool = True) -> Iterator[None]:
+    """In this block source text that a result file carries may be run."""
+    token = _trusted.set(trust)
+    try:
+        yield
+    finally:
+        _trusted.reset(token)
+
+
+def is_trusting() -> bool:
+    """Whether a `trusting` block is open."""
+    return _trusted.get()
+
+
+def digest(text: str) -> str:
+    """SHA-256 of a source text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class _Loader(importlib.abc.InspectLoader):
+    """Runs a text; tracebacks, `inspect` and Numba find its lines here."""
+
+    def __init__(self, text: str, path: str) -> None:
+        self.text, self.path = text, path
+
+    def get_source(self, fullname: str) -> str:
+        return self.text
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.text, self.path)
+
+    def is_package(self, fullname: str) -> bool:
+        return False
+
+
+def run_source(module: str, text: str) -> ModuleType:
+    """The module of a source text, run at most once in a process.
+
+    Parameters
+    ----------
+    module : str
+        Its name in scenes: ``"mylaws"`` for mylaws.py.
+    text : str
+        Python.
+
+    Raises
+    ------
+    InputError
+        If it cannot be run: what it raised, and in which line.
+    """
+    name = f"hpcclear_plugin_{module}_{digest(text)[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    path = f"<{module}.py of the scene>"
+    spec = importlib.util.spec_from_loader(name, _Loader(text, path), origin=path)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[name] = made  # dataclasses look their module up while it is run
+    try:
+        spec.loader.exec_module(made)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise InputError(
+            f"{module}.py", _said(error, path), "this was raised while it was read",
+            "Mend it; a plug-in is one file, which may import installed packages",
+        ) from error  # fmt: skip
+    return made
+
+
+def _said(error: BaseException, path: str) -> str:
+    """What was raised, and the line of the text it came from."""
+    if isinstance(error, SyntaxError):
+        line = error.lineno if error.filename == path else None
+        words = error.msg
+    else:
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
+        line = lines[-1] if lines else None
+        words = str(error)
+    return f"{type(error).__name__}: {words}" + (f" (line {line})" if line else "")

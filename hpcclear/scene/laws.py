@@ -1,0 +1,202 @@
+"""Tables of the scene that name a law: what entries they have, the law says.
+
+Laws are found by name at the door of their plug-ins; no floor above is imported here.
+"""
+
+import importlib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, ClassVar
+
+from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema
+
+from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+
+_HOME = "hpcclear.dynamics.laws"
+
+PATTERN = r"^(expression|[A-Za-z_]\w*:[A-Za-z_]\w*)$"
+"""Laws that are not ours."""
+
+ENTRIES: dict[str, Quantity] = {}
+"""Quantities of entries of users' laws that have been read, by path."""
+
+
+@cache
+def our_laws(kind: str) -> Mapping[str, Any]:
+    """The laws of a kind, "contact" or "friction", that come with this package, by name."""
+    found: Mapping[str, Any] = importlib.import_module(_HOME).laws(kind)
+    return found
+
+
+def quantity_of(parameter: Any) -> Quantity:
+    """Of a law's parameter."""
+    p = parameter
+    return Quantity(p.unit, above=p.above, below=p.below, least=p.least, most=p.most)
+
+
+def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
+    """Paths and quantities of the numbers that laws of this package have."""
+    for law in our_laws(kind).values():
+        for parameter in law.parameters:
+            if parameter.count == 1:
+                yield f"effects.{kind}.{parameter.name}", quantity_of(parameter)
+
+
+class LawTable(Table):
+    """A table with a law and its parameters."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+
+    kind: ClassVar[str] = ""
+    law: str
+
+    @classmethod
+    def _own(cls) -> tuple[str, ...]:
+        return tuple(cls.model_fields)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        """The entries of the law, converted; overrides what a table without a law does."""
+        if isinstance(data, Table):
+            return data
+        if not isinstance(data, Mapping):
+            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+        for key in data:
+            if not isinstance(key, str):
+                raise invalid("keys are strings", "Write the key as text", key=repr(key))
+        default = cls.model_fields["law"].default
+        name = data.get("law", default if isinstance(default, str) else None)
+        if not isinstance(name, str):
+            cls._refuse_unknown(data, None)
+            return data
+        law = cls.find(name, data)
+        cls._refuse_unknown(data, law)
+        return {**{k: v for k, v in data.items() if k in cls._own()}, **cls._converted(data, law)}
+
+    @classmethod
+    def find(cls, name: str, data: Mapping[str, Any]) -> Any:
+        """The law of a name, with what the table says besides; an error for validators where there is none."""
+        known = our_laws(cls.kind)
+        if name not in known:
+            raise invalid("is not one of the known values", nearest(name, tuple(known)), "law")
+        return known[name]
+
+    @classmethod
+    def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
+        others = {p.name: p for one in our_laws(cls.kind).values() for p in one.parameters}
+        entries = () if law is None else tuple(p.name for p in law.parameters)
+        for key in data:
+            if key in cls._own() or key in entries or (law is None and key in others):
+                continue
+            if law is not None and law.name == "none" and key in others:
+                raise invalid(
+                    'the law "none" has no parameters, and a parameter says that friction is meant',
+                    f'Write {cls.kind} = "none" (--set effects.{cls.kind}=none) to switch it off, '
+                    'or set law = "coulomb"',
+                    key="law",
+                    value="none",
+                )
+            if law is not None and key in law.elsewhere:
+                raise invalid(*law.elsewhere[key], key)
+            if key in others:
+                whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
+                raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
+            raise invalid("is not a known key", nearest(key, (*cls._own(), *entries)), key)
+
+    @classmethod
+    def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
+        """Values of the law's parameters, defaults filled in."""
+        found = {}
+        for parameter in law.parameters:
+            value = data.get(parameter.name, parameter.default)
+            if value is None:
+                example = parameter.example or f"a number in {parameter.unit}"
+                raise invalid(
+                    f"the law {law.name!r} needs {_an(parameter)}",
+                    f"Add {parameter.name} = {example} or so", parameter.name, None,
+                )  # fmt: skip
+            found[parameter.name] = _value(parameter, value)
+            if law.name not in our_laws(cls.kind) and parameter.count == 1:
+                ENTRIES[f"effects.{cls.kind}.{parameter.name}"] = quantity_of(parameter)
+        wrong = None if law.check is None else law.check(found)
+        if wrong is not None:
+            raise invalid(*wrong)
+        return found
+
+    @property
+    def declared(self) -> Any:
+        """The law, as `hpcclear.dynamics.laws.declared` has it."""
+        return type(self).find(self.law, self.values() | self._given())
+
+    def _given(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in self._own()}
+
+    def values(self) -> dict[str, Any]:
+        """Values of the law's parameters by name, SI."""
+        return dict(self.__pydantic_extra__ or {})
+
+    def value(self, name: str) -> Any:
+        """That of one parameter; None of one that the law has not."""
+        return self.values().get(name)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """With the entries of all laws of this package."""
+        made = handler.resolve_ref_schema(handler(schema))
+        laws = our_laws(cls.kind)
+        for law in laws.values():
+            for p in law.parameters:
+                made["properties"].setdefault(p.name, _schema(p, law, laws))
+        words = made["properties"]["law"].get("description")
+        made["properties"]["law"] = {
+            "anyOf": [{"enum": [*laws]}, {"type": "string", "pattern": PATTERN}],
+            **({} if words is None else {"description": words}),
+        }
+        made["additionalProperties"] = True  # of users' laws
+        return made
+
+
+def _schema(parameter: Any, law: Any, laws: Mapping[str, Any]) -> dict[str, Any]:
+    entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
+    whose = [name for name, one in laws.items() if one.parameter(parameter.name) is not None]
+    if parameter.count > 1:
+        many = parameter.count
+        entry = {"type": "array", "items": entry, "minItems": many, "maxItems": many}
+    words = f"{parameter.words}, {parameter.unit or 'a number'} ({', '.join(whose)}"
+    return {
+        **entry,
+        "description": words + f"; default {parameter.default})"
+        if parameter.default is not None
+        else words + ")",
+    }
+
+
+def _an(parameter: Any) -> str:
+    return f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"
+
+
+def _value(parameter: Any, value: Any) -> Any:
+    """A parameter's value in SI; an error for validators names its entry."""
+    quantity = quantity_of(parameter)
+    if parameter.count > 1:
+        if not isinstance(value, list | tuple) or len(value) != parameter.count:
+            raise invalid(
+                "a list of the right length is expected here", "Write it as [first, second]",
+                parameter.name, value,
+            )  # fmt: skip
+        return tuple(_converted(quantity, one, parameter.name, value) for one in value)
+    return _converted(quantity, value, parameter.name, value)
+
+
+def _converted(quantity: Quantity, value: Any, key: str, shown: Any) -> float:
+    from pydantic_core import PydanticCustomError
+
+    try:
+        return quantity.convert(value)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise invalid(context["reason"], context["remedy"], key, shown) from None

@@ -1,0 +1,120 @@
+"""What a scene takes from elsewhere than this program: Python files beside it, packages that offer plug-ins."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from hpcclear.base.errors import InputError
+from hpcclear.plugins.registry import Registry
+from hpcclear.plugins.sources import REFERENCE, digest, is_trusting
+from hpcclear.scene.fields import Converted, NamedRows, Table, invalid
+
+
+class UntrustedSource(InputError):
+    """Python source would be run that nobody has allowed."""
+
+
+class PluginFile(Table):
+    """A Python file beside the scene file, whose text goes wherever the scene goes."""
+
+    name: str
+    source: str
+    """The whole text of the file."""
+
+
+class PluginPackage(Table):
+    """An installed package that offers a plug-in of this scene."""
+
+    name: str
+    version: str
+    """The one that was installed."""
+
+
+class Plugins(Table):
+    """Where plug-ins of this scene come from. The program fills it: results carry it, a scene file need not have it."""
+
+    files: Annotated[tuple[PluginFile, ...], NamedRows()] = ()
+    """Python files beside the scene file that it names, as "module:Name"."""
+    packages: Annotated[tuple[PluginPackage, ...], NamedRows()] = ()
+    """Packages whose plug-ins it names."""
+
+
+@dataclass(frozen=True)
+class PluginName(Converted):
+    """An entry that names a plug-in of some kind."""
+
+    registry: Registry
+
+    def convert(self, value: Any) -> str:
+        """The name, known to be there; raises PydanticCustomError."""
+        if not isinstance(value, str):
+            raise invalid("a name is expected here", "Write it in quotes")
+        with as_invalid():
+            self.registry.get(value)
+        return value
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        other = {"type": "string", "description": 'of a package, or "module:Name" of a file'}
+        return {"anyOf": [{"enum": list(self.registry.ours())}, other]}
+
+
+@contextlib.contextmanager
+def as_invalid(key: str = "") -> Iterator[None]:
+    """Where a validator asks for a plug-in: what is wrong with that as an error of the entry."""
+    try:
+        yield
+    except InputError as error:
+        of_file = error.key.endswith(".py")
+        reason = f"{error.key}: {error.value}: {error.reason}" if of_file else error.reason
+        raise invalid(reason, error.remedy, key) from error
+
+
+def texts_of(content: Mapping[str, Any]) -> dict[str, str]:
+    """Source texts that the content of a scene carries, by module; whatever else stands there."""
+    table: Any = content.get("plugins")
+    rows = table.get("files") if isinstance(table, Mapping) else None
+    if not isinstance(rows, Mapping):
+        return {}
+    texts = {name: row.get("source") for name, row in rows.items() if isinstance(row, Mapping)}
+    return {str(name): text for name, text in texts.items() if isinstance(text, str)}
+
+
+def modules_named(content: Any) -> set[str]:
+    """Modules of all texts in the content of a scene that read ``"module:Name"``."""
+    if isinstance(content, str):
+        found = REFERENCE.fullmatch(content)
+        return {found.group(1)} if found else set()
+    if isinstance(content, Mapping):
+        content = list(content.values())
+    inner = content if isinstance(content, (list, tuple)) else ()
+    return {module for one in inner for module in modules_named(one)}
+
+
+def with_texts(content: Mapping[str, Any], read: Callable[[str], str | None]) -> dict[str, Any]:
+    """The content with the texts of the modules that it names.
+
+    `read` gives a module's text, None where there is no such file: whatever wants it says so.
+    """
+    texts = {module: read(module) for module in sorted(modules_named(content))}
+    rows = {module: {"source": text} for module, text in texts.items() if text is not None}
+    return {**content, **({"plugins": {"files": rows}} if rows else {})}
+
+
+def check_trust(content: Mapping[str, Any], name: str) -> None:
+    """InputError if the content carries Python text and nobody has said that it may be run; `name`: where it stands."""
+    texts = texts_of(content)
+    if not texts or is_trusting():
+        return
+    listed = ", ".join(f"{one}.py (SHA-256 {digest(text)[:12]})" for one, text in texts.items())
+    raise UntrustedSource(
+        "plugins.files", name,
+        f"its scene carries Python source, which is run only where --trust allows it: {listed}",
+        "Read it first; in Python use `with hpcclear.plugins.trusting()`. In a scene file of your own leave the table out: "
+        "files are read beside it",
+    )  # fmt: skip

@@ -1,0 +1,175 @@
+"""Plug-ins by name: from files beside a scene and from installed packages; whose source is run, and when."""
+
+import inspect
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hpcclear.base.errors import InputError
+from hpcclear.ensemble.identity import run_key
+from hpcclear.plugins import KINDS, Registry, run_source, trusting, using
+from hpcclear.scene import load_scene
+from hpcclear.scene.loading import scene_of_text
+from hpcclear.scene.plugged import UntrustedSource, modules_named
+
+QUICKSTART = Path("jobs/quickstart.toml")
+SOURCE = """
+from dataclasses import dataclass
+
+@dataclass
+class Mine:
+    size: float = 1.0
+
+    def area(self):
+        return self.size**2
+"""
+PACKAGE = "from pathlib import Path\nclass Theirs:\n    area = 2.0\n"
+
+
+@pytest.fixture
+def shapes() -> Registry:
+    """A registry of a kind that no scene has."""
+    registry = Registry("shape", "hpcclear.shapes", needs=("area",))
+    registry.add("round", run_source("ours", "class Round:\n    area = 3.14\n").Round)
+    registry.add("lazy", "fractions:Fraction")
+    return registry
+
+
+def install(folder: Path, group: str, name: str, value: str, version: str = "1.2") -> None:
+    """A package with an entry point, as pip leaves it in a folder of packages."""
+    info = folder / f"their_shapes-{version}.dist-info"
+    info.mkdir(parents=True)
+    info.joinpath("METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: their-shapes\nVersion: {version}\n"
+    )
+    info.joinpath("entry_points.txt").write_text(f"[{group}]\n{name} = {value}\n")
+    folder.joinpath("their_shapes.py").write_text(PACKAGE)
+
+
+def carrying(source: str = SOURCE) -> dict:
+    """The content of a scene that carries Python source."""
+    content = load_scene(QUICKSTART).resolved()
+    return {**content, "plugins": {"files": {"shapes": {"source": source}}}}
+
+
+def test_every_kind_has_a_group_of_its_own():
+    assert len({one.group for one in KINDS}) == len(KINDS) == 6
+
+
+def test_a_name_is_one_of_ours_a_package_s_or_a_file_s(shapes, tmp_path, monkeypatch):
+    install(tmp_path, "hpcclear.shapes", "square", "their_shapes:Theirs")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert shapes.get("round").area == 3.14
+    assert shapes.names() == ("round", "lazy", "square")
+    with using({"shapes": SOURCE}) as packages:
+        assert shapes.get("shapes:Mine")(3.0).area() == 9.0
+        assert packages == {}
+        assert shapes.get("square").area == 2.0
+    assert packages == {"their-shapes": "1.2"}
+    assert shapes.origin("square") == "their-shapes 1.2"
+    assert shapes.origin("round") == ""
+    assert shapes.origin("shapes:Mine", {"shapes": SOURCE}).startswith("shapes.py, SHA-256 ")
+
+
+def test_an_unknown_name_gets_the_nearest_and_all(shapes):
+    with pytest.raises(InputError, match=r"Did you mean 'round'\? Known: round, lazy"):
+        shapes.get("rond")
+
+
+def test_what_a_kind_needs_is_looked_for(shapes):
+    with pytest.raises(InputError, match="has no area: a shape needs area"):
+        shapes.get("shapes:dataclass", {"shapes": SOURCE})
+
+
+def test_two_packages_that_offer_one_name_are_named(shapes, tmp_path, monkeypatch):
+    for number, value in enumerate(("their_shapes:Theirs", "their_shapes:Path")):
+        install(tmp_path / str(number), "hpcclear.shapes", "square", value)
+        monkeypatch.syspath_prepend(tmp_path / str(number))
+    with pytest.raises(InputError, match="is offered by their-shapes and their-shapes"):
+        shapes.get("square")
+
+
+def test_a_package_that_cannot_be_imported_is_named(shapes, tmp_path, monkeypatch):
+    install(tmp_path, "hpcclear.shapes", "cube", "their_cubes:Cube")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(
+        InputError, match=r"their-shapes 1\.2 offers it.*No module named 'their_cubes'"
+    ):
+        shapes.get("cube")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = 1\nb = a / 0\n", r"ZeroDivisionError: division by zero \(line 2\)"),
+        ("def f(:\n", r"SyntaxError: .*\(line 1\)"),
+        ("import neighbour_of_mine\n", r"No module named 'neighbour_of_mine' \(line 1\)"),
+        ("raise SystemExit(3)\n", r"SystemExit: 3 \(line 1\)"),
+    ],
+)
+def test_a_file_that_cannot_be_run_is_named_with_the_line(shapes, text, said):
+    for _ in range(2):  # a module that failed is not kept
+        with pytest.raises(InputError, match=said) as error:
+            shapes.get("wrong:Mine", {"wrong": text})
+        assert error.value.key == "wrong.py"
+
+
+def test_files_are_not_looked_for_where_python_looks(shapes, tmp_path, monkeypatch):
+    (tmp_path / "elsewhere.py").write_text(SOURCE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match=r"there is no elsewhere\.py beside the scene file"):
+        shapes.get("elsewhere:Mine")
+
+
+def test_two_texts_of_one_name_are_two_modules_whose_lines_can_be_read():
+    first = run_source("shapes", SOURCE)
+    second = run_source("shapes", SOURCE.replace("**2", "**3"))
+    assert run_source("shapes", SOURCE) is first
+    assert (first.Mine(2.0).area(), second.Mine(2.0).area()) == (4.0, 8.0)
+    assert "self.size**2" in inspect.getsource(first.Mine.area)
+    assert "self.size**3" in inspect.getsource(second.Mine.area)
+
+
+def test_references_are_found_wherever_they_stand():
+    content = {"a": [{"b": "mylaws:Mine"}, "12:30"], "c": "no reference: here", "d": ("x:Y",)}
+    assert modules_named(content) == {"mylaws", "x"}
+
+
+def test_source_that_a_scene_carries_counts_and_is_not_run_unasked():
+    content = carrying()
+    with pytest.raises(UntrustedSource, match=r"shapes\.py \(SHA-256 [0-9a-f]{12}\)"):
+        load_scene(content)
+    scene = load_scene(content, trust=True)
+    assert scene.plugin_texts == {"shapes": SOURCE}
+    assert load_scene(scene.resolved(), trust=True) == scene
+    other = load_scene(carrying(SOURCE + "# more\n"), trust=True)
+    ours, theirs = run_key(scene, "sample"), run_key(other, "sample")
+    assert {key for key in ours if ours[key] != theirs[key]} == {"plugins.files.shapes.source"}
+    assert len(ours["plugins.files.shapes.source"]) < 100
+    assert scene.hash != other.hash
+    assert scene.with_({"study.seed": 5}).plugin_texts == scene.plugin_texts
+
+
+def test_a_text_of_a_result_file_is_run_only_when_trusted():
+    scene = load_scene(carrying(), trust=True).with_({"study.seed": 5})
+    with pytest.raises(UntrustedSource):
+        scene_of_text(scene.text, "samples.nc")
+    with trusting():
+        assert scene_of_text(scene.text, "samples.nc") == scene
+
+
+def test_a_note_of_a_change_smuggles_no_source_in():
+    text = load_scene(QUICKSTART).text
+    change = f"# changed: plugins.files = {json.dumps({'shapes': {'source': SOURCE}})}\n"
+    with pytest.raises(UntrustedSource):
+        scene_of_text(change + text, "samples.nc")
+
+
+def test_the_registries_load_neither_numba_nor_scipy():
+    code = "import sys, hpcclear.plugins; print({'numba', 'scipy', 'pydantic'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
