@@ -32,7 +32,7 @@ from hpcclear.results.dataset import provenance
 
 MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"
-OWN_SINGLE = "hpcclear lobatto"  # numerics.method for one response
+OWN_SINGLE = "hpcclear prince-dormand"  # numerics.method for one response
 DECADES = 10.0 ** -np.arange(5.0, 13.0)
 ENSEMBLES = {"lankarani-nikravesh": 1e-5, "frictionless": 1e-7}  # m, median error asked for
 TOLERANCES = 10.0 ** -np.arange(

@@ -105,9 +105,9 @@ def chunks(lanes: Lanes) -> Iterator[np.ndarray]:
         yield lanes.take_record()
 
 
-def recorded(scene: Scene, single: bool) -> tuple[Lanes, np.ndarray, np.ndarray]:
+def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
-    problem = problem_of(scene, ledger=True, series=True, single=single)
+    problem = problem_of(scene, ledger=True, series=True)
     n, par = problem.coordinates, parameters(scene)
     start = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))
@@ -118,14 +118,11 @@ def recorded(scene: Scene, single: bool) -> tuple[Lanes, np.ndarray, np.ndarray]
     return lanes, par, row
 
 
-def run(scene: Scene, *, single: bool = False) -> Run:
-    """Simulate one scene with its energy balance; every accepted step counts, none is kept.
-
-    `single`: as a single response is, not as the sample of an ensemble, whose implicit steps go abreast with others.
-    """
+def run(scene: Scene) -> Run:
+    """Simulate one scene with its energy balance; every accepted step counts, none is kept."""
     if not scene.clearance_joints() and scene.drive.kind == "constant-speed":
         return closed_form(scene)
-    lanes, par, start = recorded(scene, single)
+    lanes, par, start = recorded(scene)
     n = lanes.problem.coordinates
     first, largest = balance(scene, par[0], start, n)
     off, size = 0.0, largest[0]

@@ -72,9 +72,8 @@ def setup(chosen: Scene, par: Array) -> Setup:
 
 
 def single(chosen: Scene) -> Setup:
-    """One sample: the scene itself, its implicit steps with the stages side by side."""
-    one = setup(chosen, parameters(chosen))
-    return one._replace(problem=problem_of(chosen, single=True))
+    """One sample: the scene itself."""
+    return setup(chosen, parameters(chosen))
 
 
 def ensemble(chosen: Scene, samples: int) -> Setup:

@@ -38,13 +38,10 @@ def works() -> dict[str, Callable[[], object]]:
     many = scene.with_({"study.samples": 512})
     points = latin_hypercube(many)
     one = load_scene(JOBS / "slider_crank.toml")
-    smooth = one.with_(
-        {"effects.friction": None, "numerics.method": "lobatto", "numerics.rtol": 1e-10}
-    )
     few = latin_hypercube(stiff := many.with_({**STIFF, "study.samples": 8}))
     return {
         "ensemble of 512": lambda: sample_points(many, points, ranks),
-        "single response, collocation at 1e-10": lambda: simulate(smooth),
+        "single response": lambda: simulate(one),
         "8 stiff samples": lambda: sample_points(stiff, few, ranks),
     }
 

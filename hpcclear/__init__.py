@@ -7,12 +7,14 @@ Public names are loaded when they are first used, so that importing the package 
 - `evaluate`: many designs as an xarray Dataset, in this process
 - `grid`: a map, its entries as coordinates
 - `run_study`: the whole study
+- `ContactLaw`, `FrictionLaw`, `Parameter`: what a law of one's own declares
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
     from hpcclear.ensemble.maps import grid
@@ -21,9 +23,22 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = ["Scene", "evaluate", "grid", "load_scene", "run_study", "simulate"]
+__all__ = [
+    "ContactLaw",
+    "FrictionLaw",
+    "Parameter",
+    "Scene",
+    "evaluate",
+    "grid",
+    "load_scene",
+    "run_study",
+    "simulate",
+]
 
 _HOME = {
+    "ContactLaw": "dynamics.laws.declared",
+    "FrictionLaw": "dynamics.laws.declared",
+    "Parameter": "dynamics.laws.declared",
     "Scene": "scene",
     "load_scene": "scene",
     "simulate": "dynamics.response",

@@ -48,7 +48,7 @@ def pytest_generate_tests(metafunc):
 
 
 LONGEST = (
-    "survival", "docs", "accuracy", "release", "limits", "stiff", "collocation", "linkage_scenes", "further_responses",
+    "survival", "docs", "accuracy", "release", "limits", "stiff", "tight", "linkage_scenes", "further_responses",
     "effects", "certificate", "cli", "reference", "jacobian", "llvm", "fuzz", "hard_cases", "ideal", "motion", "run",
     "baumgarte", "comm", "study",
 )  # fmt: skip

@@ -85,6 +85,8 @@ class Reader:
         """Run or load one block; AssertionError or the block's own error when that fails."""
         if block.language == "bash":
             self._shell(block)
+        elif block.language == "python" and block.title is not None:
+            (self.place / block.title).write_text(block.text, encoding="utf-8")
         elif block.language == "python":
             exec(compile(block.text, str(block), "exec"), self.names)
         elif block.language == "toml":

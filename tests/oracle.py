@@ -31,6 +31,10 @@ class Joint:
     floor: float
     touching: bool = False
     impact_speed: float = math.inf
+    law: Callable[[float, float, float], float] | None = None
+    """Normal force of depth, rate and impact speed, in place of the one of `stiffness` and `damping`."""
+    rubs: Callable[[float], float] | None = None
+    """Friction over normal force of the sliding speed, in place of Coulomb's."""
 
     def forces(
         self,
@@ -55,9 +59,13 @@ class Joint:
         )
         rate = ((speeds[0] - speeds[1]) * n.conjugate()).real
         relative = rate / self.impact_speed if self.latched else rate
-        normal = max(self.stiffness * depth**1.5 * (1.0 + self.damping * relative), 0.0)
+        normal = self.stiffness * depth**1.5 * (1.0 + self.damping * relative)
+        if self.law is not None:
+            normal = self.law(depth, rate, self.impact_speed)
+        normal = max(normal, 0.0)
         sliding = (slip * (1j * n).conjugate()).real
-        tangential = self.friction * normal * max(-1.0, min(1.0, sliding / self.ramp))
+        ratio = self.friction * max(-1.0, min(1.0, sliding / self.ramp))
+        tangential = normal * (ratio if self.rubs is None else self.rubs(sliding))
         return -n * (normal + 1j * tangential), point
 
 

@@ -72,9 +72,29 @@ def summed(content: xr.Dataset) -> Iterator[float]:
         if "samples" in content:
             simulated = content["samples"] > 0
             yield float(content["samples"].sum() / content["busy"].where(simulated).sum())
+    if kind == "response":
+        yield from _loads(content)
     if kind == "accuracy":
         yield from np.ravel(content["averaged"] * content["turn_seconds"])
         yield from np.ravel(content["training"] * content["sample_seconds"])
+
+
+def _loads(content: xr.Dataset) -> Iterator[float]:
+    """Forces, contact and torque over the averaged revolutions, by the trapezoidal rule, and the recorded peaks and gaps."""
+    first = int(content.attrs.get("transient_turns", 0))
+    angle = content["crank_angle"].to_numpy()
+    inside = np.abs(angle - angle[0]) / (2.0 * np.pi) > first - 1e-6
+    time = content["time"].to_numpy()[inside]
+    for name in ("contact_force", "crank_moment"):
+        values = content[name].to_numpy()[inside]
+        yield from np.ravel(np.trapezoid(values, time, axis=0) / (time[-1] - time[0]))
+        yield from np.ravel(np.abs(values).max(axis=0))
+    touching = (content["penetration"].to_numpy()[inside] > 0.0).astype(float)
+    yield from np.ravel(np.trapezoid(touching, time, axis=0) / (time[-1] - time[0]))
+    for name in ("peak_contact_force", "mean_gap", "objective", "objective_uncertainty"):
+        yield from np.ravel(content[name].to_numpy()).astype(float)
+    at = content["contact_force"].to_numpy()[inside].argmax(axis=0)
+    yield from np.degrees(content["crank_angle"].to_numpy()[inside][at] % (2.0 * np.pi))
 
 
 def contents(place: Path) -> list[xr.Dataset]:

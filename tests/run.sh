@@ -25,8 +25,8 @@ done
 # Left out of --quick: they start mpiexec, other programs or a browser by the dozen, compile kernels of their own, or
 # simulate for long. A file that is new is in.
 long=(
-    api checkpoint cli cluster collocation comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes llvm motion notebook
-    oracle plan progress random_scenes release report robust sensitivity statistics stiff study survival target trust
+    api checkpoint cli cluster comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes llvm motion notebook
+    oracle plan progress random_scenes release report robust sensitivity statistics stiff study survival target tight trust
     vectorised
 )
 

@@ -59,36 +59,36 @@ def test_the_design_to_take_is_the_one_that_nearly_all_machines_stay_lowest_with
     """Of the case in which most is random: least mean + 2 deviations, 280 um against 340, 283.5 and 520."""
     lines = told(verified(MEAN, DEVIATION))
     assert len(lines) == 10
-    assert lines["take"] == "robust alpha"
-    assert "4 designs" in lines["why"]
-    assert "m2 = 0.2 kg" in lines["its values"]
-    expected = "0.2 mm (0.199 mm to 0.201 mm): 50% less than the original's 0.4 mm"
-    assert lines["true mean"] == expected
-    assert "33% less" in lines["true deviation"]
-    assert lines["on a bound"] == "m2 lower"
-    assert "30% of the simulations" in lines["theory"]
-    assert "100 direct simulations" in lines["how sure"]
-    assert "hpcclear report out" in lines["next"]
-    assert "widen the ranges" in lines["next"]
-    assert "stiffer bearings" in lines["next"]
+    assert lines["recommended"] == "robust alpha"
+    assert "4 simulated designs" in lines["criterion"]
+    assert "m2 = 0.2 kg" in lines["values"]
+    expected = "0.2 mm (95 % CI 0.199 mm to 0.201 mm), 50% below the baseline (0.4 mm)"
+    assert lines["mean"] == expected
+    assert "33% below" in lines["std. deviation"]
+    assert lines["active bounds"] == "m2 lower"
+    assert "30% of the simulations" in lines["contact model"]
+    assert "100 simulations" in lines["confidence"]
+    assert "hpcclear report out" in lines["next steps"]
+    assert "wider ranges" in lines["next steps"]
+    assert "stiffer bearings" in lines["next steps"]
 
 
 def test_designs_within_each_others_limits_are_named_and_others_are_not():
-    assert told(verified(MEAN, DEVIATION))["as good as it"].startswith("robust front 1:")
-    assert told(verified(MEAN, DEVIATION, 1e-8))["as good as it"].startswith("none")
-    assert "study.verification.samples" not in told(verified(MEAN, DEVIATION, 1e-8))["next"]
+    assert told(verified(MEAN, DEVIATION))["equivalent"].startswith("robust front 1:")
+    assert told(verified(MEAN, DEVIATION, 1e-8))["equivalent"].startswith("none")
+    assert "study.verification.samples" not in told(verified(MEAN, DEVIATION, 1e-8))["next steps"]
 
 
 def test_the_same_design_under_other_names_is_no_choice():
     """Beta's variables are alpha's: no cost can decide between them."""
     twice = {"m2": np.array([0.1, 0.2, 0.2, 0.3, 0.4])}
     own = told(verified([4e-4, 2e-4, 2e-4, 3e-4, 1e-4], [6e-5, 4e-5, 4e-5, 5e-5, 1e-5], **twice))
-    assert own["as good as it"].startswith("robust beta: the same design; else none")
-    assert "narrower" not in own["next"]
+    assert own["equivalent"].startswith("none")
+    assert "as wide" not in own["next steps"]
     near = told(
         verified([4e-4, 2e-4, 2e-4, 2.001e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4e-5, 1e-5], **twice)
     )
-    assert near["as good as it"].startswith("robust beta: the same design; robust front 1: within")
+    assert near["equivalent"].startswith("robust front 1: statistically")
 
 
 @pytest.mark.parametrize(
@@ -117,38 +117,42 @@ def test_total_indices_are_printed_and_what_is_negligible(total, error, words, n
 
 def test_of_designs_whose_variables_are_not_known_none_is_called_the_same():
     lines = told(verified(MEAN, DEVIATION).drop_vars("m2"))
-    assert lines["as good as it"].startswith("robust front 1: within")
+    assert lines["equivalent"].startswith("robust front 1: statistically")
 
 
 def test_what_is_as_good_says_from_where_to_where():
-    assert told(verified(MEAN, DEVIATION))["as good as it"].endswith(
-        "(m2 from 0.2 kg to 0.4 kg among them)"
-    )
+    assert told(verified(MEAN, DEVIATION))["equivalent"].endswith("(m2 from 0.2 kg to 0.4 kg)")
     content = verified(MEAN, DEVIATION)
     content["m2"][3] = content["m2"][1] * 1.001
-    assert told(content)["as good as it"].endswith("choose by cost")
+    assert told(content)["equivalent"].endswith("choose by cost")
 
 
 def test_the_ends_of_a_front_stand_beside_the_original():
     content = verified(MEAN, DEVIATION, percentile=2.0 * np.array(MEAN))
     ((case, designs, rows),) = beside_original(content)  # "calm" has no original
     assert case == "robust"
-    assert designs == ("original", "alpha (to take)", "beta")
+    assert designs == (
+        "baseline",
+        "lowest mean (alpha), recommended",
+        "lowest std. dev. (beta)",
+    )
     assert rows[0] == ("mean", "0.4 mm ±0.25%", "0.2 mm ±0.50% -50%", "0.3 mm ±0.33% -25%")
     assert rows[1][2] == "40 µm ±2.50% -33%"
-    assert rows[2] == ("95 % below", "0.8 mm", "0.4 mm -50%", "0.6 mm -25%")
-    assert rows[3] == ("held at", "", "m2 lower", "none of its variables")
+    assert rows[2] == ("95th percentile", "0.8 mm", "0.4 mm -50%", "0.6 mm -25%")
+    assert rows[3] == ("active bounds", "", "m2 lower", "none")
 
 
 def test_the_design_to_take_stands_in_its_table_whichever_it_is():
     mean = [4e-4, 2e-4, 3e-4, 1.9e-4, 1e-4]
     ((_, designs, rows),) = beside_original(verified(mean, DEVIATION))
-    assert designs == ("original", "alpha", "beta", "front 1 (to take)")
+    assert designs[0] == "baseline"
+    assert designs[3] == "front 1, recommended"
     assert rows[0][4] == "0.19 mm ±0.53% -52%"
     assert {len(row) for row in rows} == {5}
     nothing = verified(np.full(5, np.nan), np.full(5, np.nan))
     ((_, designs, rows),) = beside_original(nothing)
-    assert designs == ("original", "alpha", "beta")
+    assert not any("recommended" in name for name in designs)
+    assert len(designs) == 3
     assert rows[0][1:] == ("not known",) * 3
 
 
@@ -157,27 +161,27 @@ def test_limits_that_are_not_known_are_no_numbers():
     limits = {"percentile_lower": 1.9 * half, "percentile_upper": np.full(len(half), np.nan)}
     content = verified(MEAN, DEVIATION, percentile=2.0 * half, **limits)
     ((_, _, rows),) = beside_original(content)
-    assert rows[2][1:3] == ("0.8 mm, limits not known", "0.4 mm, limits not known -50%")
+    assert rows[2][1:3] == ("0.8 mm, interval not known", "0.4 mm, interval not known -50%")
 
 
 def test_limits_are_told_so_far_that_they_differ():
     told_apart = told(verified(MEAN, DEVIATION, half=1e-9))
-    assert "0.2 mm (0.199999 mm to 0.200001 mm)" in told_apart["true mean"]
-    assert "0.2 mm (0.199 mm to 0.201 mm)" in told(verified(MEAN, DEVIATION))["true mean"]
+    assert "(95 % CI 0.199999 mm to 0.200001 mm)" in told_apart["mean"]
+    assert "(95 % CI 0.199 mm to 0.201 mm)" in told(verified(MEAN, DEVIATION))["mean"]
 
 
 def test_an_original_that_is_best_is_kept():
     lines = told(verified([1e-4, *MEAN[1:]], [1e-6, *DEVIATION[1:]]))
-    assert "keep the design" in lines["take"]
-    assert "original" not in lines["true mean"]
+    assert "keep the baseline" in lines["recommended"]
+    assert "baseline" not in lines["mean"]
 
 
 def test_designs_that_a_publication_prints_or_that_failed_are_not_taken():
     printed = np.array([np.nan, 1e-4, np.nan, np.nan, np.nan])
     content = verified(MEAN, DEVIATION, mean_paper=printed, deviation_paper=printed)
-    assert told(content)["take"] == "robust front 1"
+    assert told(content)["recommended"] == "robust front 1"
     gone = [np.nan if k == 1 else x for k, x in enumerate(MEAN)]
-    assert told(verified(gone, DEVIATION))["take"] == "robust front 1"
+    assert told(verified(gone, DEVIATION))["recommended"] == "robust front 1"
     assert told(verified([np.nan] * 5, DEVIATION)) == {}
 
 
@@ -192,8 +196,11 @@ def test_the_least_deviation_is_told_as_far_as_limits_tell(tmp_path, least, word
     """A design within beta's limits has less; beta is the best of these in the other, and the page says so."""
     dataset.write(verified(MEAN, [*DEVIATION[:3], least, 1e-5]), tmp_path / "verification.nc")
     page = write_report(tmp_path).read_text(encoding="utf-8")
-    assert ("least deviation of f of all designs simulated as far as limits tell" in page) is words
-    assert "least mean of f of all designs simulated, has" in page
+    assert (
+        "lowest standard deviation of f of all simulated designs within the confidence intervals"
+        in page
+    ) is words
+    assert "lowest mean of f of all simulated designs: " in page
 
 
 SCENES = {

@@ -44,7 +44,7 @@ def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
     """A stepper never runs on addresses that are not there yet."""
     lanes = Lanes(problem_of(scene_with()), 4)
 
-    def interrupted(width):
+    def interrupted(width, stages):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -52,7 +52,7 @@ def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             lanes.step(1)
     assert not lanes.step(1)  # compiled now; nothing is queued
-    assert all(lanes._codes[1][:2])
+    assert all(lanes._codes[:2])
 
 
 class Started(Exception):

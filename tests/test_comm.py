@@ -323,6 +323,22 @@ def test_the_mpi_library_is_described_without_starting_it():
     assert not MPI.Is_initialized()
 
 
+@pytest.mark.parametrize(("copies", "code"), [(1, 0), (2, 2)])
+def test_a_process_that_has_left_mpi_may_run_again_by_itself(copies, code):
+    """MPI starts only once: a second run used to abort the interpreter."""
+    program = (
+        "from hpcclear.ranks.boundary import describe_mpi, run_on_ranks\n"
+        "describe_mpi()\n"  # loads the library, as `check` does
+        "import os\n"
+        "assert run_on_ranks(lambda ranks: 0) == 0\n"
+        f"os.environ['OMPI_COMM_WORLD_SIZE'], os.environ['OMPI_COMM_WORLD_RANK'] = '{copies}', '0'\n"
+        "raise SystemExit(run_on_ranks(lambda ranks: 0))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    assert ("has left MPI" in done.stderr) == (code == 2)
+
+
 def test_one_process_in_a_notebook_gets_plain_exceptions():
     ranks = boundary.alone()
     result = ranks.run_points(Task("sleep", make_sleeping, {"cost": 1e-4}), design(20))

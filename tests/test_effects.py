@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pairwise import CONTACTS, FRICTIONS, all_pairs, pairs_of, pairwise_table
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
+from some_laws import FRICTION, effects_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -149,6 +150,8 @@ def assert_same_motion(one, other):
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
     scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
     flags = dict.fromkeys((effect, "short_film", "long_film") if effect == "film" else (effect,), 1)
+    if effect in FRICTION:
+        flags = {"friction": effects_with({effect}).friction}
     assert_same_motion(run(scene, flags, ZEROS[effect]), without)
 
 

@@ -399,7 +399,7 @@ def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
     assert upper[0].get_xlabel().split() == ["95th", "percentile", "of", "f", "(mm)"]
     assert upper[0].get_ylabel() == "m2 + m3 (SI)"
     assert lower[0].get_xlabel().startswith("mean")
-    assert lower[0].get_ylabel().startswith("deviation")
+    assert lower[0].get_ylabel().startswith("standard deviation")
     points = upper[0].lines[0].get_xydata()
     one = front.isel(case=0, run=0)
     np.testing.assert_allclose(points[:, 0], 1.5e3 * one["mean"])
@@ -414,7 +414,7 @@ def test_each_two_of_three_have_panels_and_each_end_a_letter() -> None:
     made = report.front_figure(front, verified)
     lines = np.array(made.axes).reshape(4, 2)  # three pairs of the first case, one of the second
     starts = [(one.get_xlabel()[:4], one.get_ylabel()[:4]) for one in lines[:, 0]]
-    assert starts == [("mean", "devi"), ("mean", "((m2"), ("devi", "((m2"), ("mean", "devi")]
+    assert starts == [("mean", "stan"), ("mean", "((m2"), ("stan", "((m2"), ("mean", "stan")]
     assert lines[1, 0].get_ylabel().endswith("… (SI)")
     for panel in lines[:3, 0]:
         letters = {text.get_text(): text for text in panel.texts}

@@ -309,17 +309,17 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
     found = verified(folder)
     lines = answer({"verification": found}, "out")
     assert (
-        "least share with f above 0.0003 m of" in dict(lines)["why"]
+        "lowest share with f above 0.0003 m of" in dict(lines)["criterion"]
     )  # the case with most random inputs
-    assert "least mean" not in dict(lines)["why"]
+    assert "lowest mean" not in dict(lines)["criterion"]
     tables = {case: lines for case, _, lines in beside_original(found)}
     assert [line[0] for line in tables["heavy"]] == [
         "mean",
-        "deviation",
-        "95 % below",
+        "std. deviation",
+        "95th percentile",
         "m2 + m3",
         "constraints",
-        "held at",
+        "active bounds",
     ]
     assert "m2 + m3" in output
     assert "constraints" in output
@@ -329,7 +329,7 @@ def test_the_page_tells_what_was_asked_for(study: tuple[Path, str]) -> None:
     page = write_report(study[0]).read_text()
     (study[0] / "report.html").unlink()
     assert "95th percentile of f: 0." in page
-    assert ">made small<" in page
+    assert ">objective 1<" in page
     assert "share with f above 0.0004 m" in page
 
 

@@ -1,4 +1,4 @@
-"""The Jacobian of implicit steps, whose columns are evaluated side by side, against central differences one by one."""
+"""The Jacobians of implicit steps, of eight samples side by side, against central differences one by one."""
 
 from pathlib import Path
 
@@ -7,11 +7,10 @@ import pytest
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
+from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.control import fit_to_ramp
-from hpcclear.dynamics.implicit.dense import invert_both
-from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_bank
-from hpcclear.dynamics.implicit.radau import new_memory
-from hpcclear.dynamics.implicit.stiff import blocks_of
+from hpcclear.dynamics.implicit.memory import COLUMNS, Moved, N
+from hpcclear.dynamics.implicit.newton import evaluate_stages, new_jacobian
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters
@@ -27,10 +26,12 @@ TOPOLOGIES = {
     "two open, free crank": (5, {"drive": DRIVE}),
     "baumgarte": (9, {"numerics.formulation": "baumgarte"}),
 }
+TIME = 1e-4
 
 
 def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
-    """What the implicit method remembers of a lane whose journals both touch, at the state of every stage."""
+    """What the implicit method remembers of eight samples whose journals both touch, each elsewhere; steps of no length, so
+    that every stage stands there."""
     scene = load_scene(JOB).with_({
         "effects.contact": {"law": "hunt-crossley", "damping": 0.5},
         "effects.friction.coefficient": 0.1,
@@ -40,29 +41,29 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
     problem = problem_of(scene)
     n, par = problem.coordinates, parameters(scene)
     start = start_states(scene, par)[0]
-    q, v = start.coordinates(n).copy(), start.velocities(n).copy()
-    q += 1e-3 * np.random.default_rng(n).uniform(-1.0, 1.0, n)  # |e| above the clearance
-    m = new_memory(1)[0]
-    rows = m.reshape(-1, mem.LANES)
-    for bank in (rows[: at.BANK], rows[mem.SECOND : mem.SECOND + at.BANK]):
-        bank[mem.PAR : mem.PAR + len(par[0])] = par[0][:, None]
-        bank[at.STAGE_TIME] = 1e-4
-    rows[at.QS : at.QS + n], rows[at.VS : at.VS + n] = q[:, None], v[:, None]
+    m = new_columns(COLUMNS)[0]
+    rows = m.reshape(-1, COLUMNS)
+    rows[mem.PAR : mem.PAR + len(par[0])] = par[0][:, None]
+    m[mem.TIME : mem.TIME + COLUMNS] = TIME
+    rng = np.random.default_rng(n)
+    away = rng.choice([-1e-3, 1e-3], (n, COLUMNS)) * rng.uniform(0.6, 1.0, (n, COLUMNS))
+    rows[at.Q : at.Q + n] = start.coordinates(n)[:, None] + away  # |e| above the clearance
+    rows[at.V : at.V + n] = start.velocities(n)[:, None]
     settings = problem.settings()
-    vector(m, mem.LEAST)[:n] = settings.atol_coordinates[:n] / settings.rtol
-    vector(m, mem.LEAST + mem.BLOCKS)[:n] = settings.atol_velocities[:n] / settings.rtol
-    fit_to_ramp(par[0], 0, 1, m, 0, settings.rows)
+    least = (settings.atol_coordinates[:n], settings.atol_velocities[:n])
+    for first, atol in zip((mem.LEAST, mem.LEAST + N), least, strict=True):
+        rows[first : first + n] = (atol / settings.rtol)[:, None]
+    for i in range(COLUMNS):
+        fit_to_ramp(par[0], 0, 1, m, i, settings.rows)
     return problem, m
 
 
-def vector(m: np.ndarray, row: int) -> np.ndarray:
-    """The vector over the coordinates that begins at a row."""
-    return m[row * mem.LANES :][: mem.BLOCKS * mem.LANES]
-
-
-def motions_and_tables(problem: Problem) -> tuple:
-    """The motion of one lane, and of the bank's, as the stepper of lanes hands them on."""
-    return *(motion_of(problem.effects, width).address for width in (1, mem.LANES)), problem.tables
+def differentiate(problem: Problem, m: np.ndarray) -> None:
+    """Evaluate the stages, and the Jacobians at the middle one."""
+    motion = motion_of(problem.effects, COLUMNS).address
+    moved = Moved(0, motion, problem.coordinates, problem.tables)
+    evaluate_stages(moved, m)
+    new_jacobian(moved, m)
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)
@@ -70,73 +71,43 @@ def test_columns_are_the_derivatives(name: str):
     n, changes = TOPOLOGIES[name]
     problem, m = memory_of(changes)
     assert problem.coordinates == n
-    motion, bank, tables = motions_and_tables(problem)
-    rows = m.reshape(-1, mem.LANES)
-    state = np.r_[rows[at.QS : at.QS + n, mem.MIDDLE], rows[at.VS : at.VS + n, mem.MIDDLE]]
+    rows = m.reshape(-1, COLUMNS)
+    motion = motion_of(problem.effects, 1).address
 
-    def accelerations(states: np.ndarray) -> np.ndarray:
+    def accelerations(states: np.ndarray, i: int) -> np.ndarray:
         out = np.zeros((len(states), n + at.RATES))
-        contacts = rows[at.ACTIVE : at.ACTIVE + 2 * at.MAX_JOINTS, mem.MIDDLE]
-        observe(
-            motion, rows[mem.PAR : mem.SECOND, 0].copy(), tables, states,
-            np.tile(contacts, (len(states), 1)),
-            np.full(len(states), rows[at.STAGE_TIME, mem.MIDDLE]), out,
-        )  # fmt: skip
+        contacts = np.tile(rows[at.ACTIVE : at.ACTIVE + 2 * at.MAX_JOINTS, i], (len(states), 1))
+        par, times = rows[mem.PAR : mem.NUMBERS, i].copy(), np.full(len(states), TIME)
+        observe(motion, par, problem.tables, states, contacts, times, out)
         return out[:, :n]
 
-    evaluate_bank(bank, m, tables)
-    found = rows[at.ACC : at.ACC + n, mem.MIDDLE]
-    here = accelerations(state[None])[0]
-    assert found == pytest.approx(here, rel=1e-13, abs=1e-12 * abs(here).max())
-    vector(m, mem.BASE)[:n] = found
-    difference_jacobian(bank, n, blocks_of(n), m, tables)
-    columns = np.array([vector(m, mem.JACOBIAN + k * mem.BLOCKS)[:n] for k in range(2 * n)]).T
-
-    least = np.r_[vector(m, mem.LEAST)[:n], vector(m, mem.LEAST + mem.BLOCKS)[:n]]
-    increments = np.diag(np.minimum(1e-7 * np.maximum(abs(state), least), m[mem.REACH] * least))
-    reference = (accelerations(state + increments) - accelerations(state - increments)).T
-    reference /= 2.0 * np.diag(increments)
-    size = abs(reference * least).max(axis=1, keepdims=True)
-    assert (abs(found) > 0.0).sum() >= 4  # both contacts push
-    assert (abs(columns - reference) * least < 1e-4 * size).all()
+    differentiate(problem, m)
+    by = [rows[first : first + N * N].reshape(N, N, -1)[:n, :n] for first in (mem.BY_Q, mem.BY_V)]
+    for i in range(COLUMNS):
+        state = np.r_[rows[at.Q : at.Q + n, i], rows[at.V : at.V + n, i]]
+        found = rows[mem.STAGE_ACC + N : mem.STAGE_ACC + N + n, i]
+        here = accelerations(state[None], i)[0]
+        assert found == pytest.approx(here, rel=1e-13, abs=1e-12 * abs(here).max())
+        least = np.r_[rows[mem.LEAST :, i][:n], rows[mem.LEAST + N :, i][:n]]
+        reach = m[mem.REACH + i] * least
+        increments = np.diag(np.minimum(1e-7 * np.maximum(abs(state), least), reach))
+        reference = accelerations(state + increments, i) - accelerations(state - increments, i)
+        reference = reference.T / (2.0 * np.diag(increments))
+        size = abs(reference * least).max(axis=1, keepdims=True)
+        assert (abs(found) > 0.0).sum() >= 4  # both contacts push
+        columns = np.hstack([one[:, :, i] for one in by])
+        assert (abs(columns - reference) * least < 1e-4 * size).all()
 
 
 def test_differences_stay_within_the_ramp():
     """A column's increment is a thousandth of the ramp at most: across its end the slope would be hidden."""
     problem, m = memory_of({"effects.friction.ramp_speed": 1e-6})
-    _, bank, tables = motions_and_tables(problem)
-    difference_jacobian(bank, 4, 1, m, tables)
-    increments = m[mem.INCREMENT * mem.LANES :][:8]
-    least = vector(m, mem.LEAST + mem.BLOCKS)[:4]
-    assert (abs(increments[4:]) <= 1.0001e-9 * least).all()
-    assert (increments != 0.0).all()
-
-
-@pytest.mark.parametrize("n", [1, 2, 5, 8, 9, 24])
-def test_inverses_are_those_of_numpy(n: int):
-    """Of the real system and of the complex one, whose pivots have to be looked for."""
-    rng = np.random.default_rng(n)
-    m = new_memory(1)[0]
-    real, complex_ = rng.normal(size=(n, n)), rng.normal(size=(n, n)) + 1j * rng.normal(size=(n, n))
-    real[0, 0] = complex_[0, 0] = 0.0 if n > 1 else 2.0
-    parts = {mem.REAL: real, mem.COMPLEX_RE: complex_.real, mem.COMPLEX_IM: complex_.imag}
-    for row, part in parts.items():
-        for k in range(n):
-            vector(m, row + k * mem.BLOCKS)[:n] = part[:, k]
-    assert invert_both(n, blocks_of(n), m)
-    found = {
-        row: np.array([vector(m, row + k * mem.BLOCKS)[:n] for k in range(n)]).T for row in parts
-    }
-    np.testing.assert_allclose(found[mem.REAL] @ real, np.eye(n), atol=1e-11)
-    both = found[mem.COMPLEX_RE] + 1j * found[mem.COMPLEX_IM]
-    np.testing.assert_allclose(both @ complex_, np.eye(n), atol=1e-11)
-
-
-@pytest.mark.parametrize("row", [mem.REAL, mem.COMPLEX_RE])
-def test_a_singular_system_is_noticed(row: int):
-    m = new_memory(1)[0]
-    for k in range(3):
-        for first in (mem.REAL, mem.COMPLEX_RE):
-            vector(m, first + k * mem.BLOCKS)[k] = 1.0
-    vector(m, row + mem.BLOCKS)[:] = 0.0
-    assert not invert_both(3, 1, m)
+    velocities = m.reshape(-1, COLUMNS)[mem.BY_V : mem.BY_V + N * N].reshape(N, N, -1)[:4, :4]
+    reach = m[mem.REACH : mem.REACH + COLUMNS]
+    assert reach == pytest.approx(1e-9)
+    differentiate(problem, m)
+    assert np.isfinite(velocities).all()
+    reach[3] = 0.0  # there and nowhere else is no difference to divide by
+    differentiate(problem, m)
+    assert np.isfinite(np.delete(velocities, 3, axis=2)).all()
+    assert not np.isfinite(velocities[:, :, 3]).any()

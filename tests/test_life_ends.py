@@ -308,7 +308,7 @@ def test_the_command_and_the_page_say_when_and_why_lives_ended(written):
     assert "life, hours" in told
     assert "120 µm" in told or "0.12 mm" in told
     page = write_report(folder / "results").read_text(encoding="utf-8")
-    assert "Half of them are over after" in page
+    assert "Median service life: " in page
     assert " h." in page
 
 

@@ -392,10 +392,11 @@ def test_what_a_sample_of_a_linkage_costs_is_told(capsys):
     """`check` measures it, with whatever mass there is."""
     describe_scene(load_scene(LINKAGES / "crank_rocker.toml"), cost=True)
     told = capsys.readouterr().out
-    assert "time a sample" in told
+    assert "run time per sample" in told
     assert "60 samples" in told
     assert re.search(
-        r"about \d+ samples, .* of one core; hpcclear plan tells more", " ".join(told.split())
+        r"about \d+ samples, .* of one core; hpcclear plan estimates it better",
+        " ".join(told.split()),
     )
 
 

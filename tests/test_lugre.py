@@ -331,7 +331,7 @@ def test_other_laws_have_no_bristles():
         bristled({"effects.friction": coulomb})
     assert caught.value.key == "effects.friction.bristle_stiffness"
     assert caught.value.value == 1e5
-    assert "'coulomb' has no bristles" in caught.value.reason
+    assert "'coulomb' has no bristle_stiffness" in caught.value.reason
 
 
 def test_units_of_bristles_are_converted():
@@ -346,7 +346,10 @@ def test_units_of_bristles_are_converted():
 def test_points_keep_friction_at_rest_above_that_of_sliding():
     scene = bristled()
     paths = [f"effects.friction.{name}" for name in ("coefficient", "static_coefficient")]
-    for values, said in (((0.2, 0.15), "less than sliding"), ((0.0, 0.15), "at rest alone")):
+    for values, said in (
+        ((0.2, 0.15), "at least the coefficient of sliding"),
+        ((0.0, 0.15), "at rest alone"),
+    ):
         points = Points(("mu", "rest"), np.array([[0.1, 0.15], values]), tuple((p,) for p in paths))
         with pytest.raises(InputError, match=said):
             check_points(scene, points)

@@ -38,13 +38,11 @@ def shapes() -> Registry:
     return registry
 
 
-def install(folder: Path, group: str, name: str, value: str, version: str = "1.2") -> None:
+def install(folder: Path, group: str, name: str, value: str, package: str = "their-shapes") -> None:
     """A package with an entry point, as pip leaves it in a folder of packages."""
-    info = folder / f"their_shapes-{version}.dist-info"
+    info = folder / f"{package.replace('-', '_')}-1.2.dist-info"
     info.mkdir(parents=True)
-    info.joinpath("METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: their-shapes\nVersion: {version}\n"
-    )
+    info.joinpath("METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.2\n")
     info.joinpath("entry_points.txt").write_text(f"[{group}]\n{name} = {value}\n")
     folder.joinpath("their_shapes.py").write_text(PACKAGE)
 
@@ -86,9 +84,9 @@ def test_what_a_kind_needs_is_looked_for(shapes):
 
 def test_two_packages_that_offer_one_name_are_named(shapes, tmp_path, monkeypatch):
     for number, value in enumerate(("their_shapes:Theirs", "their_shapes:Path")):
-        install(tmp_path / str(number), "hpcclear.shapes", "square", value)
+        install(tmp_path / str(number), "hpcclear.shapes", "square", value, f"shapes-{number}")
         monkeypatch.syspath_prepend(tmp_path / str(number))
-    with pytest.raises(InputError, match="is offered by their-shapes and their-shapes"):
+    with pytest.raises(InputError, match="is offered by shapes-0 and shapes-1"):
         shapes.get("square")
 
 

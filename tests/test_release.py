@@ -107,7 +107,7 @@ def test_a_job_runs_from_the_wheel_alone(installed, tmp_path):
     run(installed / "mpiexec", "-n", "2", installed / "hpcclear", *sample, place=tmp_path)
     assert "report.html" in run(installed / "hpcclear", "report", results, place=tmp_path)
     page = (results / "report.html").read_text(encoding="utf-8")
-    assert "32 samples" in page
+    assert "32 simulations" in page
     assert "<style>" in page
     assert "data:image/png;base64," in page
 

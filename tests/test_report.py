@@ -126,20 +126,20 @@ def test_every_figure_leads_to_itself_enlarged_and_back(tree: Tree) -> None:
 
 def test_the_page_says_what_was_found(tree: Tree) -> None:
     for words in (
-        "60 samples",
+        "60 simulations",
         "3 failed",
         "Design “robust alpha”",
-        "19% less than the original design",
-        "1 hold on this data, 1 do not, and 1 cannot be told",
+        "19% below the baseline design",
+        "1 hold on this data, 1 do not, and 1 are undecided",
         "numerics.max_steps was reached",
         "raise numerics.max_steps",
-        "beyond the range of Hertz",
+        "beyond the range of Hertz contact",
         "2 ranks worked on it",
-        "accuracy.nc: what accuracy costs was not measured",
+        "accuracy.nc: the cost of accuracy was not measured",
         "mpiexec -n 2 hpcclear run",
         "effects.<u>contact",
-        "alpha: least mean",
-        "best: alpha or beta by the surrogate alone",
+        "alpha: lowest mean",
+        "best: alpha or beta as predicted by the surrogate alone",
     ):
         assert words in tree.text, words
     for words in ("samples.nc: no design", "front.nc", "candidate:"):
@@ -169,8 +169,8 @@ def test_one_response_makes_a_report(tmp_path: Path) -> None:
 def test_what_accuracy_costs_makes_a_report_that_misses_nothing(tmp_path: Path) -> None:
     dataset.write(data.accuracy(), tmp_path / "accuracy.nc")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
-    assert "What accuracy costs was measured" in tree.text
-    for words in ("nothing was sampled", "no design was sampled", "What is not here"):
+    assert "The cost of accuracy was measured" in tree.text
+    for words in ("nothing was sampled", "no design was sampled", "Results not available"):
         assert words not in tree.text
 
 

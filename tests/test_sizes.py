@@ -15,11 +15,11 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.stepper import quadratures
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
 from hpcclear.dynamics.explicit.steps import weigh_rates
-from hpcclear.dynamics.implicit.radau import means_of_step
+from hpcclear.dynamics.implicit.columns import leave
+from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.stepping.control import commit_measures
@@ -30,23 +30,24 @@ NONE_OPEN = at.Stepped(at.rules_of(at.Effects()), np.zeros(0, np.int64))
 
 
 @lane_function
-def last_stage_and_error(n, effects, work, stages, par, weights, atol, W):
-    step = Step(work, stages, par, weights, n, 1e-3, atol, W)
-    stage_state(step, tab.STAGES - 1, tab.STAGES - 1, W)
-    step_error(effects, step, W)
+def last_stage_and_error(n, effects, work, room, par, weights, atol, stages, W):
+    step = Step(work, room, par, weights, n, 1e-3, atol, W)
+    stage_state(step, stages - 1, stages - 1, W)
+    step_error(effects, step, stages, W)
 
 
+@pytest.mark.parametrize("pair", [tab.DORMAND_PRINCE, tab.PRINCE_DORMAND], ids=lambda p: p.name)
 @pytest.mark.parametrize("n", [1, 4, 7, at.MAX_COORDINATES])
-def test_a_stage_and_its_error_reach_every_coordinate(n: int):
+def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau):
     """Of any number of coordinates, once each, and no number beside them is touched."""
-    s = tab.STAGES - 1
-    both = njit(error_model="numpy", fastmath=FASTMATH)(one_text(last_stage_and_error, "both", W=W))
+    s = pair.stages - 1
+    text = one_text(last_stage_and_error, "both", W=W, stages=pair.stages)
+    both = njit(error_model="numpy", fastmath=FASTMATH)(text)
 
     rng = np.random.default_rng(n)
-    pair = tab.DORMAND_PRINCE
     work, par = rng.normal(size=(at.WORK, W)), np.ones((at.PARAMETERS, W))
     room, atol = (
-        rng.normal(size=(tab.STAGES, at.MAX_COORDINATES, W)),
+        rng.normal(size=(pair.stages, at.MAX_COORDINATES, W)),
         rng.uniform(0.5, 1.0, (2, at.MAX_COORDINATES)),
     )
     stages = room[:, :n].copy()
@@ -80,9 +81,11 @@ def test_what_does_not_fit_is_refused():
         replace(problem, coordinates=25, atol=50 * problem.atol[:1])
     with pytest.raises(ValueError, match="8 tolerances, not 7"):
         replace(problem, atol=problem.atol[:7])
-    three = np.eye(3)
-    with pytest.raises(ValueError, match="pairs of 7 stages"):
-        tab.Tableau("short", 2, 1, three, three[0], three[0], "none")
+    many = np.eye(15)
+    with pytest.raises(ValueError, match="pairs of 14 stages at most"):
+        tab.Tableau("long", 2, 1, many, many[0], many[0], "none")
+    with pytest.raises(ValueError, match="not 3"):
+        tab.Tableau("askew", 2, 1, many, many[0, :3], many[0, :3], "none")
     with pytest.raises(ValueError, match="a row of Start holds 64 numbers, not 21"):
         Start(np.zeros((3, 21)))
 
@@ -103,7 +106,7 @@ def test_an_end_is_a_start():
 # ---- what is integrated ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("traversal", [weigh_rates, means_of_step, quadratures, commit_measures])
+@pytest.mark.parametrize("traversal", [weigh_rates, observe_stages, leave, commit_measures])
 def test_every_stepper_integrates_all_of_the_list(traversal):
     """The gaps of the joints that are open (`commit` has its own); the rest is measured."""
     seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
@@ -124,7 +127,15 @@ def test_what_is_measured_goes_by_the_effects():
     assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
     worn = at.Effects(rod_slider=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
-    assert max(one.rate for one in at.MEASURES) < 64  # `control.measure` keeps six bits
+    for mask, largest in (
+        (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
+        (at.JOINT_MASK, at.MAX_JOINTS - 1),
+        (at.COORDINATE_MASK, at.MAX_COORDINATES - 1),
+    ):
+        assert all(number & mask == number for number in range(largest + 1))
+    assert (
+        at.MEASURE_MASK < at.RATES
+    )  # what the compiler then knows of the distance between two rows
 
 
 def test_rules_are_numbers_of_one_kind():
@@ -180,7 +191,7 @@ def test_no_stepper_names_a_rate_of_its_own():
     assert {getattr(at, name) for name in own} | of_joints == rows
     own |= {"SLIDING_POWERS", "sliding_power"}
     room = Path(hpcclear.dynamics.__file__).parent
-    for folder in ("explicit", "implicit", "collocation"):
+    for folder in ("explicit", "implicit"):
         for path in (room / folder).glob("*.py"):
             text = path.read_text()
             assert not [name for name in own if f"at.{name}" in text], path.name

@@ -77,7 +77,7 @@ def test_the_key_has_the_scenes_own_numbers():
     for words in ("40 mm", "1.1 kg", "30 µm", "15 µm", "3000 rpm", "-9 kN to -200 N", "O12", "O23"):
         assert words in text, words
     rigid = " ".join(t.get_text() for t in drawn(engine(*SCENES["ideal"], study=False))[2])
-    assert "ideal, no play" in rigid
+    assert "ideal, no clearance" in rigid
     assert "F on the slider" not in rigid
 
 

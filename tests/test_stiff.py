@@ -46,8 +46,8 @@ def scene_of(name: str, method: str, rtol: float) -> Scene:
 
 
 def one_turn(scene: Scene, start: Start) -> Outcome:
-    """Outcome of one revolution from one start, as of a single response."""
-    return Lanes(problem_of(scene, single=True), 1).run(parameters(scene), start)
+    """Outcome of one revolution from one start."""
+    return Lanes(problem_of(scene), 1).run(parameters(scene), start)
 
 
 def settled(name: str) -> Start:
@@ -70,7 +70,7 @@ def test_automatic_choice_is_right_and_cheaper(name: str):
     assert 0.0 < chosen.stiff_steps < chosen.attempts
     missed = chosen.coordinates(4) - exact.coordinates(4)
     assert abs(missed[0, SLIDER]) < 1e-7
-    # an implicit step takes the time of two explicit ones; evaluations do not tell, it has eight of them at a time
+    # eight implicit steps side by side take each the time of two explicit ones
     weighted = chosen.attempts + chosen.stiff_steps
     assert weighted < 0.6 * explicit.attempts
 

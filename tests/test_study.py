@@ -335,8 +335,8 @@ def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     spoilt = found.copy(deep=True)
     spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
     lines = dict(answer(files | {"chaos": spoilt}, "here"))
-    assert "moves 50% of the samples of this one, which makes 40% of its variance" in lines["chaos"]
-    assert "averaged_revolutions" in lines["next"]
+    assert "change 50% of the samples of this one and explain 40% of its variance" in lines["chaos"]
+    assert "averaged_revolutions" in lines["next steps"]
 
 
 def test_a_stage_whose_samples_are_damaged_is_done_again(results, tmp_path, monkeypatch):

@@ -275,12 +275,15 @@ def test_the_answer_has_a_column_for_each_end(study: Path) -> None:
     found = verified(study)
     ((case, designs, lines),) = beside_original(found)
     assert case == "three"
-    assert [name.removesuffix(" (to take)") for name in designs][:4] == ["original", *ENDS]
+    assert [name.removesuffix(", recommended") for name in designs][:4] == [
+        "baseline",
+        *(f"lowest objective {k} ({end})" for k, end in enumerate(ENDS, 1)),
+    ]
     rows = {line[0]: line[1:] for line in lines}
     assert set(map(len, rows.values())) == {len(designs)}
     assert rows[THIRD][3] == "0"
     told = [
-        line.text for line in answer({"verification": found}, "out") if line.label == "asked for"
+        line.text for line in answer({"verification": found}, "out") if line.label == "objective"
     ]
     assert len(told) == 1  # mean and deviation have lines anyway
     assert told[0].startswith(THIRD)
@@ -297,8 +300,13 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     assert [THIRD, "0"] in gamma["direct"]
     part = sections.designs(content)
     assert part is not None
-    assert part["table"].header[-4:] == ["made small", "and", "and", "constraints"]
-    assert ("gamma", "least of the third that the case makes small, likewise") in part["names"]
+    assert part["table"].header[-4:] == [
+        "objective 1",
+        "objective 2",
+        "objective 3",
+        "constraints",
+    ]
+    assert ("gamma", "lowest third objective of the case") in part["names"]
 
 
 _CHOOSE = """

@@ -126,18 +126,18 @@ def reference():
     return y
 
 
-SHARE = {"dormand-prince": 2e-6, "radau": 2e-6, "lobatto": 2e-3}
+SHARE = {"dormand-prince": 2e-6, "radau": 2e-6, "prince-dormand": 2e-3}
 METHODS = [
     "dormand-prince",
     pytest.param("radau", marks=pytest.mark.full),
-    pytest.param("lobatto", marks=pytest.mark.full),
+    pytest.param("prince-dormand", marks=pytest.mark.full),
 ]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_motion_and_profile_are_those_of_an_independent_integration(method, reference):
     scene = scene_with({**WAVY, **WORN, **ANGULAR, "numerics.method": method}, rtol=1e-12)
-    found = run(scene, single=method == "lobatto").out
+    found = run(scene).out
     np.testing.assert_allclose(found.coordinates(4), reference[:4], rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(found.velocities(4), reference[4:8], rtol=1e-8, atol=1e-6)
     profile = found.profile * float(found.time)

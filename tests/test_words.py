@@ -10,20 +10,25 @@ from typing import NamedTuple
 import pytest
 from doc_pages import ROOT, tokens
 
+from hpcclear.cli import cli
+
 FILES = (
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
     "docs/adding-an-effect.md",
     "docs/architecture.md",
+    "docs/extending.md",
     "docs/glossary.md",
     "docs/index.md",
     "docs/performance.md",
+    "docs/questions.md",
     "docs/reading-the-accuracy-figure.md",
     "docs/tutorial.md",
     "docs/validation.md",
     "docs/how-to/archive.md",
     "docs/how-to/chaos.md",
+    "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",
     "docs/how-to/designs.md",
     "docs/how-to/distribution.md",
@@ -31,12 +36,15 @@ FILES = (
     "docs/how-to/effects.md",
     "docs/how-to/elastic-rod.md",
     "docs/how-to/gallery.md",
+    "docs/how-to/linkage.md",
     "docs/how-to/mechanism.md",
     "docs/how-to/objective.md",
     "docs/how-to/oil-film.md",
+    "docs/how-to/resume.md",
     "docs/how-to/speeds.md",
     "docs/how-to/stick-slip.md",
     "docs/how-to/surrogates.md",
+    "docs/how-to/wear.md",
     "docs/how-to/xarray.md",
 )
 """Pages that have been rewritten. Add a page here once it has been."""
@@ -152,6 +160,24 @@ def test_sentences_of_a_page_are_short(name):
         for sentence in sentences(passage.text)
         if len(sentence.split()) >= LONGEST
     ]
+    assert not found, "\n".join(found)
+
+
+def help_passages() -> Iterator[tuple[str, str]]:
+    """Prose of the help of every command, with the command's name; examples and metavariables are left out."""
+    for name, command in [("hpcclear", cli), *cli.commands.items()]:
+        texts = (command.help or "").split("\n\n")
+        yield from ((name, " ".join(text.split())) for text in texts if "xample:" not in text)
+        yield from ((name, command.short_help or ""),)
+        for option in command.params:
+            yield name, getattr(option, "help", None) or ""
+
+
+def test_help_of_commands_has_the_fields_words_and_short_sentences():
+    found = []
+    for name, text in help_passages():
+        found += [f"{name}: {word!r}; write: {instead}" for word, instead in private_words(text)]
+        found += [f"{name}: {one}" for one in sentences(text) if len(one.split()) >= LONGEST]
     assert not found, "\n".join(found)
 
 

@@ -225,9 +225,9 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
 
 def test_the_page_tells_lives(study):
     page = write_report(study).read_text()
-    assert "12 lives of 1e+06 revolutions were followed; none failed." in page
-    assert "Lives that have passed no limit" in page
-    assert "mean over own life" in page
+    assert "12 service lives of 1e+06 revolutions were simulated; no failures." in page
+    assert "Survival, with 95 % confidence interval" in page
+    assert "mean, own wear" in page
     (study / "report.html").unlink()
 
 

@@ -40,15 +40,13 @@ _PROBLEMS: dict[tuple, Problem] = {}
 
 
 def _solver(name: str) -> Callable[[Setup, int], float]:
-    """By what `simulate` chooses, by collocation, or by one of the pairs."""
+    """By what `simulate` chooses, or by one of the pairs."""
     tableau = TABLEAUS.get(name)
 
     def solve(setup: Setup, sample: int = 0) -> float:
         problem = setup.problem
         if tableau is not None:
-            problem = replace(problem, tableau=tableau, collocation=False)
-        elif name == "lobatto":
-            problem = replace(problem, collocation=True)
+            problem = replace(problem, tableau=tableau)
         one = setup._replace(
             par=setup.par[sample : sample + 1], start=setup.start[sample : sample + 1]
         )
@@ -75,7 +73,7 @@ def plain_positions(setup: Setup) -> Array:
     return found[:, 1]
 
 
-SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("auto", "lobatto", *TABLEAUS)} | {
+SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("auto", *TABLEAUS)} | {
     "plain loop": plain
 }
 BATCH = {

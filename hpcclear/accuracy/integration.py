@@ -102,7 +102,7 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
             seconds[m, r] = total * share
             evaluations[m, r] = outcome.evaluations.mean()
             setting[m, r] = method.setting(rtol)
-            # collocation may be better than the reference: no error is told that the reference cannot tell
+            # a method may be better than the reference: no error is stated that the reference cannot show
             off = rms((outcome.values - reference.values) / reference.scale)
             lost = not off[0] < LOST  # nor a number
             error[m, r] = np.nan if lost else np.fmax(off, reference.error)

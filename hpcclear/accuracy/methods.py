@@ -268,7 +268,7 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
             {"formulation": "minimal", "method": "tsitouras"},
         ),
         ("fehlberg", 1, {"formulation": "minimal", "method": "fehlberg"}),
-        ("lobatto", 1, {"formulation": "minimal", "method": "lobatto"}),
+        ("prince-dormand", 1, {"formulation": "minimal", "method": "prince-dormand"}),
     ]
     if more:
         wanted += [

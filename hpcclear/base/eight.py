@@ -1,4 +1,4 @@
-"""Vectors of eight numbers as values of compiled code, for what has eight stages side by side.
+"""Vectors of eight numbers as values of compiled code, for what eight samples do abreast.
 
 The compiler makes vectors of short loops only where it can show that no store meets a load, which it cannot once a row's
 place is a number that comes at run time; and Numba reads every one of eight copies that are written out instead, which took
@@ -10,7 +10,6 @@ import operator
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.extending import lower_builtin, register_model
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
@@ -49,11 +48,6 @@ def _spread(builder, number):
 
 def _index(k):
     return ir.Constant(ir.IntType(32), k)
-
-
-def _indices(first, count):
-    kind = ir.VectorType(ir.IntType(32), count)
-    return ir.Constant(kind, [_index(first + k) for k in range(count)])
 
 
 def _place(context, builder, kind, array, row):
@@ -129,87 +123,6 @@ def spread(typingctx, number):
 
 
 @emitted
-def nine_rows(typingctx, array, row):
-    """Nine rows of a flat array, one after the other: kept in registers as far as there are any."""
-    kind = types.UniTuple(eight, EIGHT + 1)
-
-    def codegen(context, builder, sig, args):
-        rows = [builder.add(args[1], ir.Constant(args[1].type, k)) for k in range(EIGHT + 1)]
-        vectors = [
-            builder.load(_place(context, builder, sig.args[0], args[0], one), align=_ALIGNED)
-            for one in rows
-        ]
-        return context.make_tuple(builder, kind, vectors)
-
-    return kind(array, types.intp), codegen
-
-
-@emitted
-def combined(typingctx, rows, first, array, row):
-    """Nine rows times nine numbers, summed: `first`, then those of a row of a flat array."""
-
-    def codegen(context, builder, sig, args):
-        vectors = cgutils.unpack_tuple(builder, args[0])
-        data = context.make_array(sig.args[2])(context, builder, args[2]).data
-        start = builder.mul(args[3], ir.Constant(args[3].type, EIGHT))
-        # two sums side by side: each addition waits for the one before
-        sums = [builder.fmul(vectors[0], _spread(builder, args[1])), None]
-        for k in range(EIGHT):
-            place = builder.gep(data, [builder.add(start, ir.Constant(start.type, k))])
-            number = _spread(builder, builder.load(place))
-            product, which = builder.fmul(vectors[k + 1], number), (k + 1) % 2
-            before = sums[which]
-            sums[which] = product if before is None else builder.fadd(before, product)
-        return builder.fadd(*sums)
-
-    return eight(rows, types.float64, array, types.intp), codegen
-
-
-@emitted
-def total_of(typingctx, vector):
-    """Sum of a vector's numbers, by halves."""
-
-    def codegen(context, builder, sig, args):
-        left, count = args[0], EIGHT
-        while count > 1:
-            count //= 2
-            halves = [
-                builder.shuffle_vector(
-                    left, ir.Constant(left.type, ir.Undefined), _indices(first, count)
-                )
-                for first in (0, count)
-            ]
-            left = builder.fadd(*halves)
-        return builder.extract_element(left, _index(0))
-
-    return types.float64(eight), codegen
-
-
-@emitted
-def largest_of(typingctx, vector):
-    """The largest of a vector's numbers; which of them where one is none is not said."""
-
-    def codegen(context, builder, sig, args):
-        numbers = [builder.extract_element(args[0], _index(k)) for k in range(EIGHT)]
-        while len(numbers) > 1:
-            pairs = zip(numbers[::2], numbers[1::2], strict=True)
-            numbers = [builder.select(builder.fcmp_ordered(">", a, b), a, b) for a, b in pairs]
-        return numbers[0]
-
-    return types.float64(eight), codegen
-
-
-@emitted
-def either(typingctx, condition, vector, other):
-    """The first of two vectors where a condition holds, else the second."""
-
-    def codegen(context, builder, sig, args):
-        return builder.select(args[0], args[1], args[2])
-
-    return eight(types.boolean, eight, eight), codegen
-
-
-@emitted
 def above(typingctx, vector, yes, no):
     """Of two vectors, number by number, the first where a third is above 0, else the second."""
 
@@ -231,19 +144,3 @@ def size(typingctx, vector):
         return builder.bitcast(bits, _VECTOR)
 
     return eight(eight), codegen
-
-
-@emitted
-def column(typingctx, array, row, place):
-    """What stands at a place of eight rows of a flat array, one after the other."""
-
-    def codegen(context, builder, sig, args):
-        data = context.make_array(sig.args[0])(context, builder, args[0]).data
-        start = builder.add(builder.mul(args[1], ir.Constant(args[1].type, EIGHT)), args[2])
-        vector = ir.Constant(_VECTOR, ir.Undefined)
-        for k in range(EIGHT):
-            address = builder.gep(data, [builder.add(start, ir.Constant(start.type, EIGHT * k))])
-            vector = builder.insert_element(vector, builder.load(address), _index(k))
-        return vector
-
-    return eight(array, types.intp, types.intp), codegen

@@ -64,7 +64,10 @@ class InputError(ValueError):
 
 def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
-    close = difflib.get_close_matches(word[:80], words, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word[:80], words, n=3, cutoff=0.6)
+    close.sort(
+        key=lambda one: not one.startswith(word)
+    )  # whoever writes the beginning of a name means it
     if close:
         return f"Did you mean {close[0]!r}?"
     if not words:

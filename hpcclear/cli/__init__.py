@@ -21,7 +21,7 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import ensembles, scenes, studies
+from hpcclear.cli import ensembles, laws, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
@@ -34,6 +34,7 @@ _ROOT_ALONE = (
     scenes.reproduce,
     scenes.crate,
     scenes.schema,
+    laws.laws,
 )
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 
@@ -54,8 +55,8 @@ _ON_RANKS = (
 def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
-    Scenes are TOML files; results are NetCDF files that open in xarray. Start sample, run, accuracy
-    and plan under mpiexec to use more than one core:
+    Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
+    core, start sample, run, wear, map, effects, accuracy or plan under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """

@@ -156,7 +156,7 @@ def _random(found: xr.Dataset) -> list[tuple[str, str]]:
             mean, deviation = (float(error.sel(moment=m)[k]) for m in ("mean", "deviation"))
             seconds = float(found["moment_seconds"].sel(estimate=estimate)[k])
             what = f"{estimate}, {int(found['draws'][k])} draws"
-            rows.append((what, f"mean {mean:.1e}, deviation {deviation:.1e}, {seconds:.2g} s"))
+            rows.append((what, f"mean {mean:.1e}, std. deviation {deviation:.1e}, {seconds:.2g} s"))
     for moment in found["moment"].to_numpy():
         bias, own = (float(found[n].sel(moment=moment)) for n in ("moment_bias", "bias_error"))
         rows.append((f"bias of the {moment}", f"{bias:+.1e} +- {own:.1e}, surrogate to simulation"))

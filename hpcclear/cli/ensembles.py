@@ -47,17 +47,17 @@ def _check_kind(
 @POINTS
 @flag(
     "--statistics",
-    "Keep mean, deviation and histogram of Monte Carlo samples, not the samples.",
+    "Keep mean, standard deviation and histogram of Monte Carlo samples instead of the samples.",
 )
 @click.option(
     "--raw",
     type=PATH,
-    help="With --statistics: directory for the samples themselves; samples.nc in it opens as all of them.",
+    help="With --statistics: keep the samples too, in this directory. Open its samples.nc to read all of them.",
 )
 @click.option(
     "--part",
     metavar="K/N",
-    help="Only part K of N, into a file of its own beside the output: for job arrays; see merge.",
+    help="Simulate part K of N, for a job array. Each part has its own file; merge joins them.",
 )
 @with_how
 def sample(
@@ -69,7 +69,7 @@ def sample(
     part: str | None,
     how: How,
 ) -> int:
-    """Send the study's points, or a table of yours, through the dynamics.
+    """Simulate the designs of the study, or those of a table (--points).
 
     Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
@@ -97,15 +97,15 @@ def sample(
     return on_ranks(program, how.time_limit)
 
 
-@click.command(short_help="Put parts of a design together.")
+@click.command(short_help="Merge partial result files.")
 @with_scene
 @output_option("NetCDF file to write: the name that was given with each part.")
 @POINTS
 @of_one_process
 def merge(written: Written, output: Path, points: Path | None) -> int:
-    """Write what sample --part 1/N to N/N made as one file: the bytes that a single run would have written.
+    """Merge the files of sample --part 1/N to N/N into one, equal to the file of a single run.
 
-    Scene, --set and --points are those of the parts, which stay; parts that are missing are named.
+    Use the same scene, --set and --points as for the parts. The parts are kept; missing parts are listed.
 
     Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
     """
@@ -119,17 +119,23 @@ def merge(written: Written, output: Path, points: Path | None) -> int:
     return Exit.DONE
 
 
-@click.command("map", short_help="Show where the motion does what.")
+@click.command("map", short_help="Map periodic and chaotic motion over one or two parameters.")
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
-    "--x", "x", required=True, metavar="PATH=LO:HI:N", help="First entry, its limits, its cells."
+    "--x",
+    "x",
+    required=True,
+    metavar="PATH=LO:HI:N",
+    help="First parameter: scene entry, bounds, number of cells.",
 )
-@click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second entry.")
+@click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second parameter.")
 @with_how
 def map_command(written: Written, output: Path, x: str, y: str | None, how: How) -> int:
-    """Judge the motion over a line or a grid of one or two entries of the scene: growth of a kick (largest Lyapunov
-    exponent, per revolution), period, kinds of motion from several starts, f and its limit.
+    """Map periodic and chaotic motion over one or two entries of the scene.
+
+    Each cell has the largest Lyapunov exponent per revolution, the period, the kinds of motion from several
+    starts, and f with its half-width.
 
     Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --x C=0.1mm:1mm:40 -o results/map.nc
     """
@@ -144,15 +150,16 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     return on_ranks(program, how.time_limit)
 
 
-@click.command(short_help="Follow lives of joints that wear.")
+@click.command(short_help="Simulate wear over the service life.")
 @with_scene
 @output_option("NetCDF file to write.")
 @with_how
 def wear(written: Written, output: Path, how: How) -> int:
-    """Follow lives of a mechanism whose joints wear: clearance, f and peak force against revolutions, how long lives last and
-    how sure that is.
+    """Simulate wear over the service life, for many mechanisms with random inputs.
 
-    Exit code 1 if every life failed; what there is of them is written.
+    Results are clearance, f and peak force against revolutions, and the survival curve with confidence intervals.
+
+    Exit code 1 if every service life failed; the file is written all the same.
 
     Example: mpiexec -n 2 hpcclear wear jobs/wear.toml -o results/wear.nc --set wear.lives=8
     """
@@ -166,7 +173,7 @@ def wear(written: Written, output: Path, how: How) -> int:
     return on_ranks(program, how.time_limit)
 
 
-@click.command(short_help="Say which effects a scene can do without.")
+@click.command(short_help="Find effects that can be neglected.")
 @with_scene
 @output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @click.option(
@@ -174,21 +181,23 @@ def wear(written: Written, output: Path, how: How) -> int:
     default="1%",
     show_default=True,
     metavar="CHANGE",
-    help="Relative change of what the study asks that is allowed.",
+    help="Largest relative change of the results that counts as negligible.",
 )
 @click.option(
     "--samples",
     type=click.IntRange(min=64),
     metavar="N",
-    help="Samples of a variant at most; by default as many as a twentieth of the study allows.",
+    help="Largest number of samples of a variant. By default a twentieth of the study's simulations is spent.",
 )
-@flag("--forces", "Hold peak contact forces to the tolerance, too, not only tell them.")
+@flag(
+    "--forces", "Apply the tolerance to peak contact forces too. Without it they are only reported."
+)
 @click.option(
     "--scene",
     "reduced",
     type=PATH,
     metavar="FILE",
-    help="Write the cheapest scene there, whole.",
+    help="Write the recommended scene to this file.",
 )
 @with_how
 def effects(
@@ -200,8 +209,9 @@ def effects(
     reduced: Path | None,
     how: How,
 ) -> int:
-    """Measure what each effect of a scene changes and costs (play in each joint, friction, gravity, loads, ...), and print
-    the cheapest scene that stays within the tolerance.
+    """Find effects that can be neglected: clearance in each joint, friction, gravity, loads and others.
+
+    Each effect is switched off; its change of the results and of the run time is measured, with confidence intervals.
 
     Example: mpiexec -n 2 hpcclear effects jobs/quickstart.toml --tolerance 2% -o results/effects.nc
     """

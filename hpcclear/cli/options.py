@@ -27,7 +27,7 @@ SET = click.option(
     "overrides",
     multiple=True,
     metavar="KEY.PATH=VALUE",
-    help="Override an entry of the file; repeatable.",
+    help="Override an entry of the file. Repeatable.",
 )
 
 
@@ -76,12 +76,12 @@ class Amount(click.FloatRange):
         return number
 
 
-FRESH = flag("--fresh", "Start anew beside earlier results, never over them.")
+FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
 LIMIT = click.option(
     "--time-limit",
     type=Amount(min=0.0, min_open=True),
     metavar="SECONDS",
-    help="Stop early, resumable, after this time.",
+    help="Stop after this time. The same command resumes.",
 )
 INTERVAL = click.option(
     "--checkpoint-interval",
@@ -90,19 +90,19 @@ INTERVAL = click.option(
     default=5.0,
     show_default=True,
     metavar="SECONDS",
-    help="Save finished samples this often: what a crash costs at most.",
+    help="Save finished samples this often; a crash loses no more than this.",
 )
 POINTS = click.option(
     "--points",
     type=PATH,
-    help="CSV table of designs instead of the study's sampling.",
+    help="CSV table of designs, used instead of the designs of the study.",
 )
 PROGRESS = click.option(
     "--progress",
     type=click.Choice(["auto", "bar", "log", "quiet"]),
     default="auto",
     show_default=True,
-    help="How progress is shown.",
+    help="Display of progress.",
 )
 
 

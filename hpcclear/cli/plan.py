@@ -53,7 +53,9 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     out.print(made)
     if split:
         doubtful = any("?" in one.label for one in plan.rows)
-        text = "accuracy of mean and deviation: tolerance + what is left to the samples"
+        text = (
+            "accuracy of mean and standard deviation: part of the tolerance + part of the samples"
+        )
         out.print(text + ("; ?: cannot be promised" if doubtful else "") + "\n")
     out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
@@ -80,7 +82,7 @@ def _needs(
         rows.append(("reached", row.reached))
     if command == "run":
         text = (
-            f"and {plan.responses} single responses; refused surrogates and limits that are hard to meet take more; "
+            f"and {plan.responses} single responses; refused surrogates and tight constraints need more; "
             "single responses, fits and swarm run on one core"
         )
         rows.append(("simulations", f"{simulations}, {text}"))

@@ -13,13 +13,13 @@ from rich.table import Table
 from rich.text import Text
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report.answer import answer, beside_original
 from hpcclear.report.failures import explained
-from hpcclear.report.figures import labels, motion
+from hpcclear.report.figures import labels
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 
@@ -93,7 +93,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
 
         lives.check(scene)
     states = 2 * (coordinate_count(scene) - scene.bristles)
-    bristles = f" + {scene.bristles} deflections of bristles" if scene.bristles else ""
+    bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
     open_joints = len(scene.clearance_joints())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
     method = integrator_of(scene)
@@ -112,7 +112,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         ("scene hash", scene.hash[:16]),
         ("MPI", _mpi(ranks)),
     ]
-    out.print(table("What would be simulated", rows))
+    out.print(table("Model", rows))
     for text in scene.readings:
         out.print(remark("Note", text))
     for warning in (*locked, *scene.warnings):
@@ -120,7 +120,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     if scene.study is not None:
         out.print(table("Study", _study_rows(scene)))
     if cost and not locked:
-        out.print(table("Cost of a sample, measured here", _cost_rows(scene)))
+        out.print(table("Run time of a sample on this machine", _cost_rows(scene)))
     return not locked
 
 
@@ -164,7 +164,7 @@ def _locked(scene: Scene) -> list[str]:
         return []
     if not varies_geometry(scene):
         raise told[1]
-    return [f"the scene's own design {told[1].reason}; its cost is not measured"]
+    return [f"the scene's own design {told[1].reason}; its run time is not measured"]
 
 
 def _mpi(ranks: "Ranks | None") -> str:
@@ -176,13 +176,13 @@ def _mpi(ranks: "Ranks | None") -> str:
     except InputError:
         return "none found: one process"
     mail = (ranks or alone()).mail
-    met = f"; {mail.size} ranks reached each other" if mail.size > 1 else ""
+    met = f"; {mail.size} ranks connected" if mail.size > 1 else ""
     crowded = (
         f"; {mail.node_size} ranks on {mail.node_cores} cores: more ranks than cores are slower"
         if mail.node_size > mail.node_cores
         else ""
     )
-    return f"{library}{met}; {mail.node_cores} cores here{crowded}"
+    return f"{library}{met}; {mail.node_cores} cores on this node{crowded}"
 
 
 def _study_rows(scene: Scene) -> list[tuple[str, str]]:
@@ -207,8 +207,9 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         from hpcclear.study import lives
 
         assert scene.wear is not None  # by validation
-        text = f"as {scene.wear.lives} lives leave it after {row.cycles:g} revolutions; about {lives.simulations(scene)} "
-        rows.append((f"{row.name} random", f"{text}simulations first"))
+        text = f"clearance after {row.cycles:g} revolutions of {scene.wear.lives} service lives, "
+        text += f"simulated first (about {lives.simulations(scene)} simulations)"
+        rows.append((f"{row.name} random", text))
     return rows
 
 
@@ -230,8 +231,8 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     rows = [("f, steady mean", in_a_line(record))] if record["regime"] else []
     rows += [
         ("force evaluations", f"{evaluations}"),
-        ("time a sample", f"{each * 1e3:.3g} ms on one core, {DEFAULT_LANES} side by side"),
-        ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (kept for the next run)"),
+        ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
+        ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
     ]
     if scene.study is not None:
         rows.append(("hpcclear sample", _all(scene.study.samples, each)))
@@ -239,89 +240,15 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         from hpcclear.study.extent import samples_of
 
         whole = sum(samples_of(scene).values())
-        rows.append(("hpcclear run", f"about {_all(whole, each)}; hpcclear plan tells more"))
+        rows.append(
+            ("hpcclear run", f"about {_all(whole, each)}; hpcclear plan estimates it better")
+        )
     return rows
 
 
 def _all(count: int, each: float) -> str:
-    """What so many samples take, s each."""
+    """Number of samples and their time on one core; `each`: s."""
     return f"{count} samples, {duration(count * each)} of one core"
-
-
-def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
-    """Print the outcome of one response, what it took and where it went."""
-    out = console()
-    status = Status(int(response["status"]))
-    said = f"{status.name.lower()}: {status.message}"
-    rows = [("status", response.attrs.get("ended", said))]
-    if status is not Status.OK:
-        rows.append(("remedy", status.remedy))
-    f, spread = float(response["objective"]), float(response["objective_spread"])
-    if "regime" in response and status.valid:
-        rows.append(("f, steady mean", in_a_line(response, seconds)))
-    words, unit = objective_of(response)
-    half_width = float(response["objective_uncertainty"])
-    if "regime" in response:
-        half_width = float(response["objective_limit"])
-    shown = fitting(labels.with_half_width(f, half_width, unit)) if np.isfinite(f) else "nan"
-    rows.append(("objective f", f"{shown}: {words}"))
-    if np.isfinite(spread):
-        rows.append(("its spread between revolutions", quantity(spread, unit, 2)))
-    rows.append(("force evaluations", f"{int(response['rhs_evaluations'])}"))
-    for k, joint in enumerate(response["joint"].to_numpy()):
-        peak, gap = response["peak_contact_force"].to_numpy()[k], response["mean_gap"].to_numpy()[k]
-        told = f"mean gap {quantity(gap, 'm')}, peak contact force {quantity(peak, 'N')}"
-        rows.append((f"{joint}", told + _at_instants(response, k)))
-    out.print(table("Response", rows + _crank(response)))
-    if half_width > SENSITIVE * abs(f) > 0.0 and "regime" not in response:
-        out.print(remark("Warning", SENSITIVE_WORDS.format(half_width / abs(f))))
-    for text in flag_remarks(int(response["flags"])):
-        out.print(remark("Mind", text))
-    out.print(f"written  {output}")
-
-
-def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
-    """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
-    if "crank_speed" not in response:
-        return []
-    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
-    turns, time = motion.turns(response), response["time"].to_numpy()
-    if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
-        return []  # it is prescribed
-    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)
-    told = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
-    means = 60.0 / np.diff(ends)
-    if len(means) > 1:
-        told += f"; drift of the last revolution {means[-1] - means[-2]:+.2g} rpm"
-    return [("crank speed", told)]
-
-
-def _at_instants(response: xr.Dataset, joint: int) -> str:
-    """The largest stored force of the averaged revolutions, which the peak is of, where the true peak lies between instants."""
-    if "transient_turns" not in response.attrs:
-        return ""
-    turned, peak = motion.turns(response), float(response["peak_contact_force"][joint])
-    averaged = turned - turned[:1] > int(response.attrs["transient_turns"]) - 1e-6
-    shown = float(response["contact_force"].to_numpy()[averaged, joint].max(initial=0.0))
-    if not peak > shown * 1.001 or not averaged.any():
-        return ""
-    return f" (between instants; largest stored value of the averaged revolutions {quantity(shown, 'N')})"
-
-
-REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
-
-SENSITIVE = 0.01
-"""Half-width over f beyond which f is reported as sensitive to initial conditions."""
-
-SENSITIVE_WORDS = (
-    "f is sensitive to initial conditions or to the tolerance: by replicas with other starts its half-width is {:.0%} of f. "
-    "Set numerics.target_error for a mean with a confidence interval"
-)
-
-
-def flag_remarks(flags: int) -> list[str]:
-    """A sentence for each flag that is set."""
-    return [text for flag, text in REMARKS.items() if flags & flag]
 
 
 def _load(found: "Finished") -> list[tuple[str, str]]:
@@ -332,7 +259,7 @@ def _load(found: "Finished") -> list[tuple[str, str]]:
 
 
 def describe_statistics(found: "Finished") -> None:
-    """Print mean and deviation of f with the error of the mean, failures and load of a streamed Monte Carlo."""
+    """Print mean and standard deviation of f, the error of the mean, failures and load of a streamed Monte Carlo."""
     out, content = console(), found.content
     by_status = content["samples_by_status"]
     total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
@@ -344,22 +271,21 @@ def describe_statistics(found: "Finished") -> None:
         rows.append(("f", words))
         shown = f"{quantity(mean, unit, 6)}, standard error {quantity(error, unit, 2)}"
         rows.append(("mean of f", shown))
-        rows.append(("deviation of f", quantity(deviation, unit)))
+        rows.append(("std. deviation of f", quantity(deviation, unit)))
         rows.append(("half-width of a single f", labels.NOT_CHECKED))
     out.print(table("Statistics", rows + _load(found)))
     out.print(f"statistics {found.output}")
 
 
 def describe_study(place: Path) -> None:
-    """Print the ends of its fronts beside the original, the answer of a finished study in ten lines, what it took, and
-    where its files are."""
+    """Print the ends of its fronts beside the baseline, the answer of a finished study, its run time, and its files."""
     kinds = ("samples", "sensitivity", "kriging", "verification", "chaos", "timing")
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
     for case, designs, rows in beside_original(found["verification"]):
         beside = Table(
-            title=f"Case {case}, directly simulated, against the original",
+            title=f"Case {case}: simulated designs against the baseline",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
         beside.add_column(
@@ -375,8 +301,8 @@ def describe_study(place: Path) -> None:
     spent = np.sum(
         [timing[name].sum("stage") for name in ("busy", "idle", "compile", "write")], axis=0
     )
-    lines.append(("took", f"{duration(float(spent.max()))} on {timing.sizes['rank']} ranks"))
-    out.print(table("The answer", lines))
+    lines.append(("run time", f"{duration(float(spent.max()))} on {timing.sizes['rank']} ranks"))
+    out.print(table("Result", lines))
     out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
 
 
@@ -398,7 +324,7 @@ def describe_samples(found: "Finished") -> None:
     if len(good) and np.isfinite(spread).any():
         rows.append(
             (
-                "spread of f between revolutions",
+                "cycle-to-cycle std. dev.",
                 f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f",
             )
         )
@@ -406,7 +332,10 @@ def describe_samples(found: "Finished") -> None:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
     latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
     rows.append(
-        ("latched", f"{latched} samples in which a joint did not lift off for a whole revolution")
+        (
+            "no lift-off",
+            f"{latched} samples in which a joint stayed in contact for a whole revolution",
+        )
     )
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())

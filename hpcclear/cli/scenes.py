@@ -37,7 +37,7 @@ TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; r
 )
 @of_one_process
 def init(file: Path, four_stroke: bool) -> int:
-    """Write an engine to start from: every table, each number with its unit, and a small study.
+    """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
     An existing file is never overwritten.
 
@@ -56,20 +56,20 @@ def init(file: Path, four_stroke: bool) -> int:
     return Exit.DONE
 
 
-@click.command(short_help="Say what a file would simulate, at what cost.")
+@click.command(short_help="Validate an input file and estimate run time.")
 @with_scene
-@click.option("--cost/--no-cost", default=True, help="Simulate one sample to measure its cost.")
+@click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
 @click.option(
     "--sketch",
     type=PATH,
     metavar="FIGURE",
-    help="Draw the mechanism to this file (png, svg, pdf): names, axes, signs.",
+    help="Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
 )
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
-    """Validate a scene or study and say what would be simulated.
+    """Validate an input file and estimate run time.
 
-    Exit code 1 if the file's own design cannot turn while its study varies that, 2 if none can.
-    Under mpiexec or srun all ranks meet in MPI first: a launcher that does not belong to the MPI library ends with exit code 2.
+    Exit code 1 if the file's own design cannot turn but its study varies the geometry; 2 if no design can.
+    Under mpiexec or srun all ranks connect first. A launcher of another MPI library gives exit code 2.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
@@ -106,20 +106,19 @@ def _draw(scene: "Scene", sketch: Path) -> None:
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
-@click.command(short_help="Simulate one response.")
+@click.command(short_help="Simulate one design.")
 @with_scene
 @output_option("NetCDF file to write.")
 @of_one_process
 def simulate(written: Written, output: Path) -> int:
-    """Simulate one response: time series, forces, energies, objective.
+    """Simulate one design: bearing forces, torque, motion, energies, objective, as time series.
 
-    Exit code 1 if the simulation did not reach its end, 4 if f is not known to numerics.target_error; what there is
-    of it is written.
+    Exit code 1 if the simulation failed, 4 if f did not reach numerics.target_error. The file is written all the same.
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
     from hpcclear.base.outcome import Flag, Status
-    from hpcclear.cli.printing import describe_response
+    from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
     from hpcclear.dynamics.steady.telling import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
@@ -151,7 +150,7 @@ def simulate(written: Written, output: Path) -> int:
 @TRUST
 @of_one_process
 def report(directory: Path, trust: bool) -> int:
-    """Write figures and a self-contained HTML page about a directory of results.
+    """Write figures and a self-contained HTML page from a directory of results.
 
     Example: hpcclear report results/quickstart
     """
@@ -163,22 +162,22 @@ def report(directory: Path, trust: bool) -> int:
     return Exit.DONE
 
 
-@click.command(short_help="Simulate again, and compare bit by bit.")
+@click.command(short_help="Repeat simulations and compare bit by bit.")
 @click.argument("place", type=PATH)
 @click.option(
     "--samples",
     type=click.IntRange(1),
     default=16,
     show_default=True,
-    help="Samples of each file, spread over it.",
+    help="Number of samples to repeat of each file.",
 )
 @TRUST
 @of_one_process
 def reproduce(place: Path, samples: int, trust: bool) -> int:
-    """Simulate some of what result files hold again, from the scenes they carry, and compare to the last bit.
+    """Repeat some simulations of a result from the scene in its file, and compare bit by bit.
 
-    PLACE is a file or a directory of results. Versions and processors that differ from those that made them are named. Exit
-    code 1 if anything is different or cannot be read.
+    PLACE is a result file or a directory of results. Other versions and processors than those of the result are listed.
+    Exit code 1 if anything differs or cannot be read.
 
     Example: hpcclear reproduce results/quickstart
     """
@@ -201,9 +200,9 @@ def reproduce(place: Path, samples: int, trust: bool) -> int:
 @click.argument("directory", type=PATH)
 @of_one_process
 def crate(directory: Path) -> int:
-    """Write what a directory of results is, and what made it, as a Process Run Crate: DIRECTORY/ro-crate-metadata.json.
+    """Write a description of the results and their origin for an archive: a Process Run Crate.
 
-    A file that is damaged is left out and named; the exit code is 1 then.
+    The file is DIRECTORY/ro-crate-metadata.json. Damaged result files are left out and listed, with exit code 1.
 
     Example: hpcclear crate results/quickstart
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
 
 
-@click.command(short_help="Carry a whole study.")
+@click.command(short_help="Run a complete study.")
 @with_scene
 @directory_option("Directory for the results.")
 @FRESH
@@ -37,7 +37,7 @@ def run(
     time_limit: float | None,
     progress: Any,
 ) -> int:
-    """Carry a whole study: sensitivity, surrogates, robust optimisation, verified designs.
+    """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
     Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
     """
@@ -59,10 +59,10 @@ def run(
     return on_ranks(program, time_limit, STUDYING)
 
 
-@click.command(short_help="Show what accuracy costs in time.")
+@click.command(short_help="Plot accuracy against run time.")
 @with_scene
 @directory_option("Directory for accuracy.nc and the figures.")
-@flag("--quick", "A look in about a minute instead of the whole picture.")
+@flag("--quick", "Measure with fewer points, in about a minute.")
 @FRESH
 @LIMIT
 def accuracy(
@@ -72,9 +72,9 @@ def accuracy(
     fresh: bool,
     time_limit: float | None,
 ) -> int:
-    """Show what accuracy costs in time: tolerance and revolutions, integration, averaging, surrogates, Monte Carlo, ranks.
+    """Plot accuracy against run time: tolerance, revolutions, surrogate, Monte Carlo samples and number of ranks.
 
-    Each figure is written when its panel is done, and what is done is kept: the same command goes on from there.
+    Each figure is written as soon as its panel is measured. After a stop the same command resumes.
 
     Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
     """
@@ -95,23 +95,23 @@ def accuracy(
     return on_ranks(program, time_limit)
 
 
-@click.command(short_help="Say what a run will cost.")
+@click.command(short_help="Estimate the cost of a run.")
 @with_scene
 @click.option(
     "--error",
     type=Amount(0.0, 0.5, min_open=True),
     metavar="RELATIVE",
-    help="Error of the objective to plan for; by default the settings of the file.",
+    help="Target error of the objective, relative. By default the settings of the file are used.",
 )
 @click.option(
     "--ranks",
     "workers",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Ranks to plan for; by default those it runs on.",
+    help="Number of ranks to plan for. By default those of this run.",
 )
 def plan(written: Written, error: float | None, workers: int | None) -> int:
-    """Measure some samples and say what a run costs: settings, core-hours, ranks, wall time.
+    """Estimate core-hours and wall time of a run from a few measured samples.
 
     Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
     """

@@ -95,15 +95,13 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
         ("life, revolutions", _spread(content, "lifetime_quantile", cycles)),
         ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).min()))),
     ]
-    limits = (
-        f"95 % limits {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
-    )
-    rows.append((f"survive {cycles:.4g}", f"{float(last['survival']):.3g} of the lives ({limits})"))
+    limits = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
+    rows.append((f"survive {cycles:.4g}", f"{float(last['survival']):.3g} of the runs ({limits})"))
     if "exceedance" in content:
         for name in content["joint"].to_numpy():
             one = last.sel(joint=name)
             low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])
-            text = f"{float(one['exceedance']):.3g} (95 % limits {low:.3g} to {high:.3g})"
+            text = f"{float(one['exceedance']):.3g} (95 % CI {low:.3g} to {high:.3g})"
             rows.append((f"P(clearance {name} > limit)", text))
     return rows
 

@@ -22,11 +22,7 @@ def evaluator_of(
 
 def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> Records:
     """Simulate all points here and now; records in the points' order (n,)."""
-    return records_by(evaluator_of(scene, points, lanes), points)
-
-
-def records_by(evaluator: Evaluator | SteadyEvaluator, points: Points) -> Records:
-    """Records of all points by an evaluator at hand, in their order (n,)."""
+    evaluator = evaluator_of(scene, points, lanes)
     evaluator.submit(np.arange(len(points)), points.values)
     done = []
     while evaluator.pending:

@@ -110,6 +110,8 @@ class Evaluator:
         half-width; by default `KICKS` with ``numerics.uncertainty``, else none.
     objective : Objective
         Of which that half-width is.
+    recorder : Lanes, optional
+        By which samples are simulated, instead of lanes of its own.
 
     Raises
     ------
@@ -124,6 +126,7 @@ class Evaluator:
         lanes: int = DEFAULT_LANES,
         kicks: Sequence[int] | None = None,
         objective: Objective = MEAN_GAP,
+        recorder: Lanes | None = None,
     ) -> None:
         self.scene = scene
         self.lanes = lanes
@@ -134,7 +137,10 @@ class Evaluator:
         self._copies = 1 + len(self._kicks)
         self._objective = objective
         problem = problem_of(scene)
-        self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+        if recorder is not None:
+            self._lanes: Lanes | ClosedForm = recorder
+        else:
+            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}
@@ -148,7 +154,10 @@ class Evaluator:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         made = Points(self._columns.names, points, self._columns.paths)
         par = parameters(self.scene, made)
-        start = start_states(self.scene, par, made)
+        self.queue(index, par, start_states(self.scene, par, made))
+
+    def queue(self, index: Integers, par: Array, start: Start) -> None:
+        """Queue samples by their indices (m,), kernel parameters (m, PARAMETERS) and m starts."""
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
             par, start, labels = with_copies(

@@ -9,17 +9,11 @@ from numba import typeof
 from hpcclear.base.arrays import Array, Booleans, Integers, aligned
 from hpcclear.base.beside import compiled_beside, note_compiled
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation import lobatto
-from hpcclear.dynamics.collocation.lobatto import STAGES
-from hpcclear.dynamics.collocation.stepper import make_collocation_stepper
-from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.explicit.steps import explicit_code
-from hpcclear.dynamics.implicit import radau
 from hpcclear.dynamics.implicit.abreast import abreast_code
 from hpcclear.dynamics.implicit.columns import new_columns
-from hpcclear.dynamics.implicit.memory import LANES
-from hpcclear.dynamics.implicit.stiff import blocks_of, implicit_code
+from hpcclear.dynamics.implicit.memory import COLUMNS
 from hpcclear.dynamics.linkage.observe import observe, observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
 from hpcclear.dynamics.problem import Problem
@@ -31,6 +25,8 @@ from hpcclear.dynamics.stepping.settings import (
     MOTION,
     MOTION_OF_EIGHT,
     NEXT_SLOT,
+    OBSERVING,
+    OBSERVING_EIGHT,
     PROFILE,
     RECORDED,
     SLOTS,
@@ -42,9 +38,8 @@ from hpcclear.dynamics.views import Outcome, Parameters, Start
 NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
-OBSERVING = f"{observing_code.__module__}:{observing_code.__name__}"
+OBSERVER = f"{observing_code.__module__}:{observing_code.__name__}"
 ABREAST = f"{abreast_code.__module__}:{abreast_code.__name__}"
-IMPLICIT = f"{implicit_code.__module__}:{implicit_code.__name__}"
 
 
 class Lanes:
@@ -57,6 +52,9 @@ class Lanes:
         Lanes; 1 for a single response.
     record : numpy.ndarray, optional
         Buffer (rows, columns) for every accepted step of the first sample of the queue, which runs in lane 0.
+    observed : Effects, optional
+        With which the same motion is run a second time while that sample is recorded, for its works and what `observe` returns.
+        No other number depends on it.
 
     Raises
     ------
@@ -64,13 +62,18 @@ class Lanes:
         If the problem's coordinates do not fit the stepper.
     """
 
-    def __init__(self, problem: Problem, width: int, record: Array | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        width: int,
+        record: Array | None = None,
+        observed: at.Effects | None = None,
+    ) -> None:
         n = problem.coordinates
-        width = 1 if problem.collocation else width
         self.problem = problem
         self.width = width
         self.record = np.zeros((0, columns(n))) if record is None else record
-        bank = aligned((at.STAGES + tab.STAGES * at.MAX_COORDINATES) * width)
+        bank = aligned((at.STAGES + problem.tableau.stages * at.MAX_COORDINATES) * width)
         bank[at.WORK * width : at.STAGES * width] = (
             1.0  # parameters: a resting lane divides by them
         )
@@ -81,13 +84,12 @@ class Lanes:
             book=np.zeros(at.BOOK * width),
         )
         implicit = problem.implicit != "never"
-        memory = radau.new_memory if problem.single else new_columns
-        self._memory = memory(width) if implicit else None
-        if problem.collocation:
-            self._memory = lobatto.new_memory()
-        effects = problem.effects._replace(sliding=None if self._memory is None else 1)
+        self._memory = new_columns(width) if implicit else None
+        sliding = None if self._memory is None else 1
+        effects = problem.effects._replace(sliding=sliding)
+        self._observed = None if observed is None else observed._replace(sliding=sliding)
         self._rules = at.rules_of(effects)
-        measures = at.measures_of(problem.effects)
+        measures = at.measures_of(observed or problem.effects)
         self._method = at.Method(
             problem.settings().rows,
             problem.tableau.packed(),
@@ -95,12 +97,8 @@ class Lanes:
             measures,
             numbers_of(self._rules, width, n, len(measures)),
         )
-        self._codes: tuple[Any, ...] = (0,) if problem.collocation else (n, Codes(0, 0, 0))
-        self._step = (
-            make_collocation_stepper()
-            if problem.collocation
-            else make_stepper(width, implicit=implicit)
-        )
+        self._codes = Codes(0, 0, 0)
+        self._step = make_stepper(width, implicit=implicit)
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
         self._accept_queue(
@@ -111,40 +109,44 @@ class Lanes:
 
     @property
     def _widths(self) -> tuple[int, int]:
-        """Lanes of its motions, 0 for none: of all lanes, and of eight where evaluations of one lane stand side by side."""
-        all_lanes = 0 if self.problem.collocation else self.width
-        return all_lanes, LANES if self._memory is not None else 0
+        """Lanes of its motions, 0 for none: of all lanes, and of eight stiff ones."""
+        return self.width, 0 if self._memory is None else COLUMNS
 
     @property
     def motions(self) -> list[str]:
         """Its motions as `hpcclear.base.beside` names what another process may compile."""
-        widths = [width for width in self._widths if width]
-        return [f"{TEXT}:{self.problem.motion_text(self._effects, width)}" for width in widths]
+        kinds = [effects for effects in (self._effects, self._observed) if effects is not None]
+        texts = [
+            self.problem.motion_text(effects, width)
+            for effects in kinds
+            for width in self._widths
+            if width
+        ]
+        return [f"{TEXT}:{text}" for text in texts]
 
     def _compile(self) -> None:
         """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
-        problem, n, effects = self.problem, self.problem.coordinates, self._effects
-        stiff = self._memory is not None and not problem.collocation
-        blocks = not problem.collocation
-        widths = self._widths
+        problem, effects, widths = self.problem, self._effects, self._widths
+        stiff = self._memory is not None
         apart = [SPECIAL, *self.motions]
-        apart += [OBSERVING] if len(self.record) else []
-        beside = f"{IMPLICIT}:{blocks_of(n)}" if problem.single else ABREAST
-        with compiled_beside([beside] if stiff else apart):  # either is half of it
-            explicit = explicit_code(self.width).address if blocks else 0
+        apart += [OBSERVER] if len(self.record) else []
+        with compiled_beside([ABREAST] if stiff else apart):  # either is half of it
+            explicit = explicit_code(self.width, problem.tableau.stages).address
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
             if stiff:  # implicit steps take as long as all of this together
                 special_code()
                 for width in widths:
                     problem.motion(effects, width)
-        special = special_code().address
-        if blocks:
-            implicit = self._implicit_address() if stiff else 0
-            self._codes = (n, Codes(special, explicit, implicit))
-        else:
-            self._codes = (special,)
+        implicit = abreast_code().address if stiff else 0
+        self._codes = Codes(special_code().address, explicit, implicit)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        self._observer = int(self._method.numbers[MOTION])
+        if self._observed is not None:
+            for row, width in zip((OBSERVING, OBSERVING_EIGHT), widths, strict=True):
+                address = problem.motion(self._observed, width).address if width else 0
+                self._method.numbers[row] = address
+            self._observer = int(self._method.numbers[OBSERVING])
         note_compiled(self.motions)
         if self._rules.profile:
             self._method.numbers[PROFILE] = profile_code(effects, self.width).address
@@ -153,27 +155,20 @@ class Lanes:
         )
 
     def observe(self, par: Array, states: Array, contacts: Array, times: Array) -> Array:
-        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion that the lanes step with.
+        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion with the observed effects.
 
         Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
         the first step.
         """
-        row, width = (MOTION_OF_EIGHT, LANES) if self.problem.collocation else (MOTION, self.width)
         out = np.zeros((len(times), self.problem.coordinates + at.RATES))
         states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
-        motion = int(self._method.numbers[row])
-        observe(motion, par, self.problem.tables, states, contacts, times, out, width)
+        observe(self._observer, par, self.problem.tables, states, contacts, times, out, self.width)
         return out
-
-    def _implicit_address(self) -> int:
-        """Of the implicit steps: a response's stages stand side by side, the samples of an ensemble."""
-        n, single = self.problem.coordinates, self.problem.single
-        return int((implicit_code(blocks_of(n)) if single else abreast_code()).address)
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:
         arrays = (self._rules, self._block, self._queue, self._method)
         memory = () if self._memory is None else (self._memory,)
-        return (*self._codes, *arrays, self.record, *memory, budget)
+        return (self.problem.coordinates, self._codes, *arrays, self.record, *memory, budget)
 
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
         count = len(labels)
@@ -265,13 +260,17 @@ class Lanes:
     @property
     def record_full(self) -> bool:
         """Whether the record must be emptied before the stepper can go on."""
-        left = len(self.record) - int(self.counters[RECORDED])
-        return len(self.record) > 0 and left < (STAGES if self.problem.collocation else 1)
+        return 0 < len(self.record) == int(self.counters[RECORDED])
 
     def take_record(self) -> Array:
-        """The recorded rows since the last call (a copy); the record is empty afterwards."""
+        """The recorded rows since the last call (a copy); the record is empty afterwards.
+
+        Once the recorded sample is over, those that go on are no longer observed.
+        """
         rows = self.record[: int(self.counters[RECORDED])].copy()
         self.counters[RECORDED] = 0
+        if not self.running[0] or self._block.book[at.SAMPLE * self.width] != 0.0:
+            self._method.numbers[[OBSERVING, OBSERVING_EIGHT]] = 0
         return rows
 
     def step(self, budget: int) -> bool:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.laws.declared import MOST_NUMBERS
 
 TURN = 6.283185307179586  # rad
 
@@ -148,7 +147,7 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
 ) = range(30)
 JOINT_ROWS = 30
-LAW_NUMBERS = MOST_NUMBERS
+LAW_NUMBERS = 8
 """Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
 JOINT_BLOCKS = 30  # of all joints, one behind the other
 # within a joint's block
@@ -200,18 +199,16 @@ GAP_RATE = FORCE + MAX_JOINTS
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-FORCE_KINKS = DRIVE_MOMENT + 1
+FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of the slider, or of a point along x; for responses only
+FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
+FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
+SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
+FORCE_KINKS = SLIDING_POWERS + MAX_JOINTS
 """Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
 sides of friction's ramp."""
 LOW_KINKS = FORCE_KINKS + MAX_JOINTS
 HIGH_KINKS = LOW_KINKS + MAX_JOINTS
-FOLLOWED_ACCELERATION = (
-    HIGH_KINKS + MAX_JOINTS
-)  # of the slider, or of a point along x; for responses only
-FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
-FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
-SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-ANGLES = SLIDING_POWERS + MAX_JOINTS
+ANGLES = HIGH_KINKS + MAX_JOINTS
 """Of each joint cosine and sine of the contact's angle in the bearing, then in the journal; these and what follows are for
 profiles of wear only, and stand last, so that others need not pass over them."""
 PROFILES = (
@@ -246,9 +243,19 @@ MEASURES = (
 )
 INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
-The explicit, implicit and collocation steppers, the books of a lane and its outcome read this."""
+The explicit and implicit steppers, the books of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
+
+
+def _mask(largest: int) -> int:
+    """All bits that numbers up to `largest` have: taken with it a number is not below 0, and no other number."""
+    return (1 << largest.bit_length()) - 1
+
+
+JOINT_MASK = _mask(MAX_JOINTS - 1)
+COORDINATE_MASK = _mask(MAX_COORDINATES - 1)
+MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 
 def measures_of(effects: Effects) -> np.ndarray:

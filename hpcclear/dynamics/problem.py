@@ -8,7 +8,6 @@ from typing import Any, cast
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
@@ -90,8 +89,6 @@ class Problem:
     """torque_table and load_table: cubic cells of a periodic table, 4 coefficients a cell."""
     implicit: str = "never"
     """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
-    collocation: bool = False
-    """Whether one sample after the other is integrated by Lobatto collocation, its stages in the lanes."""
     cycle: float = at.TURN
     """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
     parameter_rows: int = at.OWN
@@ -102,8 +99,6 @@ class Problem:
     """Cubic cells of a linkage's tables."""
     chosen: tuple[int, ...] = ()
     """Places of the joints whose gaps count for f; none for all."""
-    single: bool = False
-    """Whether it is for one response, whose implicit steps have its stages side by side; those of ensembles go abreast."""
     from_rest: bool = False
     """Whether the body that a torque drives may begin at rest."""
 
@@ -306,26 +301,6 @@ def _bars_of(scene: Scene) -> Mechanism:
     return planar.linkage_of(scene).mechanism if scene.is_planar else slider_crank_mechanism(scene)
 
 
-def takes_collocation(scene: Scene) -> bool:
-    """Whether samples are integrated one by one, by collocation: where ``numerics.method`` names it.
-
-    "auto" never chooses it, so that a response and the sample of the same design are the same number.
-
-    Raises
-    ------
-    InputError
-        If it is named with Baumgarte's formulation, which has Runge-Kutta pairs alone.
-    """
-    if scene.numerics.method != "lobatto":
-        return False
-    if scene.numerics.formulation != "minimal":
-        raise InputError(
-            "numerics.method", "lobatto", "works in minimal coordinates only",
-            'set numerics.formulation = "minimal" or another method',
-        )  # fmt: skip
-    return True
-
-
 def _cells_of_curves(
     linkage: Linkage, tables: dict[str, Any], cells: Callable[[Any], Array]
 ) -> tuple[Array, ...]:
@@ -341,10 +316,8 @@ def _cells_of_curves(
     )
 
 
-def problem_of(
-    scene: Scene, *, series: bool = False, ledger: bool | None = None, single: bool = False
-) -> Problem:
-    """What is common to all samples of a scene; `single`: it is for one response, not for an ensemble."""
+def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+    """What is common to all samples of a scene."""
     e = scene.effects
     torque = getattr(scene.drive, "torque", None)
     drive: Any = main_drive(planar.tables_of(scene)) if scene.is_planar else scene.drive
@@ -372,8 +345,6 @@ def problem_of(
         torque_table=cells(torque) if isinstance(torque, tuple) else None,
         load_table=cells(e.slider_load) if isinstance(e.slider_load, tuple) else None,
         implicit=implicit_method(scene),
-        collocation=takes_collocation(scene),
-        single=single,
         cycle=at.TURN if linkage is None else linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
         linkage=linkage,
@@ -387,7 +358,5 @@ def integrator_of(scene: Scene) -> str:
     """Name of the method that a scene's responses and samples are integrated by."""
     if coordinate_count(scene) == 0:
         return "closed form"
-    if takes_collocation(scene):
-        return "lobatto"
     name = tableau_of(scene).name
     return {"never": name, "stiff": f"{name} and radau", "always": "radau"}[implicit_method(scene)]

@@ -5,25 +5,29 @@ body does, at most `most_kept` steps of an unfinished revolution are held.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Booleans, Records
-from hpcclear.base.beside import compiled_beside
+from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import failed
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.problem import refused_of
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.problem import effects_of, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import kicked, scales
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Rates
 from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+ITSELF = Points((), np.empty((1, 0)), ())
+"""A scene as its only design."""
 
 CHUNK = 8192
 """Accepted steps between two visits to the stepper."""
@@ -69,18 +73,30 @@ class Recording:
     scene : Scene
     copy : int
         Perturb the start in the direction of this number (`hpcclear.dynamics.steady.copies`); 0 does not.
+    kicks, objective
+        Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluator.Evaluator`.
     """
 
-    def __init__(self, scene: Scene, copy: int = 0) -> None:
-        self._scene = scene
-        self.problem = problem_of(scene, ledger=True, series=True)
+    def __init__(
+        self,
+        scene: Scene,
+        copy: int = 0,
+        kicks: Sequence[int] = (),
+        objective: Objective = MEAN_GAP,
+    ) -> None:
+        self.problem = problem_of(scene)
         self._par = parameters(scene)
         self._start = start_states(scene, self._par, walk=False)
         self._refused = refused_of(scene) if scene.is_planar else None
         if copy:
             self._start = kicked(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
-        self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer)
+        observed = effects_of(scene, series=True, ledger=True)
+        self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed)
+        self._evaluator = Evaluator(
+            scene, ITSELF, kicks=kicks, objective=objective, recorder=self._lanes
+        )
+        self._done: list[Records] = []
 
     @property
     def par(self) -> Array:
@@ -94,18 +110,14 @@ class Recording:
         Of a linkage that cannot turn there is the start alone.
         """
         lanes = self._lanes
-        if self._refused is not None:
-            lanes.step(0)  # compiles what observes the start
-            yield self._first_row()
-            return
-        lanes.queue(self._par, self._start, np.zeros(1, np.int64))
-        ensemble = Lanes(problem_of(self._scene), DEFAULT_LANES)
-        with compiled_beside(ensemble.motions):  # which gives the scalars
-            lanes.step(0)
+        lanes.step(0)  # compiles what observes the start
         yield self._first_row()
+        if self._refused is not None:
+            return
+        self._evaluator.queue(np.zeros(1, np.int64), self._par, self._start)
         while lanes.pending:
             while lanes.pending and not lanes.record_full:  # by steps, not by the clock
-                lanes.advance(0.2)
+                self._done.append(self._evaluator.advance(0.2))
             yield lanes.take_record()
 
     def _first_row(self) -> Array:
@@ -125,12 +137,10 @@ class Recording:
         return out[:, :n], Rates(out[:, n:])
 
     def record(self) -> Records:
-        """The outcome (1,) of the recorded sample, once all chunks were taken."""
+        """The outcome (1,) of the recorded sample, with a half-width if replicas run beside it, once all chunks were taken."""
         if self._refused is not None:
             return failed(0, self._refused[0])
-        labels, outcome, par = self._lanes.collect()
-        told, worn = responses_told(self.problem), bool(self.problem.effects.wear)
-        return outcome_records(labels, outcome, par, told, worn)
+        return np.concatenate(self._done)
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY, Status
+from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bending import bent_motion
 from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
-from hpcclear.dynamics.evaluation import evaluate_records, records_by
-from hpcclear.dynamics.evaluator import KICKS, Evaluator, alone, outcome_records, responses_told
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import KICKS, alone, outcome_records, responses_told
 from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.layout import TURN
 from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
@@ -26,14 +26,13 @@ from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
-from hpcclear.dynamics.recorded import Piece, Recording, Steps, pieces
+from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, Steps, pieces
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
-from hpcclear.scene.points import Points
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
@@ -121,12 +120,14 @@ def simulate(
     named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
     still = coordinate_count(scene) == 0
-    times, data, record = _closed_form(scene) if still else _integrated(scene, copy)
+    if still:
+        times, data, record = _closed_form(scene)
+    else:
+        kicks = () if copy or steady is not None else _kicks(scene, checked)
+        times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
-    elif not (still or copy):
-        record = _sample(scene, objective, checked, record)
     half_width = record["objective_uncertainty"]  # of the objective already
     record = asked(record, objective)
     record["objective_uncertainty"] = half_width
@@ -150,22 +151,11 @@ def simulate(
     )
 
 
-def _sample(scene: Scene, objective: Objective, checked: bool, series: Records) -> Records:
-    """The record (1,) of the scene as the only sample of an ensemble.
-
-    The motion of the time series is compiled with works and powers in it. Products that these share with the forces are
-    rounded there (else they stand in a fused multiply-add), so that in some linkages its last bits are other ones; where the
-    motion is chaotic it parts from the sample after some impacts. Its f is no worse, but it is not the sample's.
-    """
-    if not Status(int(series["status"][0])).valid:
-        return series  # numbers of a motion that the series do not show would be of another one
-    kicks: tuple[int, ...] = ()
+def _kicks(scene: Scene, checked: bool) -> tuple[int, ...]:
+    """Perturbations of the replicas beside a response."""
     if scene.numerics.uncertainty:
-        kicks = KICKS  # as for any sample
-    elif checked:
-        kicks = alone(scene.numerics.rtol)
-    evaluator = Evaluator(scene, _ITSELF, kicks=kicks, objective=objective)
-    return records_by(evaluator, _ITSELF)
+        return KICKS  # as for any sample
+    return alone(scene.numerics.rtol) if checked else ()
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
@@ -209,11 +199,7 @@ def _steady(scene: Scene) -> Records | None:
     """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
-    return evaluate_records(scene, _ITSELF)
-
-
-_ITSELF = Points((), np.empty((1, 0)), ())
-"""The scene as the only design."""
+    return evaluate_records(scene, ITSELF)
 
 
 def _shown(scene: Scene, steady: Records) -> Scene:
@@ -240,9 +226,8 @@ def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     return *found, record
 
 
-def _integrated(scene: Scene, copy: int) -> tuple[Array, dict[str, Array], Records]:
+def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene that is integrated."""
-    recording = Recording(scene, copy)
     count = scene.output.instants_per_revolution
     problem = recording.problem
     parts: list[dict[str, Array]] = []

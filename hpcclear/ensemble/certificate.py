@@ -4,11 +4,11 @@ A certificate is a generator. It yields the variants it wants simulated, a varia
 replicates of the points; it is sent what came of them, and returns what it found. It knows no scene: effects are numbers.
 
 Singly at first: replicates double until each effect's change is surely within the tolerance, surely beyond it, or cannot be
-told. What is within it singly is then left out together, the cheapest set first, and only a set whose own change is within
-the tolerance is recommended. Where a set fails, pairs tell which of its effects are more together than alone.
+told. What is within it singly is then left out together; where that fails, pairs tell which effects are more together than
+alone. What is recommended has been simulated: the most effects whose own change together is within the tolerance.
 
-What an effect saves depends on the others: a film saves nothing while another one calls for implicit steps. So sets without
-any come first.
+What an effect saves depends on the others: a film saves nothing while another one calls for implicit steps. So where leaving
+out all rids the scene of these, what is dearer by itself goes with the others first.
 """
 
 import itertools
@@ -33,17 +33,8 @@ Variant = tuple[int, ...]
 FIRST = 16
 """Replicates that are looked at first."""
 
-MOST_TOGETHER = 12
-"""Effects that sets are made of at most: those that save the most."""
-
-TRIES = 8
-"""Sets that are simulated before the best single effect is taken."""
-
 MOST_PAIRS = 10
-"""Pairs that are simulated at most, when a set has failed."""
-
-LEAST_SAVING = 0.99
-"""What leaving an effect out counts as at most: it is left out even where it costs no evaluations."""
+"""Pairs that are simulated at most, when all together have failed."""
 
 MORE_WORK = 1.02
 """Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
@@ -53,7 +44,7 @@ LEAST_WORK = 1e-3
 
 MUCH_LESS = 0.9
 """Work of a set over that of another below which it is cheaper: work is not known better. Of sets alike the one with more
-effects is tried and recommended, then the one whose effects come first: an effect stands before what it has beyond a model."""
+effects is recommended, then the one whose effects come first: an effect stands before what it has beyond a model."""
 
 SINGLY = 0.6
 """Of the budget that single effects may take; the rest is for sets."""
@@ -201,9 +192,8 @@ def certificate(plan: Plan) -> Asking:
     yield from _told(book, [()], plan.budget)
     yield from _told(book, singles, SINGLY * plan.budget)
     good = [one for one in singles if book.verdict(one) is Verdict.WITHIN]
-    good = sorted(sorted(good, key=lambda one: (book.work(one), one))[:MOST_TOGETHER])
-    recommended = yield from _together(book, [one[0] for one in good])
-    return Certificate(tuple(book.seen), recommended, book)
+    yield from _together(book, [one[0] for one in good])
+    return Certificate(tuple(book.seen), _recommended(book), book)
 
 
 def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
@@ -241,27 +231,50 @@ def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> 
     return [one for one in pending if one in kept]
 
 
-def _together(book: Book, good: list[int]) -> Generator[list[Asked], list[Seen], Variant]:
-    """The cheapest set of effects, each within the tolerance singly, that is so together."""
-    failed: list[Variant] = []
-    budget = book.plan.budget
-    while len(failed) < TRIES and (not failed or book.spent() <= budget):
-        best = _cheapest(book, good, failed)
-        if best is None:
-            break
-        yield from _told(book, [best], budget)
-        passes = book.verdict(best) is Verdict.WITHIN
-        if passes and book.work(best) <= MORE_WORK:
-            break
-        if not passes and not failed and len(best) > 2 and book.spent() <= budget:
-            pairs = [p for p in itertools.combinations(best, 2) if book.plan.possible(p)]
-            yield from _told(book, pairs[:MOST_PAIRS], budget)
-        failed.append(best)
-    return _best_known(book)
+def _together(book: Book, good: list[int]) -> Part:
+    """Leave out all at once what is within the tolerance singly, pairs where that fails; then all but what pairs refuse."""
+    plan = book.plan
+    cheap = [k for k in good if book.work((k,)) <= MORE_WORK]
+    explicit = plan.implicit(()) and not plan.implicit(_set(book, good))
+    for effects in [good, cheap] if explicit else [cheap]:  # what is stiff saves nothing alone
+        chosen = _set(book, effects)
+        yield from _told(book, [one for one in [chosen] if one not in book.seen], plan.budget)
+        if len(chosen) < 3 or book.verdict(chosen) is Verdict.WITHIN or book.spent() > plan.budget:
+            continue
+        pairs = [p for p in itertools.combinations(chosen, 2) if plan.possible(p)]
+        yield from _told(book, pairs[:MOST_PAIRS], plan.budget)
+        chosen = _set(book, effects)
+        yield from _told(book, [one for one in [chosen] if one not in book.seen], plan.budget)
 
 
-def _best_known(book: Book) -> Variant:
-    """The largest set that passes, unless another one is much cheaper; () where none does."""
+def _set(book: Book, effects: list[int]) -> Variant:
+    """Effects that can be off together and whose changes, as far as they are known, stay within the tolerance: those that save
+    the most first, and of those alike the first."""
+
+    def saving(k: int) -> tuple[int, int]:
+        work = max(book.work((k,)), LEAST_WORK)
+        return round(float(np.log(work) / -np.log(MUCH_LESS))), k
+
+    chosen: Variant = ()
+    for k in sorted(effects, key=saving):
+        more = tuple(sorted((*chosen, k)))
+        if book.plan.possible(more) and _may_pass(book, more):
+            chosen = more
+    return chosen
+
+
+def _may_pass(book: Book, chosen: Variant) -> bool:
+    """Whether changes that add up, with what pairs are known to be more than that, stay within the tolerance."""
+    total = sum((_values(book, (k,)) for k in chosen), np.zeros(3))
+    for pair in itertools.combinations(chosen, 2):
+        if pair in book.seen:
+            total += interaction(book, pair)
+    counted = np.array([True, book.plan.scattered, book.plan.forces])
+    return bool((np.abs(total[counted]) <= book.plan.tolerance).all())
+
+
+def _recommended(book: Book) -> Variant:
+    """Of all that was simulated and passes the largest, unless another one is much cheaper; () where none does."""
     passed = [
         one for one in book.seen
         if one and book.verdict(one) is Verdict.WITHIN and book.work(one) <= MORE_WORK
@@ -271,37 +284,6 @@ def _best_known(book: Book) -> Variant:
     least = min(book.work(one) for one in passed)
     near = [one for one in passed if book.work(one) * MUCH_LESS <= least]
     return min(near, key=lambda one: (-len(one), one))
-
-
-def _cheapest(book: Book, good: list[int], failed: list[Variant]) -> Variant | None:
-    """The set that is expected to be cheapest of those that may pass."""
-    sets = [one for k in range(1, len(good) + 1) for one in itertools.combinations(good, k)]
-    sets = [one for one in sets if not any(set(f) <= set(one) for f in failed)]
-    sets = [one for one in sets if _may_pass(book, one)]
-    for chosen in sorted(sets, key=lambda one: (*_expected_work(book, one), -len(one), one)):
-        if book.plan.possible(chosen):
-            return chosen
-    return None
-
-
-def _expected_work(book: Book, chosen: Variant) -> tuple[bool, int]:
-    """Whether implicit steps are left, and the work in steps of `MUCH_LESS`, as if each effect saved what it saves alone."""
-    alone = [book.work((k,)) for k in chosen]
-    each = [one if one > MORE_WORK else min(one, LEAST_SAVING) for one in alone]
-    total = np.log(np.maximum(each, LEAST_WORK)).sum()
-    return book.plan.implicit(chosen), round(float(total / -np.log(MUCH_LESS)))
-
-
-def _may_pass(book: Book, chosen: Variant) -> bool:
-    """Whether changes that add up, with what pairs are known to be more than that, stay within the tolerance."""
-    if chosen in book.seen:
-        return book.verdict(chosen) is Verdict.WITHIN
-    total = sum((_values(book, (k,)) for k in chosen), np.zeros(3))
-    for pair in itertools.combinations(chosen, 2):
-        if pair in book.seen:
-            total += interaction(book, pair)
-    counted = np.array([True, book.plan.scattered, book.plan.forces])
-    return bool((np.abs(total[counted]) <= book.plan.tolerance).all())
 
 
 def interaction(book: Book, off: Variant) -> Array:

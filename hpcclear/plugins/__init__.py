@@ -1,7 +1,7 @@
 """The one place where laws, objectives, distributions, surrogates and searches are found by their names.
 
-A name in a scene file is one of ours (``"normal"``), that of an installed package's entry point, or ``"module:Name"``: `Name` of
-the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
+A name in a scene file is one of ours (``"normal"``), that of an installed package's entry point, or ``"module:Name"``: `Name`
+of the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
 """
 
 from hpcclear.plugins.registry import Registry
@@ -13,9 +13,9 @@ __all__ = [
     "FRICTION_LAWS",
     "KINDS",
     "OBJECTIVES",
-    "Registry",
     "SEARCHES",
     "SURROGATES",
+    "Registry",
     "run_source",
     "trusting",
     "using",

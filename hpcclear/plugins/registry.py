@@ -71,7 +71,7 @@ class Registry:
             value = self._installed(name)
         else:
             known = texts_in_use() if texts is None else texts
-            value = self._of_file(name, *found.groups(), known)
+            value = self._of_file(name, found[1], found[2], known)
         missing = [one for one in self.needs if not hasattr(value, one)]
         if missing:
             reason = f"has no {', no '.join(missing)}: a {self.kind} needs {', '.join(self.needs)}"

@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import importlib.abc
 import importlib.util
+import linecache
 import re
 import sys
 import traceback
@@ -28,7 +29,7 @@ class _Reading(NamedTuple):
     packages: dict[str, str]
 
 
-_reading: ContextVar[_Reading] = ContextVar("reading", default=_Reading({}, {}))
+_reading: ContextVar[_Reading | None] = ContextVar("reading", default=None)
 _trusted: ContextVar[bool] = ContextVar("trusted", default=False)
 
 
@@ -51,12 +52,15 @@ def using(texts: Mapping[str, str]) -> Iterator[dict[str, str]]:
 
 def texts_in_use() -> Mapping[str, str]:
     """Source texts by module, as the innermost `using` has them."""
-    return _reading.get().texts
+    here = _reading.get()
+    return {} if here is None else here.texts
 
 
 def note_package(package: str, version: str) -> None:
     """Note that a plug-in of this package was taken."""
-    _reading.get().packages[package] = version
+    here = _reading.get()
+    if here is not None:
+        here.packages[package] = version
 
 
 @contextlib.contextmanager
@@ -113,10 +117,12 @@ def run_source(module: str, text: str) -> ModuleType:
     name = f"hpcclear_plugin_{module}_{digest(text)[:16]}"
     if name in sys.modules:
         return sys.modules[name]
-    path = f"<{module}.py of the scene>"
+    path = f"<{module}.py of the scene, {digest(text)[:12]}>"
     spec = importlib.util.spec_from_loader(name, _Loader(text, path), origin=path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
+    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
     sys.modules[name] = made  # dataclasses look their module up while it is run
     try:
         spec.loader.exec_module(made)

@@ -214,6 +214,8 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
     if not launcher.is_launched() and "mpi4py.MPI" not in sys.modules:
         return Mail()
     mpi = _load_mpi()
+    if mpi.Is_finalized():  # by an earlier call in this process, and MPI starts only once
+        return _after_mpi()
     begins = not mpi.Is_initialized()
     if begins:
         with warnings.catch_warnings():  # mpi4py's own guess, with a warning from every copy
@@ -233,6 +235,19 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
             "srun, choose the right --mpi",
         )
     return Mail(mpi, finalizes=begins)
+
+
+def _after_mpi() -> Mail:
+    """The mailbox of a process that has left MPI: of one process, for without MPI copies do not find each other."""
+    variable, copies = launcher.launched_size()
+    if copies > 1:
+        raise InputError(
+            variable,
+            copies,
+            "this process has left MPI after an earlier run, and MPI cannot be started twice",
+            "Import mpi4py.MPI at the top of the script, which keeps MPI until the script ends",
+        )
+    return Mail()
 
 
 def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:

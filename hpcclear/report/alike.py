@@ -1,4 +1,4 @@
-"""Designs that cannot be told apart from one: the same design under another name, and others within the limits."""
+"""Designs that are statistically indistinguishable from one, and the same design under another name."""
 
 import numpy as np
 import xarray as xr
@@ -8,30 +8,35 @@ from hpcclear.report.figures import labels
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
 
+_BOOKKEEPING = ("averaged", "best", "candidate")
+
 NAMED = 3
 """Designs named before the rest is counted."""
 
 
 def words(ours: xr.Dataset, best: xr.Dataset) -> str:
-    """What else could be taken, and where its variables reach."""
-    again, twins = _again(ours, best), others(ours, best)
-    known = f"{_listed(again)}: the same design; " if again else ""
+    """Return the designs that are equivalent to the best, and the range of their variables."""
+    twins = others(ours, best)
     if not twins:
-        return f"{known}{'else ' if again else ''}none: every other design differs by more than the limits"
-    shown = f"{_listed(twins)}: within the limits they cannot be told apart, choose by cost"
+        return "none: every other design differs significantly"
+    shown = f"{_listed(twins)}: statistically indistinguishable, choose by cost"
     spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
-    return f"{known}{shown} ({spans} among them)" if spans else known + shown
+    return f"{shown} ({spans})" if spans else shown
 
 
 def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Other designs that cannot be told apart from the best."""
+    """Return other designs that are statistically indistinguishable from the best."""
     again = _again(ours, best)
     return [name for name in _twins(ours, best) if name not in again]
 
 
 def _listed(names: list[str]) -> str:
-    more = len(names) - NAMED
-    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
+    """The first names, and how many more; designs that the search only met on its way have none worth printing."""
+    named = [name for name in names if not any(word in name.split() for word in _BOOKKEEPING)]
+    shown, more = named[:NAMED], len(names) - len(named[:NAMED])
+    if not shown:
+        return f"{more} other design{'s' if more > 1 else ''} of the search"
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
 def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
@@ -51,7 +56,7 @@ def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
 
 
 def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """As the file says, else those whose limits overlap."""
+    """As the file states, else those whose confidence intervals overlap."""
     names = [str(name) for name in ours["design"].to_numpy()]
     own = str(best["design"].item())
     if "same_as" in ours:
@@ -69,7 +74,7 @@ def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
 
 
 def _spans(alike: xr.Dataset) -> str:
-    """From where to where the variables of these designs reach, of those that differ."""
+    """Ranges of the variables in which these designs differ."""
     texts = []
     for variable in labels.design_variables(alike):
         low, high = float(variable.min()), float(variable.max())

@@ -1,6 +1,6 @@
-"""The answer of a study in ten lines, from its files alone: which design to take, how sure that is, what to do next.
+"""The result of a study in a dozen lines, from its files alone: recommended design, its confidence, next steps.
 
-What the command prints at its end, and what stands on top of the page.
+The command prints them at its end, and they head the page.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,19 +15,19 @@ from hpcclear.report import alike, failures
 from hpcclear.report.figures import fits, labels
 
 SPAN = 2.0
-"""Deviations above the mean that a design is judged by: some 98 of 100 machines that are made stay below."""
+"""Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
 
 MANY = 0.05
-"""Share of samples beyond the range of the theory from which it is said first."""
+"""Share of samples outside the range of Hertz contact above which that is the first of the next steps."""
 
 FAR = 0.2
-"""Relative error of the surrogate from which it is said to be off."""
+"""Relative error of the surrogate above which more samples are advised."""
 
 SOME = 0.05
-"""Share of samples that move with a kick from which a design is called chaotic."""
+"""Share of samples that change with a perturbation above which a design is called sensitive to initial conditions."""
 
 LARGE = 0.1
-"""Share of the variance from which chaos is worth more revolutions."""
+"""Share of the variance above which chaotic scatter is worth more revolutions."""
 
 LITTLE = 0.01
 """Share of the variance of f, with its half-width, below which a variable is called negligible."""
@@ -40,14 +40,14 @@ COARSE = 0.1
 
 
 class Line(NamedTuple):
-    """One line of the answer: what it is about, and what is said."""
+    """One line of the answer: its subject and its text."""
 
     label: str
     text: str
 
 
 def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
-    """The lines, best first; empty where no design was verified.
+    """Return the lines, the most important first; none if no design was verified.
 
     Parameters
     ----------
@@ -64,34 +64,35 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     original = _original(ours)
     scatter = _scatter(files, best)
     return [
-        Line("take", _named(best)),
-        Line("why", f"{labels.objective(verified)}: least {_merit(ours)} of "
-             f"{ours.sizes['design']} designs simulated, case {_case(best)}"),
-        Line("its values", _values(best)),
-        Line("true mean", _moment(best, "mean", original)),
-        Line("true deviation", _moment(best, "deviation", original)),
-        *(Line("asked for", text) for text in _goals(best)),
-        Line("as good as it", alike.words(ours, best)),
-        Line("on a bound", _bounds(best)),
+        Line("recommended", _named(best)),
+        Line("criterion", f"lowest {_merit(ours)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
+             f"f: {labels.objective(verified)}"),
+        Line("values", _values(best)),
+        Line("mean", _moment(best, "mean", original)),
+        Line("std. deviation", _moment(best, "deviation", original)),
+        *(Line("objective", text) for text in _goals(best)),
+        *(Line("constraint", text) for text in _constraints(best)),
+        Line("equivalent", alike.words(ours, best)),
+        Line("active bounds", _bounds(best)),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
-        Line("theory", _left(files, best)),
+        Line("contact model", _left(files, best)),
         *(Line("failed", text) for text in _failed(files)),
         *([Line("chaos", scatter)] if scatter else []),
-        Line("how sure", _sure(best, verified)),
-        Line("next", "; ".join(_next(files, ours, best, place))),
+        Line("confidence", _sure(best, verified)),
+        Line("next steps", "; ".join(_next(files, ours, best, place))),
     ]  # fmt: skip
 
 
 BESIDE = ("original", *ENDS[:2])
 """Designs of a case that stand beside each other, and with them further ends where its front has more."""
 
-_TOLD = {
+_ROWS = {
     "mean": "mean_true",
-    "deviation": "deviation_true",
-    "95 % below": "percentile",
-    "mean, own life": "life_mean",
-    "deviation, own life": "life_deviation",
+    "std. deviation": "deviation_true",
+    "95th percentile": "percentile",
+    "mean, own wear": "life_mean",
+    "std. dev., own wear": "life_deviation",
 }
 """Lines of the table of a case, and the variables they show."""
 
@@ -99,8 +100,8 @@ _TOLD = {
 def beside_original(
     verified: xr.Dataset,
 ) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """Each case, the designs of its table, and its lines: what it is, and its value for each, with limits and against the
-    original. The designs are `BESIDE`, and the one to take where it is another one."""
+    """Yield each case, the headers of its table, and its lines: a quantity and its value for each design, with half-width and
+    change from the baseline. The designs are `BESIDE`, and the recommended one if it is another one."""
     known = bool(np.isfinite(verified["mean_true"]).any())
     best = str(_best(_ours(verified))["design"].item()) if known else ""
     names = [str(name) for name in verified["design"].to_numpy()]
@@ -108,25 +109,42 @@ def beside_original(
         if not {f"{case} {end}" for end in BESIDE} <= set(names):
             continue
         own = best.removeprefix(f"{case} ")
-        told = (*BESIDE, *(end for end in ENDS[2:] if f"{case} {end}" in names))
-        headers = told if own == best or own in told else (*told, own)
-        designs = [verified.sel(design=f"{case} {end}") for end in headers]
+        ends = (*BESIDE, *(end for end in ENDS[2:] if f"{case} {end}" in names))
+        ends = ends if own == best or own in ends else (*ends, own)
+        designs = [verified.sel(design=f"{case} {end}") for end in ends]
         lines = [
             (words, *(_against(one, designs[0], name) for one in designs))
-            for words, name in _TOLD.items()
+            for words, name in _ROWS.items()
             if name in verified or not name.startswith("life_")
         ]
         for name in _asked(designs[0]):
-            words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
+            words = labels.statistic(str(designs[0][f"{name}_goal"].item())).removesuffix(" of f")
             lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
         if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
-            lines.append(("constraints", *(_standing(text) or "none" for text in kept)))
-        told = tuple(f"{end} (to take)" if end == own != best else end for end in headers)
-        yield case, told, [*lines, ("held at", "", *(_bounds(one) for one in designs[1:]))]
+            lines.append(
+                ("constraints", *(_VERDICTS.get(_standing(text), "none") for text in kept))
+            )
+        plain = is_plain(designs[0])
+        headers = tuple(
+            _header(end, plain) + (", recommended" if end == own != best else "") for end in ends
+        )
+        yield case, headers, [*lines, ("active bounds", "", *(_bounds(one) for one in designs[1:]))]
+
+
+def _header(end: str, plain: bool) -> str:
+    """What a design of a case is called: its role, and the name that it has in the files."""
+    if end == "original":
+        return "baseline"
+    if end not in ENDS:
+        return end
+    roles = ("lowest mean", "lowest std. dev.")
+    if plain and end in ENDS[:2]:
+        return f"{roles[ENDS.index(end)]} ({end})"
+    return f"lowest objective {ENDS.index(end) + 1} ({end})"
 
 
 def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
-    """A true value, half the width of its limits, and its change from the original's."""
+    """A simulated value, its half-width, and its change from the baseline's."""
     if name not in one or not np.isfinite(float(one[name])):
         return "not known"
     value, stem = float(one[name]), name.removesuffix("_true")
@@ -137,7 +155,7 @@ def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
         return text if ends[0] == ends[1] else f"{text} ({ends[0]:.2g} to {ends[1]:.2g})"
     if f"{stem}_upper" in one and value:
         half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
-        text += f" ±{abs(half / value):.2%}" if np.isfinite(half) else ", limits not known"
+        text += f" ±{abs(half / value):.2%}" if np.isfinite(half) else ", interval not known"
     if one["design"].item() == original["design"].item():
         return text
     before = float(original[name])
@@ -151,21 +169,21 @@ def _unit(one: xr.Dataset, name: str) -> str:
 
 
 _USUAL = ("mean of f", "deviation of f", "95th percentile of f")
-"""What is told of every design, whatever its case makes small."""
+"""Quantities that are printed of every design, whatever the objectives of its case."""
 
 
 def _asked(one: xr.Dataset) -> list[str]:
-    """What the case of a design makes small and is not told anyway: "first", "second"."""
+    """Objectives of the case of a design that have no line anyway: "first", "second"."""
     return [name for name in goals_of(one) if str(one[f"{name}_goal"].item()) not in _USUAL]
 
 
 def goals_of(one: xr.Dataset) -> list[str]:
-    """What the case of a design makes small, where that is told: "first", "second", and further ones."""
+    """Objectives of the case of a design, where the file has them: "first", "second", and further ones."""
     return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
 
 
 def leading_goals(verified: xr.Dataset) -> list[str]:
-    """What the case that the answer is about makes small, in words; none where no design was verified or files do not say."""
+    """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
     if not any(_counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
         return []
     first = _ours(verified).isel(design=0)
@@ -173,23 +191,35 @@ def leading_goals(verified: xr.Dataset) -> list[str]:
 
 
 def _goals(best: xr.Dataset) -> Iterator[str]:
-    """What the case of a design asks for beyond mean and deviation, with limits."""
+    """Objectives of the case of a design besides mean and standard deviation, with confidence intervals."""
     names = [] if is_plain(best) else goals_of(best)
     for name in names:
         if len(names) > 2 and str(best[f"{name}_goal"].item()) in _USUAL[:2]:
-            continue  # told above
+            continue  # has a line of its own
         value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
-        text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
+        text = (
+            f"{labels.statistic(str(best[f'{name}_goal'].item()))} {labels.quantity(value, unit)}"
+        )
         if low < high:
-            text += f" ({labels.between(low, high, unit)})"
+            text += f" (95 % CI {labels.between(low, high, unit)})"
         yield text
+
+
+_VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisfied"}
+"""How a file states the verdict on a constraint, the worst first, and what is printed."""
+
+
+def _constraints(best: xr.Dataset) -> Iterator[str]:
+    """Constraints of the case of a design, each with its value and verdict."""
     if "constraints" in best and str(best["constraints"].item()):
-        yield from str(best["constraints"].item()).split("; ")
+        for text in str(best["constraints"].item()).split("; "):
+            head, _, verdict = text.rpartition(": ")
+            yield f"{head}: {_VERDICTS.get(verdict, verdict)}" if head else text
 
 
 def is_plain(one: xr.Dataset) -> bool:
-    """Whether its case makes mean and deviation small, within no constraints."""
+    """Return whether the objectives of its case are mean and standard deviation, without constraints."""
     if "first_goal" not in one:
         return True
     asked = tuple(str(one[f"{name}_goal"].item()) for name in goals_of(one))
@@ -197,8 +227,8 @@ def is_plain(one: xr.Dataset) -> bool:
 
 
 def _standing(text: str) -> str:
-    """How a design stands to all its constraints, in a word or three."""
-    for word in ("broken", "cannot be told", "kept"):
+    """The worst verdict on a design's constraints, in the words of the file."""
+    for word in _VERDICTS:
         if any(part.endswith(f": {word}") for part in text.split("; ")):
             return word
     return ""
@@ -231,12 +261,12 @@ def _original(ours: xr.Dataset) -> xr.Dataset | None:
 
 
 def _best(ours: xr.Dataset) -> xr.Dataset:
-    """The design to take, of `_ours`."""
+    """The recommended design, of `_ours`."""
     return ours.isel(design=int(_judged(ours).argmin()))
 
 
 def _judged(ours: xr.Dataset) -> np.ndarray:
-    """What designs of a case are compared by: infinite for those that stand worse to its constraints than others do."""
+    """What designs of a case are compared by: infinite for those that keep its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
     order = ("", "kept", "cannot be told", "broken")
@@ -248,15 +278,15 @@ def _merit(ours: xr.Dataset) -> str:
     """What `_judged` goes by, in words."""
     first = ours.isel(design=0)
     if is_plain(first):
-        return f"mean + {SPAN:g} deviations"
-    words = str(first["first_goal"].item())
-    return f"{words} within the constraints," if str(first["constraints"].item()) else words
+        return f"mean + {SPAN:g} standard deviations of f"
+    words = labels.statistic(str(first["first_goal"].item()))
+    return f"{words} within the constraints" if str(first["constraints"].item()) else words
 
 
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
     if name.rpartition(" ")[2] == "original":
-        return f"{name}: keep the design as it is, nothing that was simulated is better"
+        return f"keep the baseline design ({name}): no simulated design is better"
     return name
 
 
@@ -274,27 +304,27 @@ def _values(best: xr.Dataset) -> str:
 
 
 def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
-    """A true moment with its limits, and against the original's."""
+    """A simulated moment with its confidence interval, and its change from the baseline."""
     one = best[f"{word}_true"]
     unit = str(one.attrs["units"])
     text = labels.quantity(float(one), unit)
     if f"{word}_lower" in best and np.isfinite(float(best[f"{word}_lower"])):
         low, high = (float(best[f"{word}_{end}"]) for end in ("lower", "upper"))
-        text += f" ({labels.between(low, high, unit)})"
+        text += f" (95 % CI {labels.between(low, high, unit)})"
     if original is None or str(original["design"].item()) == str(best["design"].item()):
         return text
     before = float(original[f"{word}_true"])
     change = float(one) / before - 1.0
-    return f"{text}: {abs(change):.0%} {'less' if change < 0 else 'more'} than the original's {labels.quantity(before, unit)}"
+    return f"{text}, {abs(change):.0%} {'below' if change < 0 else 'above'} the baseline ({labels.quantity(before, unit)})"
 
 
 def _bounds(best: xr.Dataset) -> str:
     found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
-    return found or "none of its variables"
+    return found or "none"
 
 
 def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
-    """Share of simulations that left the range of Hertz's theory."""
+    """Share of simulations outside the range of Hertz contact."""
     parts = []
     if "beyond_hertz" in best:
         share = int(best["beyond_hertz"]) / int(best["samples"])
@@ -303,7 +333,7 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     if samples is not None and "flags" in samples:
         beyond = (samples["flags"].to_numpy() & int(Flag.BEYOND_HERTZ)) != 0
         parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples")
-    return "penetration beyond Hertz's range in " + "; ".join(parts) if parts else "not known"
+    return "outside the range of Hertz contact in " + " and ".join(parts) if parts else "not known"
 
 
 def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
@@ -364,17 +394,17 @@ def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
 
 
 def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
-    """How much of the design's scatter no input makes, and how many designs are so; "" where that was not simulated."""
+    """Share of the design's variance that is chaos, and how many designs are chaotic; "" if not simulated."""
     found, name = files.get("chaos"), str(best["design"].item())
     if found is None or name not in found["design"].to_numpy():
         return ""
     own = found.sel(design=name)
     moved = (found["chaotic"] > SOME).to_numpy()
-    text = f"{int(moved.sum())} of {moved.size} designs"
+    text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
-        return f"{text}; not this one: kicks of 1e-9 leave its samples as they are"
+        return f"{text}; this one is not: perturbations of 1e-9 leave its samples unchanged"
     return (
-        f"{text}; a kick of 1e-9 moves {float(own['chaotic']):.0%} of the samples of this one, which makes "
+        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the samples of this one and explain "
         f"{float(own['chaos_share']):.0%} of its variance"
     )
 
@@ -382,16 +412,13 @@ def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
 def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     count = int(best["samples"]) if "samples" in best else 0
     level = float(verified.attrs.get("confidence", np.nan))
-    text = f"{count} direct simulations of it"
-    text += " by scrambled Sobol sequences" if verified.attrs.get("method") == "qmc" else ""
-    text += (
-        f", limits of {level:.0%} for them (not for what the model leaves out)"
-        if np.isfinite(level)
-        else ""
-    )
+    text = f"{count} simulations of it"
+    text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
+    if np.isfinite(level):
+        text += f"; {level:.0%} confidence intervals, which cover sampling error only"
     errors = _surrogate_errors(best)
     if len(errors) == 2:
-        text += f"; the surrogate was off by {errors[0]:+.1%} and {errors[1]:+.1%} there"
+        text += f". Surrogate error: mean {errors[0]:+.1%}, standard deviation {errors[1]:+.1%}"
     return text
 
 
@@ -406,23 +433,23 @@ def _next(
 ) -> Iterator[str]:
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
-        yield "mind the contact: stiffer bearings or less load; beyond Hertz's range forces are only a guide"
+        yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
     if "on_bounds" in best and str(best["on_bounds"].item()):
-        yield "widen the ranges of the variables on a bound if the machine allows it"
+        yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):
-        yield "raise study.samples: the surrogate is off there, and a better design may hide"
+        yield "a larger study.samples, since the surrogate error is large and a better design may have been missed"
     twins = alike.others(ours, best)
     if twins and ours.attrs.get("method") == "qmc":
-        yield "a smaller study.verification.accuracy tells designs apart that read the same"
+        yield "a smaller study.verification.accuracy, to separate equivalent designs"
     elif twins and "samples" in best:
-        yield f"study.verification.samples={10 * int(best['samples'])} makes the limits three times narrower"
+        yield f"study.verification.samples={10 * int(best['samples'])} for confidence intervals a third as wide"
     found, name = files.get("chaos"), str(best["design"].item())
     if (
         found is not None
         and name in found["design"]
         and float(found.sel(design=name)["chaos_share"]) > LARGE
     ):
-        yield "raise numerics.averaged_revolutions: chaos falls with it, scatter of the inputs stays"
+        yield "a larger numerics.averaged_revolutions, since chaotic scatter decreases with it"
     yield (
         f"hpcclear report {place}"
         if place

@@ -13,10 +13,15 @@ class Contact(LawTable):
     """Normal contact force of every clearance joint."""
 
     kind: ClassVar[str] = "contact"
+    formula: ClassVar[str] = "force"
     law: str
     """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
     minimum_impact_speed: Speed = 1e-3
     """Floor of the latched impact speed, m/s."""
+    force: str | None = None
+    """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
+    units: dict[str, str] | None = None
+    """The law "expression": units of its parameters, which are further entries of this table."""
 
     @property
     def latched(self) -> bool:
@@ -28,8 +33,13 @@ class Friction(LawTable):
     """Tangential force of every clearance joint."""
 
     kind: ClassVar[str] = "friction"
+    formula: ClassVar[str] = "ratio"
     law: str = "none"
     """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
+    ratio: str | None = None
+    """The law "expression": friction over normal force, of the sliding speed v and parameters."""
+    units: dict[str, str] | None = None
+    """The law "expression": units of its parameters, which are further entries of this table."""
 
     @property
     def bristled(self) -> bool:

@@ -3,17 +3,41 @@
 Laws are found by name at the door of their plug-ins; no floor above is imported here.
 """
 
+import contextlib
+import dataclasses
 import importlib
 from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
 from pydantic_core import CoreSchema
 
+from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+from hpcclear.scene.plugged import as_invalid
 
 _HOME = "hpcclear.dynamics.laws"
+
+
+def _module(name: str) -> Any:
+    return importlib.import_module(f"{_HOME}.{name}")
+
+
+@contextlib.contextmanager
+def as_mended(key: str) -> Iterator[None]:
+    """What is wrong with a law as an error of an entry."""
+    try:
+        yield
+    except _module("translate").LawError as error:
+        raise invalid(error.reason, error.remedy, key) from None
+
+
+@cache
+def named(law: Any, name: str) -> Any:
+    """A user's law with the name that the scene has for it."""
+    return dataclasses.replace(law, name=name) if dataclasses.is_dataclass(law) else law  # type: ignore[type-var]
+
 
 PATTERN = r"^(expression|[A-Za-z_]\w*:[A-Za-z_]\w*)$"
 """Laws that are not ours."""
@@ -27,6 +51,13 @@ def our_laws(kind: str) -> Mapping[str, Any]:
     """The laws of a kind, "contact" or "friction", that come with this package, by name."""
     found: Mapping[str, Any] = importlib.import_module(_HOME).laws(kind)
     return found
+
+
+def known_laws(kind: str) -> dict[str, Any]:
+    """Our laws and those of installed packages, by name."""
+    registry = CONTACT_LAWS if kind == "contact" else FRICTION_LAWS
+    others = {name: named(registry.get(name), name) for name in registry.names()}
+    return {**our_laws(kind), **others}
 
 
 def quantity_of(parameter: Any) -> Quantity:
@@ -49,7 +80,10 @@ class LawTable(Table):
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
     kind: ClassVar[str] = ""
+    formula: ClassVar[str] = ""
+    """The entry of a law that is an expression."""
     law: str
+    _law: Any = PrivateAttr(None)
 
     @classmethod
     def _own(cls) -> tuple[str, ...]:
@@ -79,9 +113,41 @@ class LawTable(Table):
     def find(cls, name: str, data: Mapping[str, Any]) -> Any:
         """The law of a name, with what the table says besides; an error for validators where there is none."""
         known = our_laws(cls.kind)
-        if name not in known:
+        if name in known:
+            return known[name]
+        if name == "expression":
+            return cls._of_formula(data)
+        if ":" not in name and name not in cls.registry().names():
             raise invalid("is not one of the known values", nearest(name, tuple(known)), "law")
-        return known[name]
+        with as_invalid("law"):
+            found = cls.registry().get(name)
+        law = named(found, name)
+        if getattr(law, "kind", "") != cls.kind:
+            what = "ContactLaw" if cls.kind == "contact" else "FrictionLaw"
+            raise invalid(
+                f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
+            )
+        return law
+
+    @classmethod
+    def registry(cls) -> Any:
+        """Where laws of users are found."""
+        return CONTACT_LAWS if cls.kind == "contact" else FRICTION_LAWS
+
+    @classmethod
+    def _of_formula(cls, data: Mapping[str, Any]) -> Any:
+        entry = cls.formula
+        text, units = data.get(entry), data.get("units", {})
+        if not isinstance(text, str):
+            raise invalid(
+                "the law 'expression' needs a formula", f'Add {entry} = "..."', entry, text
+            )
+        if not isinstance(units, Mapping) or not all(
+            isinstance(one, str) for one in units.values()
+        ):
+            raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
+        with as_mended(entry):
+            return _module("formula").law_of(cls.kind, text, units)
 
     @classmethod
     def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
@@ -99,7 +165,8 @@ class LawTable(Table):
                     value="none",
                 )
             if law is not None and key in law.elsewhere:
-                raise invalid(*law.elsewhere[key], key)
+                reason, remedy = law.elsewhere[key]
+                raise invalid(reason, remedy, key)
             if key in others:
                 whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
                 raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
@@ -123,15 +190,21 @@ class LawTable(Table):
         wrong = None if law.check is None else law.check(found)
         if wrong is not None:
             raise invalid(*wrong)
+        if law.name not in our_laws(cls.kind):
+            with as_mended("law"):
+                _module("checks").check(law, found)
         return found
+
+    @model_validator(mode="after")
+    def _keep_law(self) -> Self:
+        given = {name: getattr(self, name) for name in self._own()}
+        self._law = type(self).find(self.law, given)
+        return self
 
     @property
     def declared(self) -> Any:
         """The law, as `hpcclear.dynamics.laws.declared` has it."""
-        return type(self).find(self.law, self.values() | self._given())
-
-    def _given(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in self._own()}
+        return self._law
 
     def values(self) -> dict[str, Any]:
         """Values of the law's parameters by name, SI."""

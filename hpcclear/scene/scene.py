@@ -26,6 +26,10 @@ class Scene(SceneTables):
     _text: str = PrivateAttr("")
     _readings: tuple[str, ...] = PrivateAttr(())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As its content: laws are functions, which are found again where they are needed."""
+        return _unpickled, (self.resolved(), self._text, self._readings)
+
     @model_validator(mode="after")
     def _study_fits_mechanism(self) -> Self:
         if self.study is None:
@@ -168,6 +172,13 @@ class Scene(SceneTables):
 
     def __hash__(self) -> int:
         return hash(self.hash)
+
+
+def _unpickled(content: Mapping[str, Any], text: str, readings: tuple[str, ...]) -> Scene:
+    """A scene from what `Scene.__reduce__` gives."""
+    scene = scene_of(content)
+    scene._text, scene._readings = text, readings
+    return scene
 
 
 def scene_of(content: Mapping[str, Any]) -> Scene:

@@ -8,14 +8,10 @@ are it need not know.
 from typing import Any, NamedTuple
 
 from hpcclear.base.jit import lane_function
-from hpcclear.base.unrolled import unrolled, written_out
+from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.stepping.control import coordinate, place
-
-LATER_STAGES = range(1, tab.STAGES)
-"""Numbers, so that the sums have constant lengths from the start: lengths that the compiler finds out later it sums up in
-another order, which shows in the last bit."""
 
 
 class Step(NamedTuple):
@@ -80,10 +76,12 @@ def stage_state(step, s, terms, W):
 
 
 @lane_function
-@unrolled
-def any_stage_state(step, s, W):
-    """`stage_state` for stage s, as many terms as stages before it: a number that the compiler has to know."""
-    for terms in written_out(LATER_STAGES):
+def any_stage_state(step, s, stages, W):
+    """`stage_state` for stage s of so many, as many terms as stages before it.
+
+    A number from the start: lengths that the compiler finds out later it sums up in another order, which shows in the last bit.
+    """
+    for terms in written_out(range(1, stages)):
         if s == terms:
             stage_state(step, s, terms, W)
 
@@ -103,7 +101,7 @@ def gap_error(step, p, i, W):
 
 
 @lane_function
-def step_error(effects, step, W):
+def step_error(effects, step, stages, W):
     """Mean square of the scaled error, per lane."""
     work, n = step.work, step.n
     for i in range(W):
@@ -112,18 +110,18 @@ def step_error(effects, step, W):
         p = place(joint)
         for i in range(step.lanes):
             work[at.ERROR * W + i] += gap_error(step, p, i, W)
-    coordinate_errors(step, W)
+    coordinate_errors(step, stages, W)
     for i in range(W):
         work[at.ERROR * W + i] *= (0.5 / n) * work[at.STRICTER * W + i]
 
 
 @lane_function
-def coordinate_errors(step, W):
+def coordinate_errors(step, stages, W):
     """Add the squares of the scaled errors of coordinates and their velocities."""
-    work, stages, weights, rtol, atol = step.work, step.stages, step.weights, step.rtol, step.atol
+    work, weights, rtol, atol = step.work, step.weights, step.rtol, step.atol
     by_v: dict = {}
     by_q: dict = {}
-    for j in written_out(range(tab.STAGES)):
+    for j in written_out(range(stages)):
         by_v[j] = weights[tab.ERROR + j]
         by_q[j] = weights[tab.ERROR_SQUARE + j]
     for number in range(step.n):
@@ -132,10 +130,10 @@ def coordinate_errors(step, W):
         for i in range(W):
             h = work[at.STEP * W + i]
             a = work[(at.ACC + k) * W + i]
-            dv = by_v[tab.STAGES - 1] * a
-            dq = by_q[tab.STAGES - 1] * a
-            for j in written_out(range(tab.STAGES - 1)):
-                a = stages[stage_row(j, k) * W + i]
+            dv = by_v[stages - 1] * a
+            dq = by_q[stages - 1] * a
+            for j in written_out(range(stages - 1)):
+                a = step.stages[stage_row(j, k) * W + i]
                 dv += by_v[j] * a
                 dq += by_q[j] * a
             q = max(abs(work[(at.Q + k) * W + i]), abs(work[(at.QS + k) * W + i]))

@@ -14,7 +14,7 @@ from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.switching import settle_methods
-from hpcclear.dynamics.implicit.stiff import ask_implicit
+from hpcclear.dynamics.implicit.abreast import ask_implicit
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
@@ -99,7 +99,7 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
 
 
 class Codes(NamedTuple):
-    """Addresses of what a stepper calls: `special.special_code`, `steps.explicit_code`, `stiff.implicit_code` (0 without)."""
+    """Addresses of what a stepper calls: `special.special_code`, `steps.explicit_code`, `abreast.abreast_code` (0 without)."""
 
     special: int
     explicit: int
@@ -112,7 +112,7 @@ def make_stepper(W: int, *, implicit: bool = False) -> Any:
 
     Its arguments: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`, `layout.Method`; an
     array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the implicit method (see
-    `radau.new_memory`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
+    `columns.new_columns`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
     response and an ensemble call the same machine code; ensembles want at least twice the vector length.
     """
     known: dict[str, Any] = {"W": W}

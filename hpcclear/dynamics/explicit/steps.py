@@ -12,7 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, any_stage_state, step_error
 from hpcclear.dynamics.explicit.switching import sense_stiffness
-from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.linkage.rhs import run_observed
 from hpcclear.dynamics.stepping.control import coordinate, measure, place
 from hpcclear.dynamics.stepping.settings import (
     ATOL,
@@ -20,6 +20,7 @@ from hpcclear.dynamics.stepping.settings import (
     MEASURES,
     MOTION,
     NUMBERS,
+    OBSERVING,
     RTOL,
     SENSES,
     SETTINGS,
@@ -116,35 +117,35 @@ def any_fresh(work, W):
 
 
 @lane_function
-def take_explicit_steps(effects, motion, step, tables, senses, W):
+def take_explicit_steps(effects, observing, motion, step, tables, senses, stages, W):
     """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
     work, weights = step.work, step.weights
-    for s in range(0 if any_fresh(work, W) else 1, tab.STAGES):
+    for s in range(0 if any_fresh(work, W) else 1, stages):
         if s == 0:
             start_state(work, step.n, W)
         else:
-            any_stage_state(step, s, W)
+            any_stage_state(step, s, stages, W)
         begin_stage(work, effects.rules.free, weights[tab.NODES + s], W)
-        run_motion(motion, work, tables)
+        run_observed(observing, motion, work, tables)
         if s == 0:
             adopt_fresh(effects, work, step.stages, step.n, W)
         else:
             weigh_stage(effects, step, s, W)
-    step_error(effects, step, W)
+    step_error(effects, step, stages, W)
     if senses != 0.0:
-        sense_stiffness(step, W)
+        sense_stiffness(step, stages, W)
     for i in range(W):
-        evaluations = (tab.STAGES - 1.0) * (1.0 - work[at.STIFF * W + i])
+        evaluations = (stages - 1.0) * (1.0 - work[at.STIFF * W + i])
         work[at.EVALUATIONS * W + i] += evaluations
 
 
 @lane_function
-def explicit_steps(W, numbers, lanes, settings, weights, tables, measures):
+def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measures):
     """`take_explicit_steps` for arrays at addresses."""
     if W == 1:
         narrow_vectors()
     of = carray(numbers, NUMBERS)
-    work = carray(lanes, (at.STAGES + tab.STAGES * at.MAX_COORDINATES) * W)
+    work = carray(lanes, (at.STAGES + stages * at.MAX_COORDINATES) * W)
     entries = carray(settings, SETTINGS)
     step = Step(
         work,
@@ -157,7 +158,9 @@ def explicit_steps(W, numbers, lanes, settings, weights, tables, measures):
         of[WIDTH] & 127,
     )
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    take_explicit_steps(effects, of[MOTION], step, carray(tables, at.TABLES), entries[SENSES], W)
+    curves, senses = carray(tables, at.TABLES), entries[SENSES]
+    observing, motion = of[OBSERVING], of[MOTION]
+    take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 
 
 _DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
@@ -165,7 +168,7 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 4, _COUNTS)
 
 
 @cache
-def explicit_code(W: int) -> Any:
-    """The compiled steps of W lanes; their ``address`` is what steppers take."""
-    text = one_text(explicit_steps, f"explicit_{W}", W=W)
+def explicit_code(W: int, stages: int) -> Any:
+    """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
+    text = one_text(explicit_steps, f"explicit_{W}_{stages}", W=W, stages=stages)
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)

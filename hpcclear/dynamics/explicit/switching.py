@@ -41,7 +41,7 @@ def settle_methods(memory, settings, work, W):
 
 
 @lane_function
-def edge_excess(step, k, i, W):
+def edge_excess(step, k, stages, i, W):
     """Square of the change of acceleration between the last two stages of the pair less that of the velocity times EDGE / h.
 
     Both stages stand at the end of the step: summed over the coordinates it is positive where h lambda, estimated as
@@ -49,21 +49,20 @@ def edge_excess(step, k, i, W):
     the step hides its slope from this estimate; but then the acceleration changes far more between these two stages
     than over the whole step, which on a smooth path it never does.
     """
-    stages = step.stages
     new = step.work[(at.ACC + k) * W + i]
-    change = new - stages[stage_row(tab.STAGES - 2, k) * W + i]
+    change = new - step.stages[stage_row(stages - 2, k) * W + i]
     dv = 0.0  # without a factor h
-    for j in range(tab.STAGES - 1):
-        dv += step.weights[tab.LAST + j] * stages[stage_row(j, k) * W + i]
+    for j in range(stages - 1):
+        dv += step.weights[tab.LAST + j] * step.stages[stage_row(j, k) * W + i]
     scale = 1.0 / step.atol[at.MAX_COORDINATES + k]
-    over_step = CHATTER * (abs(new - stages[k * W + i]) + 1e-8 * abs(new))
+    over_step = CHATTER * (abs(new - step.stages[k * W + i]) + 1e-8 * abs(new))
     least = min(EDGE * abs(dv), over_step) * scale
     change *= scale
     return change * change - least * least
 
 
 @lane_function
-def sense_stiffness(step, W):
+def sense_stiffness(step, stages, W):
     """Scores of stiffness on the explicit lanes: steps at the edge of stability, less half a point for any other, and a
     decaying count of rejections. What stays at the edge gets the stricter tolerance, which costs nothing there."""
     work = step.work
@@ -72,7 +71,7 @@ def sense_stiffness(step, W):
     for number in range(step.n):
         k = coordinate(number)
         for i in range(W):
-            work[at.EDGE_EXCESS * W + i] += edge_excess(step, k, i, W)
+            work[at.EDGE_EXCESS * W + i] += edge_excess(step, k, stages, i, W)
     for i in range(W):
         at_edge = 1.0 if work[at.EDGE_EXCESS * W + i] > 0.0 else 0.0
         score = work[at.EDGE_SCORE * W + i] + 1.5 * at_edge - 0.5

@@ -11,10 +11,10 @@ from fractions import Fraction as F
 
 import numpy as np
 
-STAGES = 7
-"""Stages of every pair, the new point included: the sums over them are unrolled."""
+STAGES = 14
+"""Most stages of a pair, the new point included. Sums over the stages are unrolled: steps are compiled for their number."""
 
-# where the rows of a packed tableau start: c, A, A A, b, e, e A, b - (the stage before)
+# where the rows of a packed tableau start, each as long as the longest: c, A, A A, b, e, e A, b - (the stage before)
 NODES = 0
 MATRIX = NODES + STAGES
 SQUARE = MATRIX + STAGES * STAGES
@@ -43,7 +43,7 @@ class Tableau:
     Raises
     ------
     ValueError
-        If there are not `STAGES` stages.
+        If there are more than `STAGES` stages, or coefficients do not fit together.
     """
 
     name: str
@@ -55,16 +55,23 @@ class Tableau:
     source: str
 
     def __post_init__(self) -> None:
-        if not (self.a.shape == (STAGES, STAGES) and len(self.b) == len(self.e) == STAGES):
+        s = self.stages
+        if not (self.a.shape == (s, s) and len(self.b) == len(self.e) == s <= STAGES):
             raise ValueError(
-                f"{self.name}: the stepper takes pairs of {STAGES} stages, the new point included, not {len(self.b)}"
+                f"{self.name}: the stepper takes pairs of {STAGES} stages at most, the new point included, not {s}"
             )
 
+    @property
+    def stages(self) -> int:
+        """How many there are, the new point included."""
+        return len(self.b)
+
     def packed(self) -> np.ndarray:
-        """Coefficients for the stepper in one flat array: c, A, A A, b, e, e A, b - (the stage before)."""
-        last = self.b - self.a[-2]
-        rows = (self.a.sum(axis=1), self.a, self.a @ self.a, self.b, self.e, self.e @ self.a, last)
-        return np.concatenate([np.ravel(x) for x in rows])
+        """Coefficients for the stepper in one flat array: c, A, A A, b, e, e A, b - (the stage before); 0 for stages that are
+        not there."""
+        a, left = self.a, STAGES - self.stages
+        rows = (a.sum(axis=1), a, a @ a, self.b, self.e, self.e @ a, self.b - a[-2])
+        return np.concatenate([np.pad(x, (0, left)).ravel() for x in rows])
 
 
 def _pair(
@@ -169,4 +176,62 @@ FEHLBERG = _pair(
     "Fehlberg 1969, NASA TR R-315: an adaptive fourth-order pair, as in the paper",
 )
 
-TABLEAUS = {t.name: t for t in (TSITOURAS, DORMAND_PRINCE, FEHLBERG)}
+# Ratios of whole numbers, with which the order conditions hold to 1e-15.
+PRINCE_DORMAND = _pair(
+    "prince-dormand",
+    8,
+    7,
+    _numbers(
+        [],
+        ["1/18"],
+        ["1/48", "1/16"],
+        ["1/32", "0", "3/32"],
+        ["5/16", "0", "-75/64", "75/64"],
+        ["3/80", "0", "0", "3/16", "3/20"],
+        ["29443841/614563906", "0", "0", "77736538/692538347", "-28693883/1125000000", "23124283/1800000000"],
+        [
+            "16016141/946692911", "0", "0", "61564180/158732637", "22789713/633445777",
+            "545815736/2771057229", "-180193667/1043307555",
+        ],
+        [
+            "39632708/573591083", "0", "0", "-433636366/683701615", "-421739975/2616292301",
+            "100302831/723423059", "790204164/839813087", "800635310/3783071287",
+        ],
+        [
+            "246121993/1340847787", "0", "0", "-37695042795/15268766246", "-309121744/1061227803",
+            "-12992083/490766935", "6005943493/2108947869", "393006217/1396673457", "123872331/1001029789",
+        ],
+        [
+            "-1028468189/846180014", "0", "0", "8478235783/508512852", "1311729495/1432422823",
+            "-10304129995/1701304382", "-48777925059/3047939560", "15336726248/1032824649",
+            "-45442868181/3398467696", "3065993473/597172653",
+        ],
+        [
+            "185892177/718116043", "0", "0", "-3185094517/667107341", "-477755414/1098053517",
+            "-703635378/230739211", "5731566787/1027545527", "5232866602/850066563",
+            "-4093664535/808688257", "3962137247/1805957418", "65686358/487910083",
+        ],
+        [
+            "403863854/491063109", "0", "0", "-5068492393/434740067", "-411421997/543043805",
+            "652783627/914296604", "11173962825/925320556", "-13158990841/6184727034",
+            "3936647629/1978049680", "-160528059/685178525", "248638103/1413531060", "0",
+        ],
+    ),
+    _numbers(
+        [
+            "14005451/335480064", "0", "0", "0", "0", "-59238493/1068277825", "181606767/758867731",
+            "561292985/797845732", "-1041891430/1371343529", "760417239/1151165299", "118820643/751138087",
+            "-528747749/2220607170", "1/4",
+        ]
+    )[0],
+    _numbers(
+        [
+            "13451932/455176623", "0", "0", "0", "0", "-808719846/976000145", "1757004468/5645159321",
+            "656045339/265891186", "-3867574721/1518517206", "465885868/322736535", "53011238/667516719",
+            "2/45", "0",
+        ]
+    )[0],
+    "Prince and Dormand 1981, doi:10.1016/0771-050X(81)90010-3: their 8(7) pair of 13 stages, for tight tolerances",
+)  # fmt: skip
+
+TABLEAUS = {t.name: t for t in (TSITOURAS, DORMAND_PRINCE, FEHLBERG, PRINCE_DORMAND)}

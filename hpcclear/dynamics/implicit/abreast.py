@@ -1,20 +1,21 @@
-"""Implicit steps of ensembles: stiff samples step abreast, eight to a vector, each in a column of its own.
+"""Implicit steps where the motion is stiff (where that is: `switching`): stiff samples step abreast, eight to a vector.
 
-What `stiff` does for a single response, whose stages fill a vector: here the samples do, so evaluations and linear algebra cost
-each of them an eighth. A sample keeps its column for as long as it is stiff, and none depends on what its neighbours hold.
+A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
+revolutions, books, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
+step would. A sample keeps its column of the eight for as long as it is stiff, and none depends on what its neighbours hold.
 """
 
 from functools import cache
 from typing import Any
 
-from numba import carray, cfunc
+from numba import carray, cfunc, types
 
+from hpcclear.base.bits import call_at
 from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit import rows
 from hpcclear.dynamics.implicit.columns import (
     adopt_start,
     begin_column,
@@ -45,7 +46,7 @@ from hpcclear.dynamics.implicit.kinks import (
     first_function,
     kink_functions,
 )
-from hpcclear.dynamics.implicit.memory import ALL_KINKS, Moved
+from hpcclear.dynamics.implicit.memory import ALL_KINKS, COLUMNS, STAGES, Moved, N
 from hpcclear.dynamics.implicit.newton import (
     evaluate_stages,
     filtered_error,
@@ -61,51 +62,53 @@ from hpcclear.dynamics.implicit.newton import (
     refilter_error,
     start_of_step,
 )
-from hpcclear.dynamics.implicit.rows import COLUMNS, STAGES, N
-from hpcclear.dynamics.implicit.stiff import SIGNATURE, unpacked
 from hpcclear.dynamics.stepping.settings import (
     COORDINATES,
+    MEASURES,
     MOTION_OF_EIGHT,
+    NUMBERS,
+    OBSERVING_EIGHT,
     SETTINGS,
     WIDTH,
+    rules_in,
 )
 
 
 @lane_function
 def begin_function(latched, m, f):
     """Keep one kink function where steps begin: as evaluated there, or at the end of the step before, but for contacts that
-    have ended with that; rows.NOW counts what changed its sign, or came or went."""
-    before, nothing = fetch(m, rows.START_KINKS + f), spread(0.0)
-    last = fetch(m, rows.STAGE_KINKS + (STAGES - 1) * ALL_KINKS + f)
+    have ended with that; mem.NOW counts what changed its sign, or came or went."""
+    before, nothing = fetch(m, mem.START_KINKS + f), spread(0.0)
+    last = fetch(m, mem.STAGE_KINKS + (STAGES - 1) * ALL_KINKS + f)
     if latched:
         last = above(fetch(m, at.ACTIVE + f // mem.KINKS_A_JOINT), last, nothing)
-    known, follows = fetch(m, rows.KNOWN), fetch(m, rows.FOLLOWS)
+    known, follows = fetch(m, mem.KNOWN), fetch(m, mem.FOLLOWS)
     kept = above(follows, last, before)
-    now = above(known, kept, fetch(m, rows.STAGE_KINKS + f))
-    put(m, rows.START_KINKS + f, now)
+    now = above(known, kept, fetch(m, mem.STAGE_KINKS + f))
+    put(m, mem.START_KINKS + f, now)
     both = above(size(before) + size(now), spread(1.0), nothing)
     changed = above(before * now, nothing, both)
-    put(m, rows.NOW, fetch(m, rows.NOW) + changed)
+    put(m, mem.NOW, fetch(m, mem.NOW) + changed)
 
 
 @scalar_function
 def begin_kinks(rules, m):
     """Keep the kink functions where steps begin; what was learnt before one has changed its sign is forgotten."""
-    put(m, rows.NOW, spread(0.0))
+    put(m, mem.NOW, spread(0.0))
     for f in range(first_function(rules), after_functions(rules)):
         begin_function(rules.latched, m, f)
     for i in range(COLUMNS):
-        if m[rows.NOW * COLUMNS + i] > 0.0:
+        if m[mem.NOW * COLUMNS + i] > 0.0:
             forget_kinks(m, i)
 
 
 @lane_function
 def keep_polynomials(n, m):
     """Keep the polynomials of the steps before, where those were accepted."""
-    follows = fetch(m, rows.FOLLOWS)
+    follows = fetch(m, mem.FOLLOWS)
     for s in range(STAGES):
         for k in range(n):
-            old, kept = rows.Z + s * N + k, rows.KEPT + s * N + k
+            old, kept = mem.Z + s * N + k, mem.KEPT + s * N + k
             put(m, kept, above(follows, fetch(m, old), fetch(m, kept)))
 
 
@@ -119,18 +122,18 @@ def begin_steps(effects, moved, W, block, m, settings):
             unknown = True
     if unknown:
         start_of_step(moved, m)
-        kink_functions(effects.rules, m, rows.STAGE_KINKS)
+        kink_functions(effects.rules, m, mem.STAGE_KINKS)
     for i in range(COLUMNS):
         lane = owner(m, i)
-        if lane >= 0 and not holds(m, rows.KNOWN, i):
+        if lane >= 0 and not holds(m, mem.KNOWN, i):
             adopt_start(moved.n, lane, W, block, m, i)
     keep_polynomials(moved.n, m)
     begin_kinks(effects.rules, m)
     tolerance = number(m, mem.TOLERANCE)
     for k in range(moved.n):
         for row, unit in ((at.Q + k, k), (at.V + k, N + k)):
-            there = fetch(m, rows.LEAST + unit) + size(fetch(m, row))
-            put(m, rows.INVERSE_SCALE + unit, 1.0 / (tolerance * there))
+            there = fetch(m, mem.LEAST + unit) + size(fetch(m, row))
+            put(m, mem.INVERSE_SCALE + unit, 1.0 / (tolerance * there))
 
 
 @scalar_function
@@ -140,44 +143,47 @@ def first_guess(moved, W, work, m):
     for i in range(COLUMNS):
         lane = owner(m, i)
         new = lane >= 0 and is_new(work, W, lane)
-        flag(m, rows.ASKED, i, new)
+        flag(m, mem.ASKED, i, new)
         news = news or new
     if news:
         guess_from_start(moved.n, m)
     for i in range(COLUMNS):
         lane = owner(m, i)
         if lane >= 0:
-            if holds(m, rows.ASKED, i):
+            if holds(m, mem.ASKED, i):
                 m[mem.POLYNOMIAL_STEP + i] = m[mem.STEP + i]
                 m[mem.CONTINUES + i] = 0.0
             work[at.STIFF_STEPS_HERE * W + lane] += 1.0
-        flag(m, rows.ASKED, i, lane >= 0 and not holds(m, rows.ASKED, i))
+        flag(m, mem.ASKED, i, lane >= 0 and not holds(m, mem.ASKED, i))
     guess(moved.n, m)
 
 
 @scalar_function
 def show_kinks(rules, m):
-    """Where one of the stages lies beyond a kink, to rows.SHOWN: below 0."""
+    """Where one of the stages lies beyond a kink, to mem.SHOWN: below 0."""
     shown = spread(1.0)
     for f in range(first_function(rules), after_functions(rules)):
-        start = fetch(m, rows.START_KINKS + f)
+        start = fetch(m, mem.START_KINKS + f)
         for s in range(STAGES):
-            shown = least(shown, start * fetch(m, rows.STAGE_KINKS + s * ALL_KINKS + f))
-    put(m, rows.SHOWN, shown)
+            shown = least(shown, start * fetch(m, mem.STAGE_KINKS + s * ALL_KINKS + f))
+    put(m, mem.SHOWN, shown)
 
 
 @scalar_function
 def kink_fraction(rules, m, i, beyond):
-    """Fraction of a column's step at which the first kink lies behind, as `kinks.kink_fraction`; 2 where `show_kinks` has seen
-    none."""
+    """Fraction of a column's step at which the first kink lies behind, by the cubics through the evaluated stages; 2 where
+    `show_kinks` has seen none.
+
+    `beyond`: how far, in units of the kink's function, a stage must be for it to count.
+    """
     first = 2.0
-    if not m[rows.SHOWN * COLUMNS + i] < 0.0:
+    if not m[mem.SHOWN * COLUMNS + i] < 0.0:
         return first
     for f in range(first_function(rules), after_functions(rules)):
-        start = m[(rows.START_KINKS + f) * COLUMNS + i]
-        one = m[(rows.STAGE_KINKS + f) * COLUMNS + i]
-        two = m[(rows.STAGE_KINKS + ALL_KINKS + f) * COLUMNS + i]
-        three = m[(rows.STAGE_KINKS + 2 * ALL_KINKS + f) * COLUMNS + i]
+        start = m[(mem.START_KINKS + f) * COLUMNS + i]
+        one = m[(mem.STAGE_KINKS + f) * COLUMNS + i]
+        two = m[(mem.STAGE_KINKS + ALL_KINKS + f) * COLUMNS + i]
+        three = m[(mem.STAGE_KINKS + 2 * ALL_KINKS + f) * COLUMNS + i]
         first = min(first, crossing(start, one, two, three, beyond))
     return first
 
@@ -190,7 +196,7 @@ def cut_at_kinks(effects, moved, W, work, m):
     any_cut = False
     for i in range(COLUMNS):
         lane = owner(m, i)
-        flag(m, rows.ASKED, i, False)
+        flag(m, mem.ASKED, i, False)
         if lane >= 0:
             work[at.EVALUATIONS * W + lane] += 3.0
             guessed = m[mem.POLYNOMIAL_STEP + i] > 0.0
@@ -204,7 +210,7 @@ def cut_at_kinks(effects, moved, W, work, m):
                 work[at.ENDING * W + lane] = 0.0
                 m[mem.CONTINUES + i] = 0.0
                 work[at.EVALUATIONS * W + lane] += 3.0
-                flag(m, rows.ASKED, i, True)
+                flag(m, mem.ASKED, i, True)
                 any_cut = True
     if any_cut:
         guess(moved.n, m)
@@ -213,56 +219,55 @@ def cut_at_kinks(effects, moved, W, work, m):
 
 @scalar_function
 def norms_of_jacobians(n, m):
-    """Estimates of the largest eigenvalues, as `stiff.norm_of_jacobian`."""
+    """Estimates of the largest eigenvalues in 1/s from row sums, in units that make angles and lengths comparable."""
     by_q, by_v = spread(0.0), spread(0.0)
     for r in range(n):
         row_q, row_v = spread(0.0), spread(0.0)
         for k in range(n):
-            unit = fetch(m, rows.LEAST + N + k)
-            row_q = row_q + unit * size(fetch(m, rows.BY_Q + r * N + k))
-            row_v = row_v + unit * size(fetch(m, rows.BY_V + r * N + k))
-        inverse = 1.0 / fetch(m, rows.LEAST + N + r)
+            unit = fetch(m, mem.LEAST + N + k)
+            row_q = row_q + unit * size(fetch(m, mem.BY_Q + r * N + k))
+            row_v = row_v + unit * size(fetch(m, mem.BY_V + r * N + k))
+        inverse = 1.0 / fetch(m, mem.LEAST + N + r)
         by_q, by_v = most(by_q, row_q * inverse), most(by_v, row_v * inverse)
     put(m, mem.NORM // COLUMNS, by_v)
-    put(m, rows.NOW, by_q)
+    put(m, mem.NOW, by_q)
     for i in range(COLUMNS):
-        m[mem.NORM + i] += root_of(m[rows.NOW * COLUMNS + i])
+        m[mem.NORM + i] += root_of(m[mem.NOW * COLUMNS + i])
 
 
 @scalar_function
 def solve_steps(effects, moved, W, work, m):
-    """Solve for the stages of all columns: rows.ITERATIONS tell how it went."""
+    """Solve for the stages of all columns: mem.ITERATIONS tell how it went."""
     cut_at_kinks(effects, moved, W, work, m)
     new_jacobian(moved, m)
     norms_of_jacobians(moved.n, m)
     make_inverses(moved.n, m)
     for i in range(COLUMNS):
-        m[mem.NEW_JACOBIAN + i] = 1.0
-        flag(m, rows.ASKED, i, owner(m, i) >= 0)
+        flag(m, mem.ASKED, i, owner(m, i) >= 0)
     newton(moved, m)
     for i in range(COLUMNS):
         lane = owner(m, i)
         if lane >= 0:
-            again = abs(m[rows.ITERATIONS * COLUMNS + i]) - 1.0
+            again = abs(m[mem.ITERATIONS * COLUMNS + i]) - 1.0
             work[at.EVALUATIONS * W + lane] += 2.0 * moved.n + 3.0 * again
 
 
 @scalar_function
 def estimate_errors(moved, W, work, m):
-    """Sums of the squares of all columns' scaled errors, to rows.NOW."""
+    """Sums of the squares of all columns' scaled errors, to mem.NOW."""
     for k in range(moved.n):
-        put(m, rows.SHIFTED + k, fetch(m, rows.START + k))
-        put(m, rows.SHIFTED + N + k, spread(0.0))
+        put(m, mem.SHIFTED + k, fetch(m, mem.START + k))
+        put(m, mem.SHIFTED + N + k, spread(0.0))
     filtered_error(moved.n, m)
     again = False
     for i in range(COLUMNS):
         lane = owner(m, i)
-        flag(m, rows.ASKED, i, False)
+        flag(m, mem.ASKED, i, False)
         if lane >= 0:
             uneasy = work[at.REJECTED * W + lane] == 1.0 or m[mem.ACCEPTED_STEP + i] == 0.0
-            if m[rows.NOW * COLUMNS + i] > 2.0 * moved.n and uneasy:
+            if m[mem.NOW * COLUMNS + i] > 2.0 * moved.n and uneasy:
                 work[at.EVALUATIONS * W + lane] += 1.0
-                flag(m, rows.ASKED, i, True)
+                flag(m, mem.ASKED, i, True)
                 again = True
     if again:
         refilter_error(moved, m)
@@ -271,7 +276,7 @@ def estimate_errors(moved, W, work, m):
 @scalar_function
 def end_column(effects, moved, lane, W, work, m, i):
     """What a column's step has come to: its end, its error and the step to try next."""
-    iterations = m[rows.ITERATIONS * COLUMNS + i]
+    iterations = m[mem.ITERATIONS * COLUMNS + i]
     if iterations < 0.0:
         bring_back(moved.n, m, i)
         give_up(lane, W, work, m, i)
@@ -284,7 +289,7 @@ def end_column(effects, moved, lane, W, work, m, i):
         cut_again(lane, W, work, m, i, fraction)
         return
     m[mem.KINK_CUTS + i] = 0.0
-    total = m[rows.NOW * COLUMNS + i] + gap_errors(effects.rules, lane, W, work, m, i)
+    total = m[mem.NOW * COLUMNS + i] + gap_errors(effects.rules, lane, W, work, m, i)
     leave(effects, moved.n, lane, W, work, m, i)
     mean = total * (0.5 / moved.n)
     m[mem.TRIED_ERROR + i] = root_of(mean)
@@ -317,21 +322,51 @@ def is_held(m):
     return held
 
 
+@lane_function
+def unpacked(numbers, work, stages, par, measures):
+    """Numbers, effects and lanes from their addresses."""
+    of = carray(numbers, NUMBERS)
+    W = of[WIDTH]
+    lanes = at.Block(
+        carray(work, at.WORK * W),
+        carray(stages, at.MAX_COORDINATES * W),
+        carray(par, at.PARAMETERS * W),
+        None,
+    )
+    return of, at.Stepped(rules_in(of), carray(measures, of[MEASURES])), lanes
+
+
 @scalar_function
 def steps_abreast(numbers, work, stages, par, settings, tables, measures, memory):
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
     of, effects, block = unpacked(numbers, work, stages, par, measures)
     W = of[WIDTH]
-    moved = Moved(of[MOTION_OF_EIGHT], of[COORDINATES], 0, carray(tables, at.TABLES))
-    eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, rows.MEMORY))
+    moved = Moved(
+        of[OBSERVING_EIGHT], of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.TABLES)
+    )
+    eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
     settle_columns(block.work, W, eights)
     for e in range(len(eights)):
         if is_held(eights[e]):
             eight_steps(effects, moved, W, block, eights[e], carray(settings, SETTINGS))
 
 
+_DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
+SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
+
+
 @cache
 def abreast_code() -> Any:
-    """The compiled implicit steps of ensembles, of any lanes, joints and coordinates; steppers take their ``address``."""
+    """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
     text = one_text(steps_abreast, "abreast")
     return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+
+
+@lane_function
+def ask_implicit(address, numbers, block, method, memory):
+    """One step of Radau IIA on every stiff lane, over whatever the explicit method left in its rows."""
+    if memory is not None:
+        arrays = (
+            numbers, block.work, block.stages, block.par, method.settings, method.tables, method.measures, memory
+        )  # fmt: skip
+        call_at(address, arrays)

@@ -4,20 +4,19 @@ from hpcclear.base.arrays import Array, aligned
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit import rows
 from hpcclear.dynamics.implicit.control import fit_to_ramp, forget, go_on
+from hpcclear.dynamics.implicit.memory import COLUMNS, STAGES, N
 from hpcclear.dynamics.implicit.radau import MU
-from hpcclear.dynamics.implicit.rows import COLUMNS, STAGES, N
 from hpcclear.dynamics.stepping.control import leave_rates, measure, place
 from hpcclear.dynamics.stepping.settings import ATOL, PARAMETER_ROWS, RTOL
 
 
 def new_columns(width: int) -> Array:
-    """Memory of so many lanes, shape (eights, rows.MEMORY)."""
+    """Memory of so many lanes, shape (eights, mem.MEMORY)."""
     eights = -(-width // COLUMNS)
-    m = aligned(eights * rows.MEMORY).reshape(eights, rows.MEMORY)
+    m = aligned(eights * mem.MEMORY).reshape(eights, mem.MEMORY)
     m[:, at.WORK * COLUMNS : at.BANK * COLUMNS] = 1.0  # a column at rest divides by parameters
-    m[:, rows.LEAST * COLUMNS : rows.BY_Q * COLUMNS] = 1.0
+    m[:, mem.LEAST * COLUMNS : mem.BY_Q * COLUMNS] = 1.0
     return m
 
 
@@ -36,7 +35,7 @@ def is_new(work, W, lane):
 @lane_function
 def owner(m, i):
     """The lane in column i, -1 where there is none."""
-    return int(m[rows.OWNER * COLUMNS + i]) - 1
+    return int(m[mem.OWNER * COLUMNS + i]) - 1
 
 
 @lane_function
@@ -56,8 +55,8 @@ def find_column(lane, memory):
     """Give a lane the first column that is free."""
     for e in range(len(memory)):
         for i in range(COLUMNS):
-            if memory[e, rows.OWNER * COLUMNS + i] == 0.0:
-                memory[e, rows.OWNER * COLUMNS + i] = lane + 1
+            if memory[e, mem.OWNER * COLUMNS + i] == 0.0:
+                memory[e, mem.OWNER * COLUMNS + i] = lane + 1
                 return
 
 
@@ -68,7 +67,7 @@ def settle_columns(work, W, memory):
         for i in range(COLUMNS):
             lane = owner(memory[e], i)
             if lane >= 0 and (not is_stiff(work, W, lane) or is_new(work, W, lane)):
-                memory[e, rows.OWNER * COLUMNS + i] = 0.0
+                memory[e, mem.OWNER * COLUMNS + i] = 0.0
     for lane in range(W):
         if is_stiff(work, W, lane) and is_new(work, W, lane):
             find_column(lane, memory)
@@ -81,8 +80,8 @@ def take_over(n, lane, W, par, m, i, settings):
         m[(mem.PAR + k) * COLUMNS + i] = par[k * W + lane]
     for k in range(n):
         by_v = settings[ATOL + at.MAX_COORDINATES + k]
-        m[(rows.LEAST + k) * COLUMNS + i] = settings[ATOL + k] / settings[RTOL]
-        m[(rows.LEAST + N + k) * COLUMNS + i] = by_v / settings[RTOL]
+        m[(mem.LEAST + k) * COLUMNS + i] = settings[ATOL + k] / settings[RTOL]
+        m[(mem.LEAST + N + k) * COLUMNS + i] = by_v / settings[RTOL]
     forget(m, i)
     fit_to_ramp(par, lane, W, m, i, settings)
 
@@ -93,7 +92,7 @@ def bring_back(n, m, i):
     for s in range(STAGES):
         for k in range(n):
             row = s * N + k
-            m[(rows.Z + row) * COLUMNS + i] = m[(rows.KEPT + row) * COLUMNS + i]
+            m[(mem.Z + row) * COLUMNS + i] = m[(mem.KEPT + row) * COLUMNS + i]
 
 
 @scalar_function
@@ -113,10 +112,10 @@ def begin_column(effects, moved, lane, W, block, m, i, settings):
     for k in range(n):
         m[(at.Q + k) * COLUMNS + i] = work[(at.Q + k) * W + lane]
         m[(at.V + k) * COLUMNS + i] = work[(at.V + k) * W + lane]
-        m[(rows.START + k) * COLUMNS + i] = block.stages[k * W + lane]
+        m[(mem.START + k) * COLUMNS + i] = block.stages[k * W + lane]
     known = not (first or work[at.FRESH * W + lane] == 1.0)
-    flag(m, rows.KNOWN, i, known)
-    flag(m, rows.FOLLOWS, i, follows and not first)
+    flag(m, mem.KNOWN, i, known)
+    flag(m, mem.FOLLOWS, i, follows and not first)
     work[at.STIFF_STEPS * W + lane] += 1.0
     return not known
 
@@ -130,7 +129,7 @@ def adopt_start(n, lane, W, block, m, i):
         for k in range(n):
             found = m[(at.ACC + k) * COLUMNS + i]
             block.stages[k * W + lane] = found
-            m[(rows.START + k) * COLUMNS + i] = found
+            m[(mem.START + k) * COLUMNS + i] = found
         for r in range(at.RATES):
             work[(at.RATE_OLD + r) * W + lane] = m[(at.RATE_NOW + r) * COLUMNS + i]
         work[at.FRESH * W + lane] = 0.0
@@ -141,7 +140,7 @@ def gap_errors(rules, lane, W, work, m, i):
     """Squares of the scaled errors of the integrals of a column's gaps over the step, added, as for the explicit method."""
     total = 0.0
     for p in range(rules.begin, rules.end):
-        error = work[(at.RATE_OLD + at.GAP + p) * W + lane] + m[(rows.GAP_ERROR + p) * COLUMNS + i]
+        error = work[(at.RATE_OLD + at.GAP + p) * W + lane] + m[(mem.GAP_ERROR + p) * COLUMNS + i]
         clearance = mem.PAR + at.JOINT_BLOCKS + at.JOINT_ROWS * p + at.CLEARANCE
         span = m[clearance * COLUMNS + i] * m[(mem.PAR + at.PERIOD) * COLUMNS + i]
         error *= m[mem.STEP + i] / MU / (m[mem.TOLERANCE + i] * span)
@@ -159,7 +158,7 @@ def leave(effects, n, lane, W, work, m, i):
     leave_rates(effects, work, lane, W, m, COLUMNS, i)
     for p in range(effects.rules.begin, effects.rules.end):
         rate = at.GAP + place(p)
-        work[(at.RATE_SUM + rate) * W + lane] = m[(rows.MEAN + rate) * COLUMNS + i]
+        work[(at.RATE_SUM + rate) * W + lane] = m[(mem.MEAN + rate) * COLUMNS + i]
     for r in range(len(effects.measures)):
         rate = measure(effects, r)
-        work[(at.RATE_SUM + rate) * W + lane] = m[(rows.MEAN + rate) * COLUMNS + i]
+        work[(at.RATE_SUM + rate) * W + lane] = m[(mem.MEAN + rate) * COLUMNS + i]

@@ -1,6 +1,6 @@
 """What implicit steps decide for a lane: tolerances, the next step, what a failure or a success leaves behind.
 
-Its numbers stand in column i of the rows that `memory` names, whether it steps alone (in column 0) or abreast with others.
+Its numbers stand in column i of the rows that `memory` names.
 """
 
 import math
@@ -11,11 +11,8 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.stepping.settings import RTOL
 
-CHEAP_CONTRACTION = 0.002
-"""While Newton's iteration converges faster than this, and the step stays what it is, the Jacobian is kept."""
-
-KEPT_TO = 1.2
-"""A step that would grow by less keeps its size, and the inverses."""
+CHEAP_CONTRACTION, KEPT_TO = 0.002, 1.2
+"""While Newton's iteration converges faster than this, a step that would grow by less keeps its size."""
 
 BEST_RATE = 0.3
 """Of the iteration's convergence. Where friction sticks it goes with the step: the normal force changes, so does the slope."""
@@ -114,8 +111,6 @@ def forget(m, i):
         mem.KEPT_STEP,
         mem.ACCEPTED_STEP,
         mem.RATE_SLOPE,
-        mem.FACTORED_STEP,
-        mem.NEW_JACOBIAN,
         mem.TRIED_ERROR,
         mem.KINK_CUTS,
     ):
@@ -130,7 +125,6 @@ def go_on(m, i):
     """The step before was accepted; its polynomial is kept by the caller."""
     m[mem.ACCEPTED_STEP + i] = m[mem.STEP + i]
     m[mem.ACCEPTED_ERROR + i] = max(m[mem.TRIED_ERROR + i], 1e-2)
-    m[mem.NEW_JACOBIAN + i] = 0.0
     m[mem.KEPT_STEP + i] = m[mem.POLYNOMIAL_STEP + i]
     m[mem.CONTINUES + i] = 1.0
 
@@ -189,7 +183,6 @@ def give_up(lane, W, work, m, i):
     h = m[mem.STEP + i]
     m[mem.POLYNOMIAL_STEP + i] = m[mem.KEPT_STEP + i]
     m[mem.CONTINUES + i] = 1.0
-    m[mem.NEW_JACOBIAN + i] = 0.0
     shrink = BEST_RATE / m[mem.RATE + i] if m[mem.RATE + i] > 0.0 else 0.0
     m[mem.RATE + i] = 1.0
     m[mem.CONTRACTION + i] = 1.0
@@ -205,7 +198,7 @@ def propose(lane, W, work, m, i, iterations):
     proposal = next_step(m, i, iterations)
     if iterations == 1:
         m[mem.RATE_SLOPE + i] *= SLOPE_MEMORY
-    elif m[mem.NEW_JACOBIAN + i] == 1.0:
+    else:
         m[mem.RATE_SLOPE + i] = m[mem.RATE + i] / h
     if m[mem.RATE_SLOPE + i] > 0.0:
         proposal = min(proposal, BEST_RATE / m[mem.RATE_SLOPE + i])

@@ -6,7 +6,7 @@ are larger. No column's numbers depend on another's.
 
 from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import lane_function, scalar_function
-from hpcclear.dynamics.implicit.rows import EXCHANGED, N
+from hpcclear.dynamics.implicit.memory import EXCHANGED, N
 
 
 @lane_function

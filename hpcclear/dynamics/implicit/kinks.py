@@ -9,7 +9,6 @@ from hpcclear.base.eight import above, fetch, put, spread
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.memory import END, LANES
 from hpcclear.dynamics.implicit.radau import BASIS, NODES
 from hpcclear.dynamics.stepping.control import place
 
@@ -68,41 +67,6 @@ def first_function(rules):
 def after_functions(rules):
     """What comes after the last of them."""
     return mem.KINKS_A_JOINT * rules.end
-
-
-@scalar_function
-def kinks_of_start(rules, m):
-    """Keep the functions at the last state evaluated, where a step begins; True where one has changed its sign, or come or
-    gone, since the start kept before."""
-    kink_functions(rules, m, mem.KINKS)
-    changed = False
-    for f in range(first_function(rules), after_functions(rules)):
-        before = m[mem.START_KINKS + f]
-        now = m[(mem.KINKS + f) * LANES + END]
-        m[mem.START_KINKS + f] = now
-        changed = changed or sign_changed(before, now)
-    return changed
-
-
-@lane_function
-def sign_changed(before, now):
-    """Whether a function has changed its sign, or come or gone."""
-    return not (before * now > 0.0 or (before == 0.0 and now == 0.0))
-
-
-@scalar_function
-def kink_fraction(rules, m, beyond):
-    """Fraction of the step at which the first kink lies behind, by the cubics through the evaluated stages; 2 if none.
-
-    `beyond`: how far, in units of the kink's function, a stage must be for it to count.
-    """
-    kink_functions(rules, m, mem.KINKS)
-    first = 2.0
-    for f in range(first_function(rules), after_functions(rules)):
-        start = m[mem.START_KINKS + f]
-        row = (mem.KINKS + f) * LANES
-        first = min(first, crossing(start, m[row], m[row + 1], m[row + 2], beyond))
-    return first
 
 
 @lane_function

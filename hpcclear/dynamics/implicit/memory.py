@@ -1,10 +1,8 @@
-"""What the implicit method remembers of a lane from step to step, and its scratch: one flat row of numbers a lane, in rows of
-eight, each a vector.
+"""What the implicit method remembers of eight samples that step abreast, and its scratch: rows of eight, a column a sample.
 
-It starts with two banks laid out like `work` with eight lanes and followed by the lane's parameters, so that the functions that
-run on lanes run on them too. In the first the stages of a step stand side by side, in the second the displaced states that
-the Jacobian's differences are taken from: eight evaluations take no longer than one. Behind them stand vectors over the
-coordinates, each in `BLOCKS` rows: the linear algebra of a step is done on these.
+It starts with a bank laid out like `work` with eight lanes and followed by their parameters, so that the functions that run on
+lanes run on it too. The numbers that implicit steps decide by stand behind it, then a row for each number of a coordinate, of a
+stage or of a matrix.
 """
 
 from typing import NamedTuple
@@ -12,12 +10,13 @@ from typing import NamedTuple
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 
-LANES = 8
-BLOCKS = -(-at.MAX_COORDINATES // LANES)  # rows that a number of each coordinate takes
-_N = at.MAX_COORDINATES
+COLUMNS = 8
+N = at.MAX_COORDINATES
+STAGES = 3
+MIDDLE = 1  # the second stage
 
-PAR = at.WORK  # row of the first parameter in a bank
-NUMBERS = at.BANK  # row of the first of a lane's numbers, behind the first bank; where each begins, each for eight lanes:
+PAR = at.WORK  # row of the first parameter
+NUMBERS = at.BANK  # row of the first of these numbers; where each begins, each for eight columns:
 (
     TIME,  # s, since the start of the revolution
     STEP,  # s
@@ -30,57 +29,54 @@ NUMBERS = at.BANK  # row of the first of a lane's numbers, behind the first bank
     CONTRACTION,  # of Newton's iteration, rate over 1 - rate
     RATE,  # its last rate of convergence
     RATE_SLOPE,  # 1/s, that rate over the step, when last seen with a new Jacobian; 0 when not since a kink
-    FACTORED_STEP,  # s, for which the inverses hold; 0 when they do not
-    NEW_JACOBIAN,  # 1 while the Jacobian was evaluated within this step
     NORM,  # estimate of the largest eigenvalue of the Jacobian, 1/s
     KINK_CUTS,  # how often the step at hand was cut at a kink its solution showed
     CEILING,  # s, of the next steps: some way below one that Newton's iteration failed on
     TOLERANCE,  # relative, of a step's error
     REACH,  # of a difference at most, as a part of LEAST
-) = range(NUMBERS * LANES, (NUMBERS + 18) * LANES, LANES)
-SECOND = NUMBERS + 18  # row where the second bank starts
-# rows:
-NODE = SECOND + at.BANK  # where the stages stand in the step; the last one from END on
-MATRIX = (
-    NODE + 1
-)  # three: coefficients of the velocities' increments in the stages of the coordinates
-UNIT = MATRIX + 3  # three: the same in the stages of the velocities
-MARK = UNIT + 3  # the unit matrix, and one row of noughts
-HOLE = MARK + LANES + 1  # 1 less these
+) = range(NUMBERS * COLUMNS, (NUMBERS + 16) * COLUMNS, COLUMNS)
+OWNER = NUMBERS + 16  # 1 + lane of the sample in each column; 0 where there is none
+KNOWN = (
+    OWNER + 1
+)  # 1 where the kink functions at the start of the step are known from the step before
+FOLLOWS = KNOWN + 1  # 1 where a step begins at the end of the step before
+SHOWN = FOLLOWS + 1  # below 0 where a stage lies beyond a kink
+ASKED = SHOWN + 1  # 1 for columns that the work at hand is for
+ITERATIONS = ASKED + 1  # of Newton, as `control.rate_of` has it
+CHANGE_BEFORE = ITERATIONS + 1  # size of its correction before
+NOW = CHANGE_BEFORE + 1  # and of the last one; sum of the squares of the error estimate
+# a row for each stage and coordinate, stage by stage
+Z = NOW + 1  # increments of the velocities
+KEPT = Z + STAGES * N  # the same of the step before
+TRANSFORMED = KEPT + STAGES * N  # those of Z, decoupled
+STAGE_ACC = TRANSFORMED + STAGES * N  # accelerations
+CHANGE = STAGE_ACC + STAGES * N
+# a row for each coordinate, then perhaps each velocity
+START = CHANGE + STAGES * N  # accelerations at the start of the step
+SHIFTED = START + N  # those at a start the error estimate has moved, and moves of velocities
+INVERSE_SCALE = SHIFTED + 2 * N  # of tolerances
+LEAST = INVERSE_SCALE + 2 * N  # sizes at which absolute and relative tolerance weigh the same
+# matrices, row by row, N rows of eight each
+BY_Q = LEAST + 2 * N  # the Jacobian
+BY_V = BY_Q + N * N
+REAL = BY_V + N * N  # inverse of the real system, and of the complex one
+COMPLEX_RE = REAL + N * N
+COMPLEX_IM = COMPLEX_RE + N * N
+EXCHANGED = COMPLEX_IM + N * N  # 1 where two rows were exchanged
+# of the kinks and of what is integrated
 KINKS_A_JOINT = 4
 ALL_KINKS = KINKS_A_JOINT * at.MAX_JOINTS
-KINKS = HOLE + LANES + 1  # kink functions, joint by joint, lane by lane the stages
-INCREMENT = KINKS + ALL_KINKS  # of the Jacobian's differences, by coordinates, then velocities
-JACOBIAN = INCREMENT + 2 * BLOCKS  # its columns, vectors, by the n coordinates, then velocities
-MIDDLE, END = (
-    1,
-    2,
-)  # lanes of the second stage and of the last, at the end of the step, as those after it
-# vectors over the coordinates:
-Q = JACOBIAN + 2 * _N * BLOCKS  # at the start of the step
-V = Q + BLOCKS
-Z = V + BLOCKS  # increments of the velocities at the three stages
-KEPT = Z + 3 * BLOCKS  # the same of the step before
-TRANSFORMED = KEPT + 3 * BLOCKS  # those of Z, decoupled
-CHANGE = TRANSFORMED + 3 * BLOCKS
-START = CHANGE + 3 * BLOCKS  # accelerations at the start of the step
-SHIFTED = START + BLOCKS  # those at a start the error estimate has moved, and moves of velocities
-BASE = SHIFTED + 2 * BLOCKS  # accelerations at the state that the Jacobian holds for
-INVERSE_SCALE = BASE + BLOCKS  # of tolerances of coordinates, then of velocities
-LEAST = INVERSE_SCALE + 2 * BLOCKS  # sizes at which absolute and relative tolerance weigh the same
-PIVOT = LEAST + 2 * BLOCKS  # rows that were exchanged of the real system, and of the complex one
-COMPLEX_PIVOT = PIVOT + BLOCKS
-REAL = COMPLEX_PIVOT + BLOCKS  # columns of the inverse of the real system
-COMPLEX_RE = REAL + _N * BLOCKS  # and of the complex one's, real and imaginary part
-COMPLEX_IM = COMPLEX_RE + _N * BLOCKS
-START_KINKS = (COMPLEX_IM + _N * BLOCKS) * LANES  # kink functions at the start of the step
-MEMORY = -(-(START_KINKS + ALL_KINKS) // LANES) * LANES
+STAGE_KINKS = EXCHANGED + N * N  # kink functions, stage by stage
+START_KINKS = STAGE_KINKS + STAGES * ALL_KINKS
+MEAN = START_KINKS + ALL_KINKS  # of each rate over the step
+GAP_ERROR = MEAN + at.RATES  # sums of the gaps weighted for the error of their integrals
+MEMORY = (GAP_ERROR + at.MAX_JOINTS) * COLUMNS
 
 
 class Moved(NamedTuple):
-    """What is stepped: the address of its motion of eight lanes, coordinates, rows of a vector over them, tables."""
+    """What is stepped: the addresses of its motions of eight lanes (`rhs.run_observed`), coordinates, tables."""
 
+    observing: int
     motion: int
     n: int
-    blocks: int
     tables: Array

@@ -1,7 +1,6 @@
 """Radau IIA of order 5 for eight samples abreast: stages by simplified Newton, error estimate, integrals over a step.
 
-The same method as `radau`, which has one sample's stages side by side: there the eight columns of a row are stages, or
-coordinates, here they are samples, and each stage has rows of its own. m is the memory of such eight (`rows`), n the number of
+The columns of a row are samples, and each stage has rows of its own. m is the memory of such eight (`memory`), n the number of
 coordinates. What is done for some of the eight is chosen number by number, so that none depends on its neighbours.
 """
 
@@ -11,12 +10,10 @@ from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit import rows
 from hpcclear.dynamics.implicit.control import MAX_ITERATIONS, begin_iteration, rate_of
 from hpcclear.dynamics.implicit.inverses import invert_complex, invert_real
-from hpcclear.dynamics.implicit.jacobian import RELATIVE
 from hpcclear.dynamics.implicit.kinks import kink_functions
-from hpcclear.dynamics.implicit.memory import ALL_KINKS
+from hpcclear.dynamics.implicit.memory import ALL_KINKS, COLUMNS, STAGES, N
 from hpcclear.dynamics.implicit.radau import (
     ERROR_BY_MATRIX,
     ERROR_WEIGHTS,
@@ -29,9 +26,10 @@ from hpcclear.dynamics.implicit.radau import (
     T,
     weights_at,
 )
-from hpcclear.dynamics.implicit.rows import COLUMNS, STAGES, N
-from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.linkage.rhs import run_motion, run_observed
 from hpcclear.dynamics.stepping.control import measure, place
+
+RELATIVE = 1.5e-8  # of a difference: square root of the round-off
 
 
 @lane_function
@@ -59,7 +57,7 @@ def start_of_step(moved, m):
     for k in range(moved.n):
         put(m, at.QS + k, fetch(m, at.Q + k))
         put(m, at.VS + k, fetch(m, at.V + k))
-    run_motion(moved.motion, m, moved.tables)
+    run_observed(moved.observing, moved.motion, m, moved.tables)
 
 
 @lane_function
@@ -68,7 +66,7 @@ def put_stage(n, m, s):
     h = number(m, mem.STEP)
     put(m, at.STAGE_TIME, number(m, mem.TIME) + NODES[s] * h)
     for k in range(n):
-        v, z = fetch(m, at.V + k), rows.Z + k
+        v, z = fetch(m, at.V + k), mem.Z + k
         total = MATRIX[s, 0] * fetch(m, z) + MATRIX[s, 1] * fetch(m, z + N)
         total = total + MATRIX[s, 2] * fetch(m, z + 2 * N)
         put(m, at.VS + k, v + fetch(m, z + s * N))
@@ -82,7 +80,7 @@ def evaluate_stages(moved, m):
         put_stage(moved.n, m, s)
         run_motion(moved.motion, m, moved.tables)
         for k in range(moved.n):
-            put(m, rows.STAGE_ACC + s * N + k, fetch(m, at.ACC + k))
+            put(m, mem.STAGE_ACC + s * N + k, fetch(m, at.ACC + k))
 
 
 @lane_function
@@ -98,30 +96,30 @@ def observe_stages(effects, moved, m, integrated):
     rules = effects.rules
     for s in range(STAGES):
         put_stage(moved.n, m, s)
-        run_motion(moved.motion, m, moved.tables)
+        run_observed(moved.observing, moved.motion, m, moved.tables)
         for k in range(moved.n):
-            put(m, rows.STAGE_ACC + s * N + k, fetch(m, at.ACC + k))
-        kink_functions(rules, m, rows.STAGE_KINKS + s * ALL_KINKS)
+            put(m, mem.STAGE_ACC + s * N + k, fetch(m, at.ACC + k))
+        kink_functions(rules, m, mem.STAGE_KINKS + s * ALL_KINKS)
         if integrated:
             for joint in range(rules.begin, rules.end):
                 gap = at.GAP + place(joint)
-                add_rate(m, rows.MEAN + gap, gap, MATRIX[2, s], s == 0)
-                add_rate(m, rows.GAP_ERROR + place(joint), gap, ERROR_BY_MATRIX[s], s == 0)
+                add_rate(m, mem.MEAN + gap, gap, MATRIX[2, s], s == 0)
+                add_rate(m, mem.GAP_ERROR + place(joint), gap, ERROR_BY_MATRIX[s], s == 0)
             for r in range(len(effects.measures)):
                 rate = measure(effects, r)
-                add_rate(m, rows.MEAN + rate, rate, MATRIX[2, s], s == 0)
+                add_rate(m, mem.MEAN + rate, rate, MATRIX[2, s], s == 0)
 
 
 @scalar_function
 def guess(n, m):
     """First guess of the stages where it is asked for: the polynomial of the step before, or of the longer try from the same
     start; without either, the velocities at the start."""
-    asked = fetch(m, rows.ASKED)
+    asked = fetch(m, mem.ASKED)
     old, h = number(m, mem.POLYNOMIAL_STEP), number(m, mem.STEP)
     after = above(number(m, mem.CONTINUES), spread(1.0), spread(0.0))
     ratio = h / above(old, old, h)
     for k in range(n):
-        row = rows.Z + k
+        row = mem.Z + k
         z0, z1, z2 = fetch(m, row), fetch(m, row + N), fetch(m, row + 2 * N)
         for s in range(STAGES):
             w0, w1, w2 = weights_at(after + NODES[s] * ratio)
@@ -134,11 +132,11 @@ def guess(n, m):
 @scalar_function
 def guess_from_start(n, m):
     """First guess of the stages where it is asked for: the accelerations at the start."""
-    asked, h = fetch(m, rows.ASKED), number(m, mem.STEP)
+    asked, h = fetch(m, mem.ASKED), number(m, mem.STEP)
     for k in range(n):
-        a = h * fetch(m, rows.START + k)
+        a = h * fetch(m, mem.START + k)
         for s in range(STAGES):
-            row = rows.Z + s * N + k
+            row = mem.Z + s * N + k
             put(m, row, above(asked, NODES[s] * a, fetch(m, row)))
     decouple(n, m)
 
@@ -147,10 +145,10 @@ def guess_from_start(n, m):
 def decouple(n, m):
     """The increments at the stages, decoupled."""
     for k in range(n):
-        z = rows.Z + k
+        z = mem.Z + k
         z0, z1, z2 = fetch(m, z), fetch(m, z + N), fetch(m, z + 2 * N)
         for s in range(STAGES):
-            row = rows.TRANSFORMED + s * N + k
+            row = mem.TRANSFORMED + s * N + k
             put(m, row, T_INVERSE[s, 0] * z0 + T_INVERSE[s, 1] * z1 + T_INVERSE[s, 2] * z2)
 
 
@@ -165,7 +163,7 @@ def difference(moved, m, row, unit, column):
     run_motion(moved.motion, m, moved.tables)
     put(m, row, before)
     for r in range(moved.n):
-        change = fetch(m, at.ACC + r) - fetch(m, rows.STAGE_ACC + N + r)
+        change = fetch(m, at.ACC + r) - fetch(m, mem.STAGE_ACC + N + r)
         put(m, column + r * N, change * inverse)
 
 
@@ -174,8 +172,8 @@ def new_jacobian(moved, m):
     """Partial derivatives of the accelerations at the middle stage, where they are known, by coordinates and velocities."""
     put_stage(moved.n, m, mem.MIDDLE)
     for k in range(moved.n):
-        difference(moved, m, at.QS + k, fetch(m, rows.LEAST + k), rows.BY_Q + k)
-        difference(moved, m, at.VS + k, fetch(m, rows.LEAST + N + k), rows.BY_V + k)
+        difference(moved, m, at.QS + k, fetch(m, mem.LEAST + k), mem.BY_Q + k)
+        difference(moved, m, at.VS + k, fetch(m, mem.LEAST + N + k), mem.BY_V + k)
 
 
 @scalar_function
@@ -186,24 +184,24 @@ def make_inverses(n, m):
     for r in range(n):
         for c in range(n):
             i = r * N + c
-            by_q, less = fetch(m, rows.BY_Q + i), spread(0.0) - fetch(m, rows.BY_V + i)
+            by_q, less = fetch(m, mem.BY_Q + i), spread(0.0) - fetch(m, mem.BY_V + i)
             real, re = less - (h * (1.0 / MU)) * by_q, less - (h * (MU_RE / square)) * by_q
             im = (h * (MU_IM / square)) * by_q
             if r == c:
                 real, re, im = real + MU / h, re + MU_RE / h, im + MU_IM / h
-            put(m, rows.REAL + i, real)
-            put(m, rows.COMPLEX_RE + i, re)
-            put(m, rows.COMPLEX_IM + i, im)
-    invert_real(n, m, rows.REAL)
-    invert_complex(n, m, rows.COMPLEX_RE, rows.COMPLEX_IM)
+            put(m, mem.REAL + i, real)
+            put(m, mem.COMPLEX_RE + i, re)
+            put(m, mem.COMPLEX_IM + i, im)
+    invert_real(n, m, mem.REAL)
+    invert_complex(n, m, mem.COMPLEX_RE, mem.COMPLEX_IM)
 
 
 @lane_function
 def residuals(n, m, inverse):
-    """What is left of the decoupled equations, to rows.CHANGE; `inverse`: of the step."""
+    """What is left of the decoupled equations, to mem.CHANGE; `inverse`: of the step."""
     lam, re, im = MU * inverse, MU_RE * inverse, MU_IM * inverse
     for k in range(n):
-        f, w, change = rows.STAGE_ACC + k, rows.TRANSFORMED + k, rows.CHANGE + k
+        f, w, change = mem.STAGE_ACC + k, mem.TRANSFORMED + k, mem.CHANGE + k
         f0, f1, f2 = fetch(m, f), fetch(m, f + N), fetch(m, f + 2 * N)
         w0, w1, w2 = fetch(m, w), fetch(m, w + N), fetch(m, w + 2 * N)
         r0 = T_INVERSE[0, 0] * f0 + T_INVERSE[0, 1] * f1 + T_INVERSE[0, 2] * f2
@@ -219,10 +217,10 @@ def solved(n, m, r):
     """Coordinate r of the three decoupled changes, from what is left of their equations."""
     x, y, z = spread(0.0), spread(0.0), spread(0.0)
     for k in range(n):
-        i, change = r * N + k, rows.CHANGE + k
+        i, change = r * N + k, mem.CHANGE + k
         c0, c1, c2 = fetch(m, change), fetch(m, change + N), fetch(m, change + 2 * N)
-        re, im = fetch(m, rows.COMPLEX_RE + i), fetch(m, rows.COMPLEX_IM + i)
-        x = x + c0 * fetch(m, rows.REAL + i)
+        re, im = fetch(m, mem.COMPLEX_RE + i), fetch(m, mem.COMPLEX_IM + i)
+        x = x + c0 * fetch(m, mem.REAL + i)
         y = y + c1 * re - c2 * im
         z = z + c2 * re + c1 * im
     return x, y, z
@@ -230,26 +228,26 @@ def solved(n, m, r):
 
 @scalar_function
 def correct(n, m):
-    """One correction of simplified Newton where it is asked for; its size relative to the tolerance to rows.NOW, squared and
+    """One correction of simplified Newton where it is asked for; its size relative to the tolerance to mem.NOW, squared and
     times 3 n."""
-    asked = fetch(m, rows.ASKED)
+    asked = fetch(m, mem.ASKED)
     h = number(m, mem.STEP)
     residuals(n, m, 1.0 / h)
     total = spread(0.0)
     for r in range(n):
         x, y, z = solved(n, m, r)
-        by_q = (h * (1.0 / MU)) * fetch(m, rows.INVERSE_SCALE + r)
-        by_v = fetch(m, rows.INVERSE_SCALE + N + r)
+        by_q = (h * (1.0 / MU)) * fetch(m, mem.INVERSE_SCALE + r)
+        by_v = fetch(m, mem.INVERSE_SCALE + N + r)
         total = total + (by_v * by_v + by_q * by_q) * (x * x + y * y + z * z)
-        row = rows.TRANSFORMED + r
+        row = mem.TRANSFORMED + r
         w0, w1, w2 = fetch(m, row) + x, fetch(m, row + N) + y, fetch(m, row + 2 * N) + z
         put(m, row, w0)
         put(m, row + N, w1)
         put(m, row + 2 * N, w2)
         for s in range(STAGES):
-            found, z_row = T[s, 0] * w0 + T[s, 1] * w1 + T[s, 2] * w2, rows.Z + s * N + r
+            found, z_row = T[s, 0] * w0 + T[s, 1] * w1 + T[s, 2] * w2, mem.Z + s * N + r
             put(m, z_row, above(asked, found, fetch(m, z_row)))
-    put(m, rows.NOW, total)
+    put(m, mem.NOW, total)
 
 
 @scalar_function
@@ -258,14 +256,14 @@ def take_in(n, m, iteration):
     Returns how many columns go on."""
     going = 0
     for i in range(COLUMNS):
-        if m[rows.ASKED * COLUMNS + i] == 1.0:
-            change = math.sqrt(m[rows.NOW * COLUMNS + i] / (3.0 * n))
-            before = m[rows.CHANGE_BEFORE * COLUMNS + i]
+        if m[mem.ASKED * COLUMNS + i] == 1.0:
+            change = math.sqrt(m[mem.NOW * COLUMNS + i] / (3.0 * n))
+            before = m[mem.CHANGE_BEFORE * COLUMNS + i]
             iterations = rate_of(m, i, iteration, change, before)
-            m[rows.ITERATIONS * COLUMNS + i] = iterations
-            m[rows.CHANGE_BEFORE * COLUMNS + i] = max(change, 1e-300)
+            m[mem.ITERATIONS * COLUMNS + i] = iterations
+            m[mem.CHANGE_BEFORE * COLUMNS + i] = max(change, 1e-300)
             if iterations != 0:
-                m[rows.ASKED * COLUMNS + i] = 0.0
+                m[mem.ASKED * COLUMNS + i] = 0.0
             else:
                 going += 1
     return going
@@ -273,9 +271,9 @@ def take_in(n, m, iteration):
 
 @scalar_function
 def newton(moved, m):
-    """Solve for the stages of all columns that ask for it, whose first guess was evaluated (rows.ITERATIONS)."""
+    """Solve for the stages of all columns that ask for it, whose first guess was evaluated (mem.ITERATIONS)."""
     for i in range(COLUMNS):
-        if m[rows.ASKED * COLUMNS + i] == 1.0:
+        if m[mem.ASKED * COLUMNS + i] == 1.0:
             begin_iteration(m, i)
     for iteration in range(MAX_ITERATIONS):
         if iteration > 0:
@@ -296,35 +294,35 @@ def product(n, m, matrix, vector, r):
 
 @scalar_function
 def filtered_error(n, m):
-    """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in rows.CHANGE (v, then q).
+    """Error estimate of order 3, filtered by the real system so that stiff parts do not spoil it, in mem.CHANGE (v, then q).
 
-    Reads the accelerations at the start and shifts of the velocities there from rows.SHIFTED on. The sum of the scaled squares
-    goes to rows.NOW.
+    Reads the accelerations at the start and shifts of the velocities there from mem.SHIFTED on. The sum of the scaled squares
+    goes to mem.NOW.
     """
-    by_v, by_q, result = rows.CHANGE, rows.CHANGE + N, rows.CHANGE + 2 * N
+    by_v, by_q, result = mem.CHANGE, mem.CHANGE + N, mem.CHANGE + 2 * N
     h = number(m, mem.STEP)
     inverse, scaled = 1.0 / h, h * (1.0 / MU)
     for k in range(n):
-        z = rows.Z + k
+        z = mem.Z + k
         z0, z1, z2 = fetch(m, z), fetch(m, z + N), fetch(m, z + 2 * N)
         q = ERROR_BY_MATRIX[0] * z0 + ERROR_BY_MATRIX[1] * z1 + ERROR_BY_MATRIX[2] * z2
         v = ERROR_WEIGHTS[0] * z0 + ERROR_WEIGHTS[1] * z1 + ERROR_WEIGHTS[2] * z2
-        put(m, by_q + k, fetch(m, rows.SHIFTED + N + k) + q)
-        put(m, by_v + k, fetch(m, rows.SHIFTED + k) + inverse * v)
+        put(m, by_q + k, fetch(m, mem.SHIFTED + N + k) + q)
+        put(m, by_v + k, fetch(m, mem.SHIFTED + k) + inverse * v)
     for k in range(n):
-        put(m, by_v + k, fetch(m, by_v + k) + scaled * product(n, m, rows.BY_Q, by_q, k))
+        put(m, by_v + k, fetch(m, by_v + k) + scaled * product(n, m, mem.BY_Q, by_q, k))
     for k in range(n):  # behind what is still read
-        put(m, result + k, product(n, m, rows.REAL, by_v, k))
+        put(m, result + k, product(n, m, mem.REAL, by_v, k))
     total = spread(0.0)
     for k in range(n):
         v = fetch(m, result + k)
         q = scaled * (v + fetch(m, by_q + k))
         put(m, by_v + k, v)
         put(m, by_q + k, q)
-        v = v * fetch(m, rows.INVERSE_SCALE + N + k)
-        q = q * fetch(m, rows.INVERSE_SCALE + k)
+        v = v * fetch(m, mem.INVERSE_SCALE + N + k)
+        q = q * fetch(m, mem.INVERSE_SCALE + k)
         total = total + v * v + q * q
-    put(m, rows.NOW, total)
+    put(m, mem.NOW, total)
 
 
 @scalar_function
@@ -332,14 +330,14 @@ def refilter_error(moved, m):
     """The estimate once more where it is asked for, from the start moved by the estimate: for a first try that looked too
     inaccurate."""
     n = moved.n
-    first, asked = fetch(m, rows.NOW), fetch(m, rows.ASKED)
+    first, asked = fetch(m, mem.NOW), fetch(m, mem.ASKED)
     put(m, at.STAGE_TIME, number(m, mem.TIME))
     for k in range(n):
-        put(m, at.VS + k, fetch(m, at.V + k) + fetch(m, rows.CHANGE + k))
-        put(m, at.QS + k, fetch(m, at.Q + k) + fetch(m, rows.CHANGE + N + k))
+        put(m, at.VS + k, fetch(m, at.V + k) + fetch(m, mem.CHANGE + k))
+        put(m, at.QS + k, fetch(m, at.Q + k) + fetch(m, mem.CHANGE + N + k))
     run_motion(moved.motion, m, moved.tables)
     for k in range(n):
-        put(m, rows.SHIFTED + k, fetch(m, at.ACC + k))
-        put(m, rows.SHIFTED + N + k, fetch(m, rows.CHANGE + k))
+        put(m, mem.SHIFTED + k, fetch(m, at.ACC + k))
+        put(m, mem.SHIFTED + N + k, fetch(m, mem.CHANGE + k))
     filtered_error(n, m)
-    put(m, rows.NOW, above(asked, fetch(m, rows.NOW), first))
+    put(m, mem.NOW, above(asked, fetch(m, mem.NOW), first))

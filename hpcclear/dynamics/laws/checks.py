@@ -8,7 +8,6 @@ import numpy as np
 
 from hpcclear.dynamics.laws.declared import (
     JOINT,
-    MOST_NUMBERS,
     VARYING,
     ContactLaw,
     FrictionLaw,
@@ -16,6 +15,7 @@ from hpcclear.dynamics.laws.declared import (
 )
 from hpcclear.dynamics.laws.numbers import elastic_at, evaluate, sample_numbers, stored, with_words
 from hpcclear.dynamics.laws.translate import LawError
+from hpcclear.dynamics.layout import LAW_NUMBERS
 
 TYPICAL = {
     "stiffness": 9e8,
@@ -56,9 +56,9 @@ def check_shape(law: Law) -> None:
                     f"{title} asks for {name!r}, which nobody gives",
                     f"Declare it as a parameter, or in numbers; there are {', '.join(sorted(given))}",
                 )
-    if len(law.read) > MOST_NUMBERS:
+    if len(law.read) > LAW_NUMBERS:
         raise LawError(
-            f"reads {len(law.read)} numbers, and there is room for {MOST_NUMBERS}",
+            f"reads {len(law.read)} numbers, and there is room for {LAW_NUMBERS}",
             "Work more of them out in once",
         )
     if isinstance(law, ContactLaw) and law.elastic is not None:
@@ -139,6 +139,10 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
                 *(given[name] for name in law.arguments(function))
             )
             return _expected(found, title, unit)
+        except (ZeroDivisionError, OverflowError):
+            raise LawError(
+                f"{title} is not finite", "Mend the formula, or the parameters"
+            ) from None
         except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
             raise LawError(
                 f"{title} does not fit its units: {error}",

@@ -34,9 +34,6 @@ VARYING = {
 contact (a law that asks for it is latched) and one over it; the sliding speed, the normal force, and the deflection of
 bristles with its rate."""
 
-MOST_NUMBERS = 8
-"""Numbers of a sample that the functions of a law may read in the lanes."""
-
 
 @dataclass(frozen=True)
 class Parameter:
@@ -57,6 +54,16 @@ class Parameter:
     """In messages: "fixed damping factor"; its name, if empty."""
     count: int = 1
     """How many numbers: one, or a list of so many."""
+
+    def bounds(self) -> str:
+        """The bounds in words."""
+        limits = {
+            "above": self.above,
+            "at least": self.least,
+            "below": self.below,
+            "at most": self.most,
+        }
+        return " and ".join(f"{word} {one:g}" for word, one in limits.items() if one is not None)
 
     @property
     def title(self) -> str:

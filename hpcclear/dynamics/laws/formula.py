@@ -64,7 +64,11 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     names = list(dict.fromkeys(used))
     text = f"from math import *\n\n\ndef {entry}({', '.join(names)}):\n    return {ast.unparse(tree)}\n"
     function = _function(text, entry)
-    named = {"name": "expression", "words": "a formula in the scene", "formula": formula}
+    named: dict[str, Any] = {
+        "name": "expression",
+        "words": "a formula in the scene",
+        "formula": formula,
+    }
     if kind == "contact":
         return ContactLaw(**named, parameters=parameters, force=function)
     return FrictionLaw(**named, parameters=parameters, ratio=function)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.laws.declared import MOST_NUMBERS, ContactLaw, FrictionLaw, Law
+from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Law
+from hpcclear.dynamics.layout import LAW_NUMBERS
 
 _ARRAYS = {
     "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "tanh": np.tanh, "atan": np.arctan, "fabs": np.abs,
@@ -90,15 +91,15 @@ def sample_numbers(law: Law, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def rows_of(law: Law, given: Mapping[str, Any], size: int) -> Array:
-    """The numbers that its functions read in the lanes, (m, at most `MOST_NUMBERS`), in the order of ``law.read``."""
-    assert len(law.read) <= MOST_NUMBERS
+    """The numbers that its functions read in the lanes, shape (m, at most `LAW_NUMBERS`), in the order of ``law.read``."""
+    assert len(law.read) <= LAW_NUMBERS
     found = sample_numbers(law, given)
     columns = [np.broadcast_to(np.asarray(found[name], float), size) for name in law.read]
     return np.stack(columns, axis=-1) if columns else np.empty((size, 0))
 
 
 def read_from(law: Law, rows: Array) -> dict[str, Array]:
-    """The numbers of `rows_of` by name; rows of shape (..., MOST_NUMBERS)."""
+    """The numbers of `rows_of` by name; rows of shape (..., LAW_NUMBERS)."""
     return {name: rows[..., k] for k, name in enumerate(law.read)}
 
 
@@ -138,7 +139,7 @@ def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, Any]) -> Any:
 
 
 def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Array:
-    """Depth at which the elastic part is `force`, by halving on a scale of logarithms; at most 1 m."""
+    """Depth at which the elastic part is `force`, shape (m,), by halving on a scale of logarithms; at most 1 m."""
     low, high = np.full(np.shape(force), -30.0), np.zeros(np.shape(force))
     for _ in range(60):
         middle = 0.5 * (low + high)

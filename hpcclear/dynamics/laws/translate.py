@@ -8,6 +8,7 @@ import ast
 import builtins
 import inspect
 import math
+import sys
 import textwrap
 from collections.abc import Callable
 from types import FunctionType, ModuleType
@@ -37,8 +38,7 @@ class LawError(ValueError):
 def definition_of(function: Callable[..., Any]) -> ast.FunctionDef:
     """The syntax tree of a function."""
     try:
-        text = textwrap.dedent(inspect.getsource(function))
-        tree = ast.parse(text).body[0]
+        tree = ast.parse(textwrap.dedent(_source(function))).body[0]
     except (OSError, TypeError, SyntaxError, IndexError):
         raise LawError("its source cannot be read", "Write it with def in a file") from None
     if not isinstance(tree, ast.FunctionDef):
@@ -46,6 +46,16 @@ def definition_of(function: Callable[..., Any]) -> ast.FunctionDef:
             "is no function written with def", "Write it with def, at the top of the file"
         )
     return tree
+
+
+def _source(function: Callable[..., Any]) -> str:
+    """The lines of a function; of a text that stands in no file, from its module's loader."""
+    loader: Any = getattr(sys.modules.get(function.__module__), "__loader__", None)
+    path = function.__code__.co_filename
+    if path.startswith("<") and hasattr(loader, "get_source"):
+        lines = loader.get_source(function.__module__).splitlines(keepends=True)
+        return "".join(inspect.getblock(lines[function.__code__.co_firstlineno - 1 :]))
+    return inspect.getsource(function)
 
 
 def written(function: Callable[..., Any], name: str, title: str) -> list[str]:

@@ -47,7 +47,7 @@ def motion(effects, lanes, tables, W):
 '''
 
 BANK = 8
-"""Lanes of an implicit step's and of collocation's motion."""
+"""Lanes of an implicit step's motion."""
 
 _LOOK_UP = """    for i in range(W):
 {before}        work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})

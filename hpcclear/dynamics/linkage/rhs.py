@@ -147,3 +147,15 @@ def written_by(effects: at.Effects) -> ModuleType:
 def run_motion(address, work, tables):
     """Accelerations and rates of all lanes at the stage held in `work`, by the motion at an address."""
     call_at(address, (work, tables))
+
+
+@lane_function
+def run_observed(observing, address, work, tables):
+    """The same, after the motion at another address if that is not 0: what both write is this one's in the end.
+
+    So a response has works and powers, and not a bit of its motion is other than its sample's. In one motion with both, a
+    product that a force and a power share is rounded, where it stands in a fused multiply-add of the force alone.
+    """
+    if observing != 0:
+        call_at(observing, (work, tables))
+    call_at(address, (work, tables))

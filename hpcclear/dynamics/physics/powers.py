@@ -39,7 +39,8 @@ def logarithm(x):
     p = p * q + 0.2
     p = p * q + 0.3333333333333333
     p = p * q + 1.0
-    return exponent * 1.9082149292705877e-10 + 2.0 * s * p + exponent * 0.6931471803691238
+    found = exponent * 1.9082149292705877e-10 + 2.0 * s * p + exponent * 0.6931471803691238
+    return found if x == x else x
 
 
 @lane_function

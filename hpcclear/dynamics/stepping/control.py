@@ -84,13 +84,13 @@ def judge_step(work, settings, W):
 @lane_function
 def place(joint):
     """The place of a joint: not below 0, which spares the compiler a question for every lane."""
-    return joint & 7
+    return joint & at.JOINT_MASK
 
 
 @lane_function
 def coordinate(number):
     """The number of a coordinate: not below 0, likewise."""
-    return number & 31
+    return number & at.COORDINATE_MASK
 
 
 @lane_function
@@ -181,7 +181,7 @@ def commit_joint(latched, work, p, i, W):
 @lane_function
 def measure(effects, r):
     """Rate r of those that are measured: not below 0, which spares the compiler a question for every lane."""
-    return effects.measures[r] & 63
+    return effects.measures[r] & at.MEASURE_MASK
 
 
 @lane_function

@@ -1,9 +1,7 @@
 """The accepted steps of one sample, of which time series are made. Ensembles pass a record without rows, which keeps none."""
 
-from hpcclear.base.eight import combined, nine_rows, put
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.collocation.lobatto import MATRIX, SINCE, STAGES
 from hpcclear.dynamics.stepping.settings import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
@@ -42,38 +40,3 @@ def record_step(record, counters, work, stages, book, n, W):
             counters[RECORDED] = row + 1
         full = counters[RECORDED] >= record.shape[0]
     return full
-
-
-@lane_function
-def record_nodes(record, counters, work, m, book, n):
-    """Append the inner nodes of a step of collocation, which stand in the lanes of `m`, before it is committed."""
-    if record.shape[0] > 0 and book[at.SAMPLE] == 0.0:
-        for i in range(STAGES - 1):
-            row = counters[RECORDED] + i
-            turn_time = m[at.STAGE_TIME * STAGES + i]
-            record[row, TIME] = book[at.ELAPSED] + turn_time
-            record[row, TURN_TIME] = turn_time
-            record[row, REVOLUTION] = book[at.REVOLUTION]
-            for k in range(JOINTS):
-                record[row, CONTACTS + k] = m[(at.ACTIVE + k) * STAGES]
-                record[row, CONTACTS + JOINTS + k] = m[(at.INVERSE_IMPACT + k) * STAGES]
-            for k in range(n):
-                record[row, STATE + k] = m[(at.QS + k) * STAGES + i]
-                record[row, STATE + n + k] = m[(at.VS + k) * STAGES + i]
-                record[row, STATE + 2 * n + k] = m[(at.ACC + k) * STAGES + i]
-        first = counters[RECORDED]
-        counters[RECORDED] = first + STAGES - 1
-        for r in range(4):
-            power = at.DRIVE_POWER + r
-            start = work[at.RATE_OLD + power]
-            put(m, SINCE, combined(nine_rows(m, MATRIX), start, m, at.RATE_NOW + power))
-            done = book[at.TOTAL + at.WORKS + r] + work[at.INTEGRAL + power]
-            for i in range(STAGES - 1):
-                since = m[SINCE * STAGES + i]
-                record[first + i, DRIVE_WORK + r] = done + work[at.STEP] * since
-
-
-@lane_function
-def no_room(record, counters):
-    """Whether another step of collocation might not fit into `record`."""
-    return record.shape[0] > 0 and counters[RECORDED] + STAGES > record.shape[0]

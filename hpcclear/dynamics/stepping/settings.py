@@ -38,14 +38,19 @@ STRICT = 1e-6
 COUNTERS = 4
 
 # ---- numbers by which a stepper asks for what is compiled apart from it
-(ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT, PROFILE) = range(9)
-RULES = 9  # the first of them
+(
+    ASKED, LANE, FOUND, WIDTH, COORDINATES, MEASURES, MOTION, MOTION_OF_EIGHT, OBSERVING, OBSERVING_EIGHT, PROFILE,
+    RULES,  # the first of them
+) = range(12)  # fmt: skip
 NUMBERS = RULES + len(at.Rules._fields)
 
 
 def numbers_of(rules: at.Rules, width: int, n: int, measures: int) -> Integers:
     """Those of a stepper of `width` lanes, whose motions have no addresses yet."""
-    return np.array([0, 0, 0, width, n, measures, 0, 0, 0, *rules], np.int64)
+    numbers = np.zeros(NUMBERS, np.int64)
+    numbers[WIDTH], numbers[COORDINATES], numbers[MEASURES] = width, n, measures
+    numbers[RULES:] = rules
+    return numbers
 
 
 @lane_function

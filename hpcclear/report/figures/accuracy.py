@@ -130,7 +130,7 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
     if floor > 0.0:
         panel.axhline(floor, color="black", lw=0.6, ls=(0, (6, 2)))
         panel.annotate(
-            f"floor {floor:.0e}: copies disagree", (0.99, floor), xycoords=("axes fraction", "data"),
+            f"scatter of replicas {floor:.0e}", (0.99, floor), xycoords=("axes fraction", "data"),
             ha="right", va="bottom", fontsize=style.SMALL,
         )  # fmt: skip
     handles, names = panel.get_legend_handles_labels()
@@ -147,7 +147,7 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
     _foot(
         figure,
         found,
-        f"{found.attrs.get('copies', '')}, kicked by 1e-10, half of them ten times stricter.",
+        f"{found.attrs.get('copies', '')}, perturbed by 1e-10, half of them at a ten times tighter tolerance.",
     )
     return figure
 
@@ -160,7 +160,7 @@ def surrogate_figure(found: xr.Dataset) -> "Figure":
     rows = (
         ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"]),
         ("RMAE (–)", found["rmae"]),
-        ("leave-one-out error\nover deviation (–)", found["leave_one_out"]),
+        ("leave-one-out error\nover std. dev. (–)", found["leave_one_out"]),
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
         for k, surrogate in enumerate(found["surrogate"].to_numpy()):

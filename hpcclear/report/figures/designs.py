@@ -77,7 +77,7 @@ _SIDES = ((4, 3), (4, -9), (12, 3), (12, -9), (20, 3))
 """Where letters stand right of their marks, points; of three and more, left of marks in the right half of a panel."""
 
 _MOMENTS = ("mean of f", "deviation of f")
-_LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"deviation $\sigma_f$"))
+_LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"standard deviation $\sigma_f$"))
 
 
 def _goals(one: xr.Dataset) -> list[_Goal]:
@@ -96,6 +96,7 @@ def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
 def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     """One of them, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
     values = one[f"searched_{name}"]
+    words = labels.statistic(words)
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
     share = words.startswith("share ")
@@ -191,10 +192,10 @@ def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, c
 def _mark(one: xr.Dataset) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
-        return "the paper's, directly", "D"
+        return "paper (simulated)", "D"
     if str(one["design"].item()).rpartition(" ")[2] == "original":
-        return "the original, directly", "s"
-    return "ours, directly simulated", "o"
+        return "baseline (simulated)", "s"
+    return "optimised (simulated)", "o"
 
 
 def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:

@@ -71,11 +71,11 @@ def _verdict(one: xr.Dataset, tolerance: float) -> str:
     room = tolerance - np.abs(one["change"].to_numpy()[open_])
     count = int(one["samples"])
     if np.isnan(room).any():
-        return f"; cannot be told: {int(one['failed'])} of {count} samples failed"
+        return f"; undecided: {int(one['failed'])} of {count} samples failed"
     if room.min() <= 0.0:
-        return f"; cannot be told by {count} samples"
+        return f"; undecided with {count} samples"
     more = count * float((one["limit"].to_numpy()[open_] / room).max()) ** 2
-    return f"; cannot be told by {count} samples, about {float(f'{more:.1g}'):.0f} would do"
+    return f"; undecided with {count} samples, about {float(f'{more:.1g}'):.0f} would suffice"
 
 
 def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
@@ -83,10 +83,11 @@ def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
     chosen = int(np.argmax(content["recommended"].to_numpy()))
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
-    last = f"Nothing can be left out within {tolerance}."
+    last = f"No effect can be neglected within {tolerance}."
     if chosen:
         share = saving(content, chosen, seconds)
-        last = f"Within {tolerance} the scene can do without {', '.join(named(content, chosen))}: saves {100 * share:.0f} %."
+        names = ", ".join(named(content, chosen))
+        last = f"Within {tolerance} these effects can be neglected: {names}. This saves {100 * share:.0f} %."
     return [*(statement(content, k, seconds) for k in singles), *told_apart(content), last]
 
 

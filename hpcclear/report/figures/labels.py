@@ -15,9 +15,9 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 FLAGS = {
-    Flag.LATCHED: "a joint did not lift off for at least one averaged revolution: its damping still uses the velocity "
-    "of the last impact, so f may depend on the tolerance",
-    Flag.BEYOND_HERTZ: "penetration went beyond the range of Hertz theory",
+    Flag.LATCHED: "a joint stayed in contact for at least one averaged revolution. Its damping still uses the last impact "
+    "velocity, so results may depend on the integration tolerance; the law hunt-crossley has no such memory",
+    Flag.BEYOND_HERTZ: "indentation exceeds 25 % of the clearance, beyond the range of Hertz contact: forces are indicative",
     Flag.STIFF: "the implicit method was used for part of the run",
 }
 """What flags of a sample say."""
@@ -128,6 +128,11 @@ def words(variable: xr.DataArray) -> str:
 def objective(content: xr.Dataset) -> str:
     """What f is in a file of results, in words."""
     return str(content.attrs.get("objective", MEAN_GAP.words))
+
+
+def statistic(words: str) -> str:
+    """A statistic of f as files name it, in the words that are printed."""
+    return re.sub(r"^deviation of f", "standard deviation of f", words)
 
 
 def design_variables(content: xr.Dataset) -> list[xr.DataArray]:

@@ -206,7 +206,7 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     """A line for each body, joint, drive and load."""
     mechanism = cast(Planar, scene.mechanism)
     q = labels.quantity
-    lines = ["angles from x, counter-clockwise; ○ mass centre; a ring about a joint: play"]
+    lines = ["angles from x, counter-clockwise; ○ mass centre; a ring about a joint: clearance"]
     for body in mechanism.bodies:
         size = "" if body.length is None else f"{q(body.length, 'm')}, "
         lines.append(

@@ -104,7 +104,7 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     """What responses are compared by: variable, joint or "", words."""
     named = enumerate(joints(response).items(), 1)
     found = [("contact_force", label, f"contact force {k} ({name})") for k, (label, name) in named]
-    found.append(("crank_moment", "", "crank moment"))
+    found.append(("crank_moment", "", "torque of the drive"))
     if "slider_acceleration" in response:
         found.append(("slider_acceleration", "", "slider acceleration"))
     return found

@@ -118,12 +118,12 @@ def _spread(below: "Axes", samples: xr.Dataset, main: xr.DataArray) -> None:
     below.set_xlabel(labels.of(main).label(symbol(main)))
     if not bool(spread.notnull().any()) and bool(samples["objective"].notnull().any()):
         below.set_yticks([])
-        words = "its scatter between revolutions\nis not known of this objective"
+        words = "cycle-to-cycle variation\nnot available for this objective"
         place: dict[str, Any] = {"ha": "center", "va": "center", "transform": below.transAxes}
         below.text(0.5, 0.5, words, fontsize=style.SMALL, **place)
         return
     _cloud(below, main, spread, _values(main))
-    below.set_ylabel(labels.of(spread).label("spread of $f$"))
+    below.set_ylabel(labels.of(spread).label("std. dev. in time"))
     positive = spread.where(spread > 0)
     if float(positive.max()) > 30.0 * float(positive.min()):
         below.set_yscale("log")
@@ -174,7 +174,7 @@ def _title(samples: xr.Dataset) -> str:
     count = samples.sizes["sample"]
     failed = int((samples["status"] != 0).sum())
     latched = int((samples["latched"] != 0).any("joint").sum()) if "latched" in samples else 0
-    return f"{count} simulations: {failed} failed, {latched} with a joint latched"
+    return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"
 
 
 def _marks(samples: xr.Dataset) -> list[Any]:

@@ -142,12 +142,12 @@ def _key(scene: Scene) -> list[str]:
                 f"bearing R {_q(joint.bearing_radius, 'm')}"
             )
         else:
-            lines.append(f"{label}, {name}: ideal, no play")
+            lines.append(f"{label}, {name}: ideal, no clearance")
     drive = scene.drive
     if isinstance(drive, TorqueDrive):
         lines.append(f"crank: {_rpm(drive.initial_speed)} at the start, torque M")
     else:
-        lines.append(f"crank: {_rpm(drive.speed)}, held")
+        lines.append(f"crank: {_rpm(drive.speed)}, constant speed")
     if effects.slider_load is not None:
         lines.append(f"F on the slider, along x: {_range(effects.slider_load)}")
     if effects.gravity > 0.0:

@@ -77,12 +77,12 @@ def survival_figure(wear: xr.Dataset) -> "Figure":
     panel, cycles = axes[0, 0], wear["cycle"].to_numpy()
     lower, upper = wear["survival_lower"].to_numpy(), wear["survival_upper"].to_numpy()
     panel.fill_between(
-        cycles, lower, upper, color=style.PALETTE["blue"], alpha=0.25, lw=0, label="95 % limits"
+        cycles, lower, upper, color=style.PALETTE["blue"], alpha=0.25, lw=0, label="95 % CI"
     )
     panel.plot(cycles, wear["survival"].to_numpy(), color=style.PALETTE["blue"], label="survival")
     panel.set_ylim(-0.02, 1.02)
     panel.set_xlabel(_revolutions(wear))
-    panel.set_ylabel("lives that are not over (–)")
+    panel.set_ylabel("survival (–)")
     panel.legend(loc="lower left")
     style.settle(axes)
     return figure

@@ -38,8 +38,8 @@ def words(content: Content) -> list[str]:
     reached = "; ".join(told) if told else "no error of f down to 1% was reached"
     floor = float(found["averaging_floor"])
     return [
-        f"What accuracy costs was measured. For one revolution, an error of f of {reached}.",
-        f"Averages of f over long stretches disagree by {floor:.1e}, whatever the tolerance.",
+        f"The cost of accuracy was measured. For one revolution, an error of f of {reached}.",
+        f"Means of f over long intervals differ by {floor:.1e}, at any tolerance.",
     ]
 
 
@@ -82,7 +82,7 @@ def _averaging(found: xr.Dataset) -> list[list[object]]:
         rows.append([f"average over {count} revolutions", *_cells(float(one), cost)])
     rows.append(
         [
-            "floor of averaging: copies disagree",
+            "scatter between replicas (lower bound of the averaging error)",
             Number(f"{float(found['averaging_floor']):.1e}"),
             "",
         ]

@@ -37,7 +37,7 @@ _RESULTS: tuple[Drawing, ...] = (
     (
         "samples",
         samples.samples_figure,
-        "Objective against every design variable, its spread and histogram.",
+        "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
     ),
     (
         "sensitivity",
@@ -64,24 +64,24 @@ _RESULTS: tuple[Drawing, ...] = (
     (
         "kriging",
         surrogates.parity_figure,
-        "Surrogate against dynamics: each point predicted without itself; R² on test points.",
+        "Surrogate against simulation: each point predicted without itself; R² on test points.",
     ),
     (
         "wear",
         wear.fan_figure,
-        "Clearance and objective over the life: median, half and nine tenths of the lives; single lives in grey.",
+        "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
     ),
     (
         "wear",
         wear.survival_figure,
-        "Lives that have passed no limit, with 95 % limits (Clopper and Pearson).",
+        "Survival, with 95 % confidence interval (Clopper and Pearson).",
     ),
     (
         "wear",
         wear.profile_figure,
-        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over lives.",
+        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
     ),
-    ("timing", timing.timing_figure, "Where the ranks' time went, by rank and by stage."),
+    ("timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
 )
 """Kind of file, figure, caption."""
 
@@ -100,7 +100,7 @@ _RESPONSE = (
     (portraits.phase_figure, "phase portraits"),
     (portraits.poincare_figure, "Poincaré section, once a revolution"),
     (response.spectrum_figure, "spectra"),
-    (response.energy_figure, "energy ledger"),
+    (response.energy_figure, "energy balance"),
 )
 
 
@@ -120,16 +120,18 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
         yield from _of_file(draw, content.get(kind), caption)
     certificate, times = content.get("effects"), content.get("timing")
     if certificate is not None:
-        told = "Change of f with each effect off, with its limits and the tolerance; the time that leaving it out saves."
+        told = "Change of f with each effect off, with confidence interval and tolerance, and the run time saved."
         yield told, lambda: _shown(effects.effects_figure(certificate, times), told)
     front = content.get("front")
     if front is not None:
         verified = content.get("verification")
-        caption = "Pareto fronts of all runs, and the designs simulated directly."
+        caption = (
+            "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs."
+        )
         yield caption, lambda: _shown(designs.front_figure(front, verified), caption)
     costs = content.get("accuracy")
     for name, draw in accuracy.FIGURES.items() if costs is not None else ():
-        yield from _of_file(draw, costs, f"What accuracy costs: {name.replace('_', ' ')}.")
+        yield from _of_file(draw, costs, f"Cost of accuracy: {name.replace('_', ' ')}.")
     found = content.responses
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]

@@ -41,6 +41,8 @@ class Section:
     """File in ``templates`` that shows its content."""
     content: Any
     """For the template; None where there is nothing to show."""
+    folded: bool = False
+    """Whether it opens on request only."""
 
 
 def preformatted(text: str, summary: str = "") -> dict[str, str]:

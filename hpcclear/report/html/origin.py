@@ -23,8 +23,8 @@ def effects(content: Content) -> list[object] | None:
     else:
         shown = ("drive", "joints", "effects", "numerics")
         rows = [row for name in shown for row in _flat(entries.get(name), name)]
-        words = "An effect that is not listed was off, and not even compiled."
-        first = [words, Table(["entry", "value"], rows, "What was simulated")]
+        words = "Effects that are not listed were disabled."
+        first = [words, Table(["entry", "value"], rows, "Settings of the model")]
     return [*first, preformatted(scene, "The whole scene file")]
 
 
@@ -57,7 +57,7 @@ def timing(content: Content) -> list[object] | None:
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
-    return [Table(header, rows, "Where the ranks' time went, all stages")]
+    return [Table(header, rows, "Time of each rank, all stages")]
 
 
 def reproduce(content: Content) -> list[object]:
@@ -83,5 +83,5 @@ def reproduce(content: Content) -> list[object]:
         if content.attribute(name)
     ]
     if rows:
-        steps += [words, Table(["what", "value"], rows, "What made these files")]
+        steps += [words, Table(["what", "value"], rows, "Origin of these files")]
     return steps

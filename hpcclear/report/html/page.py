@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.report.answer import answer
-from hpcclear.report.html import costs, gallery, origin, picture, sections
+from hpcclear.report.html import costs, gallery, loads, origin, picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import Section, render
@@ -25,8 +25,8 @@ _MISSING = {
     "kriging": "kriging.nc: no surrogate (`hpcclear run`)",
     "front": "front.nc: nothing was optimised (`hpcclear run`)",
     "verification": "verification.nc: no design was verified (`hpcclear run`)",
-    "accuracy": "accuracy.nc: what accuracy costs was not measured (`hpcclear accuracy`)",
-    "timing": "timing.nc: how the ranks spent their time is not known",
+    "accuracy": "accuracy.nc: the cost of accuracy was not measured (`hpcclear accuracy`)",
+    "timing": "timing.nc: the time of the ranks is not known",
 }
 
 
@@ -110,22 +110,23 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
 
     One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
     """
-    beside = " beside the paper's" if content.is_compared else ""
+    beside = " and those of the paper" if content.is_compared else ""
     drawn = functools.partial(gallery.figures, troubles=troubles)
     makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
-        ("answer", "The answer", "answer.html", lambda one: answer(one.files, "") or None),
+        ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
         ("summary", "Summary", "summary.html", sections.summary),
         ("designs", f"Optimised designs{beside}", "designs.html", sections.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
-        ("claims", "Claims of the paper", "parts.html", sections.claims),
-        ("readings", "How the paper can be read", "parts.html", sections.readings),
-        ("motion", "The mechanism in motion", "motion.html", lambda one: one.responses or None),
-        ("accuracy", "What accuracy cost", "parts.html", costs.accuracy),
+        ("loads", "Loads of the bearings", "parts.html", loads.loads),
+        ("motion", "Animation", "motion.html", lambda one: one.responses or None),
+        ("accuracy", "Cost of accuracy", "parts.html", costs.accuracy),
         ("figures", "Figures", "figures.html", drawn),
-        ("trust", "Which samples to trust", "parts.html", sections.trust),
-        ("time", "How the ranks spent their time", "parts.html", origin.timing),
+        ("trust", "Data quality", "parts.html", sections.trust),
         ("effects", "Effects and settings", "parts.html", origin.effects),
         ("reproduce", "How to reproduce", "parts.html", origin.reproduce),
+        ("claims", "Claims of the paper", "parts.html", sections.claims),
+        ("readings", "Effect of ambiguities in the paper", "parts.html", sections.readings),
+        ("time", "Time of the ranks", "parts.html", origin.timing),
     )
     for name, title, template, make in makers:
         # figures are limited one by one
@@ -133,14 +134,18 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         made = section() if name == "figures" else attempt(f"“{title}”", section, troubles)
         if made is not None:
             yield made
-    yield Section("missing", "What is not here", "list.html", _missing(content, troubles))
+    yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
+
+
+_FOLDED = ("claims", "readings", "time")
+"""Sections that few readers need."""
 
 
 def _section(
     name: str, title: str, template: str, make: Callable[[Content], object], content: Content
 ) -> Section:
     """A section whose content its template can show, which is tried."""
-    section = Section(name, title, template, make(content))
+    section = Section(name, title, template, make(content), name in _FOLDED)
     if section.content is not None:
         render(template, content=section.content)
     return section

@@ -13,9 +13,9 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 
 _LEGEND = {
-    "design": "simulated directly",
-    "original": "original design",
-    "printed": "the paper’s design",
+    "design": "simulated",
+    "original": "baseline design",
+    "printed": "design of the paper",
 }
 _USUAL = ("mean of f", "deviation of f")
 FRAMES = 180  # of a revolution

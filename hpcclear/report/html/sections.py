@@ -46,24 +46,22 @@ def _lives_words(content: Content) -> list[str]:
     cycles, failed = float(last["cycle"]), int((~np.isin(lives["ending"], LIVED)).sum())
     early = int((lives["ended"] < cycles).sum()) - failed
     words = [
-        f"{lives.sizes['life']} lives of {'up to ' if early > 0 else ''}{cycles:.4g} revolutions were followed; "
-        f"{_none(failed)} failed."
+        f"{lives.sizes['life']} service lives of {'up to ' if early > 0 else ''}{cycles:.4g} revolutions were simulated; "
+        f"{_failures(failed)}."
     ]
     ends = lives["end_clearance"] if "end_clearance" in lives else lives["clearance"].isel(cycle=-1)
     levels = quantiles(ends.to_numpy(), np.array([0.05, 0.95]))
     for k, name in enumerate(lives["joint"].to_numpy()):
         low, high = (str(quantity(float(value), "m")) for value in levels[:, k])
-        words.append(
-            f"The clearance of {name} ends between {low} and {high} in nine of ten of them."
-        )
+        words.append(f"Final clearance of {name}, 5th to 95th percentile: {low} to {high}.")
     if "lifetime_hours_quantile" in lives:
         median = lives.sel(quantile=0.5)
         turns, hours = float(median["lifetime_quantile"]), float(median["lifetime_hours_quantile"])
         if np.isfinite(turns):
-            words.append(f"Half of them are over after {turns:.4g} revolutions, {hours:.4g} h.")
+            words.append(f"Median service life: {turns:.4g} revolutions, {hours:.4g} h.")
     if any(name.startswith("limit_") for name in lives.attrs):
         limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
-        words.append(f"{float(last['survival']):.0%} of them pass no limit (95 % limits {limits}).")
+        words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {limits}).")
     return words
 
 
@@ -73,7 +71,7 @@ def _samples_words(content: Content) -> list[str]:
         return []
     count, failed = samples.sizes["sample"], int((samples["status"] != 0).sum())
     names = ", ".join(labels.words(v) for v in labels.design_variables(samples))
-    words = [f"{count} samples, different in {names}, were simulated; {_none(failed)} failed."]
+    words = [f"{count} simulations, varying {names}; {_failures(failed)}."]
     f = samples["objective"]
     if bool(f.notnull().any()):
         low, high = (str(quantity(float(end), str(f.attrs["units"]))) for end in (f.min(), f.max()))
@@ -104,22 +102,23 @@ def _designs_words(content: Content) -> list[str]:
         if letter not in ("alpha", "beta") or base is None or not is_plain(one):
             continue  # the averaged best of a case, or of another goal, which the answer tells
         what = "mean" if letter == "alpha" else "deviation"
+        printed = "mean" if letter == "alpha" else "standard deviation"
         change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
         value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
         told = _as_far_as_told(by_name, one, what)
         words.append(
-            f"Design “{name}”, of the least {what} of f of all designs simulated{told}, has a {what} of {value}: "
-            f"{abs(change):.0%} {'less' if change < 0 else 'more'} than the original design."
+            f"Design “{name}” has the lowest {printed} of f of all simulated designs{told}: {value}, "
+            f"{abs(change):.0%} {'below' if change < 0 else 'above'} the baseline design."
         )
     return words
 
 
 def _as_far_as_told(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: str) -> str:
-    """Where another design of the case has less, which its limits do not tell from this one's."""
+    """A restriction, where another design of the case has a lower value that is statistically indistinguishable."""
     case = str(one["case"].item()) if "case" in one else ""
     rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
     less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
-    return " as far as limits tell" if less else ""
+    return " within the confidence intervals" if less else ""
 
 
 def _claims_words(content: Content) -> list[str]:
@@ -130,7 +129,7 @@ def _claims_words(content: Content) -> list[str]:
     counts = [verdicts.count(verdict) for verdict in _MARKS]
     return [
         f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, "
-        f"{counts[1]} do not, and {counts[2]} cannot be told."
+        f"{counts[1]} do not, and {counts[2]} are undecided."
     ]
 
 
@@ -147,8 +146,8 @@ def _time_words(content: Content) -> list[str]:
     ]
 
 
-def _none(count: int) -> str:
-    return "none" if count == 0 else str(count)
+def _failures(count: int) -> str:
+    return "no failures" if count == 0 else f"{count} failed"
 
 
 def _facts(content: Content) -> list[tuple[str, object]]:
@@ -192,17 +191,17 @@ def designs(content: Content) -> dict[str, object] | None:
         (k for k in range(len(names)) if k not in spread), key=lambda k: _place(verified, k)
     )
     words = (
-        f"Mean and deviation of f, {labels.objective(verified)}, by direct simulation, with confidence limits; and by the "
-        "surrogate."
+        f"Mean and standard deviation of f, {labels.objective(verified)}: by simulation with 95 % half-widths, and as the "
+        "surrogate predicts them."
     )
-    caption = "The original and the optimised designs"
+    caption = "Baseline and optimised designs"
     if content.is_compared:
         words = (
-            "Mean and deviation of f by direct simulation, with confidence limits; by the surrogate; and as the paper "
-            "prints them in its Table 4. The printed deviations are neither deviation nor variance of f as the model "
-            "here gives it; nothing was fitted to them."
+            "Mean and standard deviation of f: by simulation with 95 % half-widths, as the surrogate predicts them, and as the "
+            "paper prints them in its Table 4. The printed standard deviations match neither the standard deviation nor the "
+            "variance of f in this model; nothing was fitted to them."
         )
-        caption = "Table 4, ours and the paper's"
+        caption = "Table 4: this study and the paper"
     remarks = str(verified.attrs.get("remarks", "none"))
     return {
         "words": words,
@@ -220,16 +219,16 @@ def designs(content: Content) -> dict[str, object] | None:
 
 
 _MEANINGS = (
-    ("original", "the scene as it is written"),
-    ("alpha", "least mean (or of the first that the case makes small) of all designs simulated"),
+    ("original", "the baseline design, as the scene file has it"),
+    ("alpha", "lowest mean (or first objective of the case) of all simulated designs"),
     (
         "beta",
-        "least deviation (or of the second) of these, and of designs that cannot be told from it the best in the other",
+        "lowest standard deviation (or second objective); ties are broken by the first objective",
     ),
-    ("front", "between these two, not beaten in both by any other"),
-    ("best", "alpha or beta by the surrogate alone, in the best run of the swarm"),
-    ("averaged", "the average of what all runs of the swarm found so"),
-    ("candidate", "met by the search on the way, and simulated anew beside the others"),
+    ("front", "non-dominated designs between the two"),
+    ("best", "alpha or beta as predicted by the surrogate alone, in the best run of the search"),
+    ("averaged", "the mean of these designs over all runs of the search"),
+    ("candidate", "found during the search and simulated like the others"),
 )
 """Kinds of designs, by a word of their names, and what they are."""
 
@@ -240,13 +239,11 @@ def _meanings(names: Sequence[str]) -> list[tuple[str, str]]:
     if not further:
         return list(_MEANINGS)
     told = dict(_MEANINGS)
-    told["beta"] = told["beta"].replace("the other", "the others")
-    told["front"] = "between these, not beaten in all by any other"
+    told["beta"] = told["beta"].replace("the first objective", "the other objectives")
+    told["front"] = "non-dominated designs between these"
     told["best"] = told["best"].replace("alpha or beta", "alpha, beta or a further end")
     places = zip(further, ORDINALS[2:], strict=False)
-    rows = [
-        (end, f"least of the {place} that the case makes small, likewise") for end, place in places
-    ]
+    rows = [(end, f"lowest {place} objective of the case") for end, place in places]
     return [*list(told.items())[:3], *rows, *list(told.items())[3:]]
 
 
@@ -270,13 +267,13 @@ def _place(verified: xr.Dataset, k: int) -> tuple[str, int]:
 
 _MOMENTS = (
     ("mean_true", "mean of f"),
-    ("deviation_true", "deviation of f"),
-    ("life_mean", "mean over own life"),
-    ("life_deviation", "deviation over own life"),
+    ("deviation_true", "std. deviation of f"),
+    ("life_mean", "mean, own wear"),
+    ("life_deviation", "std. deviation, own wear"),
     ("mean_surrogate", "surrogate: mean"),
-    ("deviation_surrogate", "surrogate: deviation"),
+    ("deviation_surrogate", "surrogate: std. deviation"),
     ("mean_paper", "printed: mean"),
-    ("deviation_paper", "printed: deviation"),
+    ("deviation_paper", "printed: std. deviation"),
 )
 
 
@@ -288,7 +285,7 @@ def _designs_table(verified: xr.Dataset, caption: str) -> Table:
     header = ["design", *(s.label(words) for s, (_, words) in zip(scales, columns, strict=True))]
     asked = [name for name in ORDINALS if f"{name}_goal" in verified]
     if asked:  # each case asks for its own, so the cells say what it is
-        header += ["made small", *["and"] * (len(asked) - 1), "constraints"]
+        header += [*(f"objective {k + 1}" for k in range(len(asked))), "constraints"]
     rows = []
     for k in range(verified.sizes["design"]):
         row: list[object] = [verified["design"].to_numpy()[k]]
@@ -308,7 +305,7 @@ def _asked(one: xr.Dataset, names: Sequence[str]) -> list[object]:
     cells: list[object] = []
     for name in names:
         value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
-        words = str(one[f"{name}_goal"].item())
+        words = labels.statistic(str(one[f"{name}_goal"].item()))
         cells.append(f"{words}: {value}" if words else "")
     return [*cells, str(one["constraints"].item()) or "none"]
 
@@ -356,7 +353,8 @@ def claims(content: Content) -> list[object] | None:
         one = found.isel(claim=k)
         verdict = str(one["verdict"].item())
         mark, kind = _MARKS.get(verdict, ("", "open"))
-        badge = {"words": f"{mark} {verdict}", "kind": kind}
+        words = "undecided" if kind == "open" else verdict
+        badge = {"words": f"{mark} {words}", "kind": kind}
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
     header = ["claim", "verdict", "the numbers that decide"]
     return [Table(header, rows, "Claims of the paper, tested on this data")]

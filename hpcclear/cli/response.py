@@ -1,0 +1,117 @@
+"""What `simulate` prints: loads of the bearings first, then torque, validity and objective, then warnings."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from rich import box
+from rich.table import Table
+
+from hpcclear.base.outcome import Status
+from hpcclear.cli.printing import console, fitting, objective_of, quantity, remark, table
+from hpcclear.dynamics.steady.telling import in_a_line
+from hpcclear.report import bearings
+from hpcclear.report.figures import labels, motion
+
+
+def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
+    """Print the loads, objective and warnings of one response (kind ``response``), and its file.
+
+    `seconds`: run time, printed with a steady mean.
+    """
+    out = console()
+    status = Status(int(response["status"]))
+    loads = bearings.bearings(response)
+    if status.valid and loads:
+        out.print(_bearing_table(loads))
+    out.print(table("Response", [*_status_rows(response), *_rows(response, seconds)]))
+    for label, text in bearings.remarks(response):
+        out.print(remark(label, text))
+    out.print(f"written  {output}")
+
+
+def _status_rows(response: xr.Dataset) -> list[tuple[str, str]]:
+    """How the simulation ended, and for a failure its remedy."""
+    status = Status(int(response["status"]))
+    said = f"{status.name.lower()}: {status.message}"
+    rows = [("status", response.attrs.get("ended", said))]
+    return rows if status is Status.OK else [*rows, ("remedy", status.remedy)]
+
+
+def _bearing_table(found: list[bearings.Bearing]) -> Table:
+    """Peak and mean force, angle of the peak, contact and mean gap of each joint."""
+    made = Table(
+        title="Bearings, over the averaged revolutions", title_justify="left", box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )  # fmt: skip
+    pressed = any(np.isfinite(one.pressure) for one in found)
+    made.add_column("joint", overflow="fold")
+    for header in ("peak force", "at crank angle", "mean force", "contact", "mean gap"):
+        made.add_column(header, justify="right")
+    if pressed:
+        made.add_column("mean pressure", justify="right")
+    for one in found:
+        row = [
+            one.joint,
+            quantity(one.peak, "N"),
+            bearings.degrees(one),
+            quantity(one.mean, "N"),
+            bearings.share(one.contact),
+            quantity(one.gap, "m"),
+            quantity(one.pressure, "Pa", 3),
+        ]
+        made.add_row(*(fitting(cell) for cell in (row if pressed else row[:-1])))
+    return made
+
+
+def _rows(response: xr.Dataset, seconds: float | None) -> list[tuple[str, str]]:
+    """Everything about the whole mechanism, the objective after the loads."""
+    rows = []
+    status = Status(int(response["status"]))
+    if status.valid:
+        drive = bearings.torque(response)
+        shown = f"largest {quantity(drive.peak, 'N m')}, mean {quantity(drive.mean, 'N m')}"
+        rows += [("torque of the drive", shown), *_crank(response)]
+        rows += [("peak between instants", text) for text in _between_instants(response)]
+        if bearings.bearings(response):
+            rows.append(("contact model", bearings.validity(response)))
+        if "regime" in response:
+            rows.append(("f, steady mean", in_a_line(response, seconds)))
+    f, spread = float(response["objective"]), float(response["objective_spread"])
+    words, unit = objective_of(response)
+    half_width = float(
+        response["objective_limit" if "regime" in response else "objective_uncertainty"]
+    )
+    shown = fitting(labels.with_half_width(f, half_width, unit)) if np.isfinite(f) else "nan"
+    rows.append(("objective f", f"{shown}: {words}"))
+    if np.isfinite(spread):
+        rows.append(("cycle-to-cycle std. dev.", quantity(spread, unit, 2)))
+    return [*rows, ("force evaluations", f"{int(response['rhs_evaluations'])}")]
+
+
+def _between_instants(response: xr.Dataset) -> list[str]:
+    """Joints whose peak force lies between two stored instants, with the largest stored value."""
+    if "transient_turns" not in response.attrs:
+        return []
+    return [
+        f"{one.joint}, at an angle not known; largest stored value of the averaged revolutions "
+        f"{quantity(one.stored, 'N')} at {np.degrees(one.angle):.0f} deg"
+        for one in bearings.bearings(response)
+        if one.between_instants
+    ]
+
+
+def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
+    """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
+    if "crank_speed" not in response:
+        return []
+    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
+    turns, time = motion.turns(response), response["time"].to_numpy()
+    if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
+        return []  # it is prescribed
+    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)
+    shown = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
+    means = 60.0 / np.diff(ends)
+    if len(means) > 1:
+        shown += f"; drift of the last revolution {means[-1] - means[-2]:+.2g} rpm"
+    return [("crank speed", shown)]

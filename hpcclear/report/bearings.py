@@ -1,0 +1,179 @@
+"""Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.figures import labels, motion
+from hpcclear.scene.loading import scene_of_text
+
+MISSED = 0.01
+"""Of a peak force: what the largest stored force may lack of it and still be the same peak."""
+
+ROUNDING = 1e-12
+"""Of the largest torque: a smaller mean is zero but for rounding."""
+
+SENSITIVE = 0.01
+"""Half-width over f beyond which f is reported as sensitive to initial conditions."""
+
+_SENSITIVE_WORDS = (
+    "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is {:.0%} of f. "
+    "Set numerics.target_error for a mean with a confidence interval"
+)
+
+REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
+
+
+class Bearing(NamedTuple):
+    """Loads of one joint with clearance over the averaged revolutions; NaN where unknown."""
+
+    joint: str
+    peak: float
+    """Peak contact force, N; between the stored instants too."""
+    stored: float
+    """Largest stored contact force, N."""
+    angle: float
+    """Crank angle of that instant, rad, 0 to 2 pi."""
+    mean: float
+    """Time mean of the contact force, N."""
+    pressure: float
+    """Mean force over the projected area 2 R_B L, Pa; the scene gives L for a film or for wear."""
+    contact: float
+    """Share of the time in contact."""
+    gap: float
+    """Mean distance of the journal centre from the clearance circle, m."""
+
+    @property
+    def between_instants(self) -> bool:
+        """Whether the peak lies between two stored instants."""
+        return self.stored < (1.0 - MISSED) * self.peak
+
+
+class Torque(NamedTuple):
+    """Torque of the drive over the averaged revolutions, N m."""
+
+    peak: float
+    """Of its absolute value, at the stored instants."""
+    mean: float
+
+
+def bearings(response: xr.Dataset) -> list[Bearing]:
+    """Return the loads of each joint with clearance of a response (kind ``response``), in its order."""
+    inside = averaged(response)
+    weight = _weights(response["time"].to_numpy()[inside])
+    angles = response["crank_angle"].to_numpy()[inside]
+    areas = _projected_areas(response)
+    found = []
+    for k, joint in enumerate(map(str, response["joint"].to_numpy())):
+        if float(response["mean_gap"][k]) == float(response["peak_contact_force"][k]) == 0.0:
+            continue  # an ideal joint of a slider-crank
+        force = response["contact_force"].to_numpy()[inside, k]
+        touching = response["penetration"].to_numpy()[inside, k] > 0.0
+        at = int(force.argmax()) if len(force) else 0
+        mean = float(weight @ force) if len(force) else np.nan
+        found.append(
+            Bearing(
+                joint,
+                float(response["peak_contact_force"][k]),
+                float(force[at]) if len(force) else np.nan,
+                float(angles[at] % (2.0 * np.pi)) if len(force) else np.nan,
+                mean,
+                mean / areas.get(joint, np.nan),
+                float(weight @ touching) if len(force) else np.nan,
+                float(response["mean_gap"][k]),
+            )
+        )
+    return found
+
+
+def torque(response: xr.Dataset) -> Torque:
+    """Return the torque of the drive; NaN if no averaged revolution is stored."""
+    inside = averaged(response)
+    if not inside.any():
+        return Torque(np.nan, np.nan)
+    moment = response["crank_moment"].to_numpy()[inside]
+    weight = _weights(response["time"].to_numpy()[inside])
+    peak, mean = float(np.abs(moment).max()), float(weight @ moment)
+    return Torque(peak, mean if abs(mean) > ROUNDING * peak else 0.0)
+
+
+def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
+    """Return every remark on a response as terminal and page print it: "Warning" or "Note", and its text."""
+    found = []
+    f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
+    if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
+        found.append(("Warning", _SENSITIVE_WORDS.format(half_width / abs(f))))
+    flags = int(response["flags"])
+    warnings = flag_remarks(flags & ~int(Flag.STIFF))
+    notes = flag_remarks(flags & int(Flag.STIFF))
+    return [
+        *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
+    ]  # fmt: skip
+
+
+def validity(response: xr.Dataset) -> str:
+    """Return in plain words whether the model is valid for a response."""
+    status, flags = Status(int(response["status"])), int(response["flags"])
+    if not status.valid:
+        return "the simulation failed: no number of it is a result"
+    if flags & Flag.BEYOND_HERTZ:
+        return "outside the range of Hertz contact: forces are indicative only"
+    if flags & Flag.LATCHED:
+        return "within the range of Hertz contact; results may depend on the integration tolerance"
+    return "within the range of Hertz contact"
+
+
+def share(contact: float) -> str:
+    """Return a share of the time in words; a share that is not 0 or 1 is never rounded to it."""
+    if not np.isfinite(contact):
+        return "nan"
+    if contact in (0.0, 1.0):
+        return f"{contact:.0%}"
+    return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"
+
+
+def degrees(one: Bearing) -> str:
+    """Return the crank angle of the peak in words, a dash where no stored instant has it."""
+    known = np.isfinite(one.angle) and not one.between_instants and one.peak > 0.0
+    return f"{np.degrees(one.angle):.0f} deg" if known else "–"
+
+
+def flag_remarks(flags: int) -> list[str]:
+    """Return a sentence for each flag that is set."""
+    return [text for flag, text in REMARKS.items() if flags & flag]
+
+
+def averaged(response: xr.Dataset) -> Booleans:
+    """Return which instants (time,) lie in the averaged revolutions; all where the file does not say."""
+    turned = motion.turns(response)
+    first = int(response.attrs.get("transient_turns", 0))
+    inside: Booleans = turned - turned[:1] > first - 1e-6
+    return inside
+
+
+def _weights(time: Array) -> Array:
+    """Weights of a time mean by the trapezoidal rule, shape (time,)."""
+    if len(time) < 2:
+        return np.ones(len(time))
+    steps = np.diff(time)
+    weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    return weights / weights.sum()
+
+
+def _projected_areas(response: xr.Dataset) -> dict[str, float]:
+    """2 R_B L of each joint whose length the scene gives, m^2."""
+    try:
+        scene = scene_of_text(str(response.attrs["scene"]), "scene")
+    except (InputError, KeyError):
+        return {}  # a file of another version, or without its scene
+    areas = {}
+    for joint in scene.clearance_joints():
+        one = scene.clearance_joint(joint)
+        part = one.film or one.wear
+        if part is not None:
+            areas[joint] = 2.0 * one.bearing_radius * part.length
+    return areas

@@ -1,0 +1,63 @@
+"""The page's section on the loads of the bearings: the numbers and remarks that the terminal prints after `simulate`."""
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.outcome import Status
+from hpcclear.report import bearings
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Number, Table, quantity
+
+_NO_ANGLE = "A dash instead of an angle: the peak lies between two stored instants, and the stored force there is lower."
+
+
+def loads(content: Content) -> list[object] | None:
+    """Return a table of the bearings of every stored response, torque and validity, then the remarks; None without any."""
+    valid = {
+        name: one for name, one in content.responses.items() if Status(int(one["status"])).valid
+    }
+    found = {name: bearings.bearings(one) for name, one in valid.items()}
+    parts: list[object] = []
+    if any(found.values()):
+        parts.append(_bearings(found))
+    if any(bearings.degrees(one) == "–" for each in found.values() for one in each):
+        parts.append(_NO_ANGLE)
+    if valid:
+        header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
+        rows = [_whole(name, one) for name, one in valid.items()]
+        parts.append(Table(header, rows, "Drive, objective, and validity of the contact model"))
+    for name, one in content.responses.items():
+        status = Status(int(one["status"]))
+        if not status.valid:
+            parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
+        parts += [f"{label} ({name}): {text}." for label, text in bearings.remarks(one)]
+    return parts or None
+
+
+def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
+    """The bearings of all responses; a column of pressures where the length of a bearing is known."""
+    header: list[object] = [
+        "response", "joint", "peak force", "at crank angle", "mean force", "contact", "mean gap",
+        "mean pressure",
+    ]  # fmt: skip
+    rows = [_row(name, one) for name, each in found.items() for one in each]
+    if not any(np.isfinite(one.pressure) for each in found.values() for one in each):
+        header, rows = header[:-1], [row[:-1] for row in rows]
+    return Table(header, rows, "Bearings, over the averaged revolutions")
+
+
+def _row(name: str, one: bearings.Bearing) -> list[object]:
+    return [
+        name, one.joint, quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N"),
+        Number(bearings.share(one.contact)), quantity(one.gap, "m"), quantity(one.pressure, "Pa", 3),
+    ]  # fmt: skip
+
+
+def _whole(name: str, found: xr.Dataset) -> list[object]:
+    drive = bearings.torque(found)
+    half_width = found["objective_limit" if "regime" in found else "objective_uncertainty"]
+    f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
+    shown = labels.with_half_width(f, float(half_width), unit)
+    validity = bearings.validity(found) if bearings.bearings(found) else "no joint with clearance"
+    return [name, quantity(drive.peak, "N m"), quantity(drive.mean, "N m"), Number(shown), validity]

@@ -1,0 +1,121 @@
+"""What an engineer reads first: loads of the bearings, in the terminal and on the page alike."""
+
+import re
+
+import numpy as np
+import pytest
+import report_data as data
+
+from hpcclear import load_scene, simulate
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.cli.response import describe_response
+from hpcclear.report import bearings
+from hpcclear.report.html import loads
+from hpcclear.report.html.content import Content
+
+TURN = 2.0 * np.pi
+
+
+def response(**flags):
+    """Four revolutions of a synthetic response, the first two of them the transient."""
+    made = data.response(4, instants=360)
+    made.attrs["transient_turns"] = 2
+    made["peak_contact_force"][:] = made["contact_force"].to_numpy().max(axis=0)
+    for name, value in flags.items():
+        made[name] = value
+    return made
+
+
+def page_of(content):
+    parts = loads.loads(Content(None, {}, {}, {"a": content})) or []
+    cells = [
+        str(cell)
+        for part in parts
+        if not isinstance(part, str)
+        for row in part.rows
+        for cell in row
+    ]
+    return cells, [part for part in parts if isinstance(part, str)]
+
+
+@pytest.mark.parametrize("at", [1.0, 100.0, 359.0])
+def test_the_peak_has_the_angle_at_which_it_occurs(at):
+    made = response()
+    angle = np.degrees(made["crank_angle"].to_numpy())
+    force = np.where(np.abs(angle - (3 * 360.0 + at)) < 0.51, 900.0, 100.0)
+    force += np.where(angle < 360.0, 5000.0, 0.0)  # the transient does not count
+    made["contact_force"][:] = force[:, None]
+    made["peak_contact_force"][:] = 900.0
+    for one in bearings.bearings(made):
+        assert np.degrees(one.angle) == pytest.approx(at, abs=0.6)
+        assert one.peak == 900.0
+        assert bearings.degrees(one) == f"{np.degrees(one.angle):.0f} deg"
+
+
+def test_means_are_over_time_whatever_the_instants():
+    """Force 100 N in contact, 0 in flight, for 30 % of each revolution; then many more instants in contact."""
+    made = response()
+    share = made["crank_angle"].to_numpy() / TURN % 1.0
+    touching = share < 0.3
+    made["contact_force"][:] = np.where(touching, 100.0, 0.0)[:, None]
+    made["penetration"][:] = np.where(touching, 1e-6, 0.0)[:, None]
+    thinned = made.isel(time=np.flatnonzero(touching | (np.arange(len(share)) % 4 == 0)))
+    # the jumps lie between instants 1 or 4 degrees apart; a mean over instants would be 63 N of the second
+    for shown in (made, thinned):
+        for one in bearings.bearings(shown):
+            assert one.mean == pytest.approx(30.0, abs=100.0 * 4 / 360)
+            assert one.contact == pytest.approx(0.3, abs=4 / 360)
+
+
+def test_a_peak_between_instants_has_no_angle(tmp_path, capsys):
+    made = response()
+    made["peak_contact_force"][:] = 3.0 * made["contact_force"].to_numpy().max(axis=0)
+    assert {bearings.degrees(one) for one in bearings.bearings(made)} == {"–"}
+    describe_response(made, tmp_path / "a.nc")
+    assert "at an angle not known" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("flag", [Flag.LATCHED, Flag.BEYOND_HERTZ, Flag.TARGET_MISSED])
+def test_page_and_terminal_print_the_same_numbers_and_warnings(tmp_path, capsys, flag):
+    made = response(flags=int(flag))
+    describe_response(made, tmp_path / "a.nc")
+    shown = " ".join(capsys.readouterr().out.split())
+    cells, texts = page_of(made)
+    for one in bearings.bearings(made):
+        assert bearings.degrees(one) in cells
+        assert bearings.degrees(one) in shown
+        assert bearings.share(one.contact) in cells
+    assert bearings.validity(made) in cells
+    (warning,) = bearings.flag_remarks(flag)
+    assert any(warning in text for text in texts)
+    assert warning in shown
+
+
+def test_a_failed_simulation_has_no_loads(tmp_path, capsys):
+    made = response(status=np.int8(Status.STEP_CAP))
+    describe_response(made, tmp_path / "a.nc")
+    shown = capsys.readouterr().out
+    assert "peak force" not in shown
+    cells, texts = page_of(made)
+    assert not cells
+    assert Status.STEP_CAP.remedy in texts[0]
+
+
+def test_pressure_is_force_over_projected_area_and_ideal_joints_are_left_out():
+    fast = ["numerics.transient_revolutions=1", "numerics.averaged_revolutions=1"]
+    scene = load_scene("jobs/wear.toml", fast)
+    found = {one.joint: one for one in bearings.bearings(simulate(scene))}
+    assert set(found) == set(scene.clearance_joints())
+    for joint, one in found.items():
+        part = scene.clearance_joint(joint)
+        area = 2.0 * part.bearing_radius * part.wear.length
+        assert one.pressure == pytest.approx(one.mean / area, rel=1e-12)
+        assert one.mean > 0.0
+    ideal = load_scene("jobs/slider_crank.toml", [*fast, "joints.crank_rod.kind=ideal"])
+    assert [one.joint for one in bearings.bearings(simulate(ideal))] == ["rod_slider"]
+
+
+@pytest.mark.parametrize("contact", [0.0, 1e-7, 0.0004, 0.5, 0.9996, 1.0 - 1e-9, 1.0])
+def test_no_share_is_rounded_to_all_or_nothing(contact):
+    shown = bearings.share(contact)
+    assert (re.fullmatch(r"(0|100)%", shown) is not None) == (contact in (0.0, 1.0))

@@ -1,0 +1,346 @@
+"""Laws that nobody here wrote, from files beside the scene and from formulas: against an integration of its own, in the
+lanes, on ranks, and refused where they are at fault."""
+
+import math
+import shutil
+import sys
+from pathlib import Path
+
+import commands
+import numpy as np
+import pytest
+import tomli_w
+from oracle import SliderCrank
+from running import run
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.laws.lanes import in_lanes
+from hpcclear.dynamics.physics import powers
+from hpcclear.dynamics.problem import problem_of
+from hpcclear.scene import Scene, load_scene
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "analysis"))
+
+from assembly import executed_arithmetic, force_evaluation  # noqa: E402
+
+LAWS = Path(__file__).parent / "data" / "mylaws.py"
+NO_FRICTION = {"law": "none"}
+ZHIYING = {"law": "mylaws:ZhiyingQishao", "restitution": 0.2}
+POWER = {"law": "mylaws:Power", "force_at": "300 N", "exponent": 1.2}
+EXPONENTIAL = {"law": "mylaws:Exponential", "force_at": "500 N"}
+STRIBECK = {
+    "law": "mylaws:MyStribeck",
+    "coefficient": 0.05,
+    "static_coefficient": 0.1,
+    "stribeck_speed": "0.5 m/s",
+    "ramp_speed": 0.05,
+}
+FORMULA = {
+    "law": "expression",
+    "force": "K * d**1.5 * (1 + b * v)",
+    "units": {"b": "s/m"},
+    "b": "0.5 s/m",
+}
+
+
+def file_with(folder: Path, contact: dict, friction: dict = NO_FRICTION, **more) -> Path:
+    """A scene file of the paper's slider-crank with these laws, and the laws' file beside it."""
+    scene = load_scene(ROOT / "jobs" / "slider_crank.toml").with_({"study": None})
+    content = scene.resolved()
+    content["effects"] |= {"contact": contact, "friction": friction}
+    for joint in ("crank_rod", "rod_slider"):
+        content["joints"][joint] = {**content["joints"]["crank_rod"], "clearance": 3e-4}
+    content["numerics"] |= {"rtol": 1e-8, "transient_revolutions": 0, "averaged_revolutions": 1}
+    content["numerics"] |= {"energy": True} | more
+    shutil.copy(LAWS, folder / "mylaws.py")
+    path = folder / "scene.toml"
+    path.write_text(tomli_w.dumps(content), encoding="utf-8")
+    return path
+
+
+def oracle_of(scene: Scene, contact, friction=None) -> SliderCrank:
+    """The integration of its own, with other laws: of (depth, rate, impact speed, Hertz' stiffness); of the sliding speed."""
+    content = scene.resolved()
+    latched = scene.effects.contact.latched
+    content["effects"]["contact"] = {"law": "lankarani-nikravesh", "restitution": 1.0}
+    content["effects"]["friction"] = NO_FRICTION
+    made = SliderCrank(content)
+    for joint in made.joints:
+        stiffness = joint.stiffness
+        joint.latched = latched
+        joint.law = lambda d, v, v0, k=stiffness: contact(d, v, v0, k)
+        joint.rubs = friction
+    return made
+
+
+def zhiying(d, v, v0, k):
+    e = 0.2
+    return k * d**1.5 * (1 + 3 * (1 - e**2) * math.exp(2 * (1 - e)) * v / (4 * v0))
+
+
+def stribeck(v):
+    return (0.05 + 0.05 * math.exp(-abs(v) / 0.5)) * math.tanh(v / 0.05)
+
+
+CASES = {
+    "Zhiying and Qishao": (ZHIYING, NO_FRICTION, zhiying, None),
+    "exponent 1.2": (
+        POWER, NO_FRICTION, lambda d, v, v0, k: 300 * (d / 1e-5) ** 1.2 * (1 + 0.3 * v), None,
+    ),
+    "exponential": (
+        EXPONENTIAL, NO_FRICTION, lambda d, v, v0, k: 500 * math.expm1(d / 5e-5) * (1 + 0.3 * v), None,
+    ),
+    "a Stribeck curve": (
+        FORMULA, STRIBECK, lambda d, v, v0, k: k * d**1.5 * (1 + 0.5 * v), stribeck,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_user_s_law_gives_what_an_independent_solver_gives(case, tmp_path):
+    """A revolution from rest in the clearance to rtol 1e-8; the energy balance closes with the law's own stored energy."""
+    contact, friction, force, ratio = CASES[case]
+    scene = load_scene(file_with(tmp_path, contact, friction))
+    _, expected = oracle_of(scene, force, ratio).run(0, 1, rtol=1e-10)
+    result = run(scene)
+    assert result.out.status == 0
+    assert float(result.out.objective) == pytest.approx(expected, rel=2e-6)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_user_s_law_is_vectorised(case, tmp_path):
+    contact, friction, *_ = CASES[case]
+    effects = problem_of(load_scene(file_with(tmp_path, contact, friction))).effects
+    found = executed_arithmetic(force_evaluation(effects, 16))
+    assert found.packed.total() >= 100
+    assert found.packed_share >= 0.9
+
+
+# ---- refused where they are at fault ------------------------------------------------------------------------
+HEAD = """
+import math
+from hpcclear import ContactLaw, FrictionLaw, Parameter
+def hertz(depth, stiffness): return stiffness * depth**1.5
+"""
+FAULTS = {
+    "a wrong unit": (
+        """
+def force(depth, rate, stiffness, b):
+    return stiffness * depth**1.5 * (1 + b * rate)
+Bad = ContactLaw(words="", parameters=(Parameter("b", "s**2/m", default=0.5),), force=force)
+""",
+        "force does not fit its units",
+    ),
+    "pulls": (
+        """
+def force(depth, rate, stiffness, b):
+    return stiffness * depth**1.5 * (1 - b * rate)
+Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), force=force)
+""",
+        "it pulls",
+    ),
+    "not finite": (
+        """
+def force(depth, rate, stiffness, b):
+    return stiffness * depth**1.5 * (1 + b / (rate - rate))
+Bad = ContactLaw(words="", parameters=(Parameter("b", "m/s", default=0.5),), force=force)
+""",
+        "not finite",
+    ),
+    "energy of another force": (
+        """
+def energy(depth, stiffness):
+    return 0.5 * stiffness * depth**2.5
+Bad = ContactLaw(words="", force=hertz, energy=energy)
+""",
+        "its energy does not match",
+    ),
+    "a force where nothing touches": (
+        """
+def force(depth, rate, stiffness, b):
+    return stiffness * depth**1.5 + b * rate
+Bad = ContactLaw(words="", parameters=(Parameter("b", "N*s/m", default=50.0),), force=force)
+""",
+        "where nothing touches",
+    ),
+    "a loop": (
+        """
+def force(depth, stiffness):
+    for _ in range(3):
+        depth = depth * 1.0
+    return stiffness * depth**1.5
+Bad = ContactLaw(words="", force=force)
+""",
+        "more in it than arithmetic",
+    ),
+    "a word that lanes have not": (
+        """
+def force(depth, stiffness):
+    return stiffness * depth**1.5 * math.erf(1.0)
+Bad = ContactLaw(words="", force=force)
+""",
+        "which the lanes do not have",
+    ),
+    "what nobody gives": (
+        """
+def force(depth, stiffnes):
+    return stiffnes * depth**1.5
+Bad = ContactLaw(words="", force=force)
+""",
+        "asks for 'stiffnes', which nobody gives",
+    ),
+    "stored energy by the impact speed": (
+        """
+def force(depth, impact_speed, stiffness, b):
+    return stiffness * depth**1.5 * (1 + b * impact_speed)
+Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), force=force)
+""",
+        "goes by the impact speed",
+    ),
+    "a law of another kind": (
+        """
+def ratio(speed, b):
+    return b * speed
+Bad = FrictionLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), ratio=ratio)
+""",
+        "is no contact law",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_law_with_a_fault_is_refused_with_the_reason(fault, tmp_path):
+    source, reason = FAULTS[fault]
+    path = file_with(tmp_path, {"law": "bad:Bad"})
+    (tmp_path / "bad.py").write_text(HEAD + source, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    assert caught.value.key == "effects.contact.law"
+    assert caught.value.value == "bad:Bad"
+    assert reason in caught.value.reason
+    assert caught.value.remedy
+
+
+def test_friction_that_drives_sliding_on_is_refused(tmp_path):
+    path = file_with(
+        tmp_path,
+        ZHIYING,
+        {"law": "expression", "ratio": "0.1 - v * b", "units": {"b": "s/m"}, "b": 0.1},
+    )
+    with pytest.raises(InputError, match="drives sliding on"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [
+        ("K * d**1.5 * (1 + b * v", "cannot be read as a formula"),
+        ("K * d**1.5 * (1 + x * v)", "'x', which is no parameter"),
+        ("K * d**1.5 * open('x')", "calls 'open'"),
+        ("K * d.real**1.5", "more in it than arithmetic"),
+        ("K * d**1.5 * (1 + b)", "does not fit its units"),
+    ],
+)
+def test_a_formula_that_is_none_is_refused(force, said, tmp_path):
+    with pytest.raises(InputError) as caught:
+        load_scene(file_with(tmp_path, FORMULA | {"force": force}))
+    assert caught.value.key.startswith("effects.contact")
+    assert said in caught.value.reason
+
+
+def test_parameters_have_units_bounds_and_defaults(tmp_path):
+    scene = load_scene(file_with(tmp_path, POWER))
+    assert scene.number("effects.contact.force_at") == 300.0
+    assert scene.unit("effects.contact.force_at") == "N"
+    assert scene.effects.contact.value("chi") == 0.3
+    for wrong, said in (
+        ({"force_at": "3 m"}, "does not fit"),
+        ({"force_at": -1.0}, "must be above 0 N"),
+        ({"forces_at": 1.0}, "is not a known key"),
+    ):
+        with pytest.raises(InputError) as caught:
+            scene.with_({"effects.contact": POWER | wrong})
+        assert said in caught.value.reason
+    bare = {"law": "mylaws:Power"}
+    with pytest.raises(InputError, match="needs a force_at"):
+        scene.with_({"effects.contact": bare})
+
+
+def test_a_formula_is_the_law_it_writes_out(tmp_path):
+    """Hunt and Crossley's, to the rounding of the motion."""
+    scene = load_scene(file_with(tmp_path, FORMULA))
+    ours = scene.with_({"effects.contact": {"law": "hunt-crossley", "damping": 0.5}})
+    one, other = run(scene), run(ours)
+    assert float(one.out.objective) == pytest.approx(float(other.out.objective), rel=1e-9)
+    assert one.out.peak_force[:2] == pytest.approx(other.out.peak_force[:2], rel=1e-5)
+
+
+# ---- the words that laws may use --------------------------------------------------------------------------------
+def test_words_of_laws_are_as_good_as_the_library_s():
+    x = np.concatenate([np.linspace(-30, 30, 4001), np.logspace(-12, 2, 400)])
+    positive = np.abs(x) + 1e-300
+    for ours, theirs, at_ in (
+        (powers.exponential, np.exp, x),
+        (powers.logarithm, np.log, positive),
+        (powers.tanh, np.tanh, x),
+        (powers.arctan, np.arctan, x),
+    ):
+        got = np.array([ours(one) for one in at_])
+        np.testing.assert_allclose(got, theirs(at_), rtol=1e-14, atol=4e-16)
+    raised = np.array([powers.power(one, 1.37) for one in positive])
+    np.testing.assert_allclose(raised, positive**1.37, rtol=2e-13, atol=1e-300)
+    assert powers.power(0.0, 1.37) == 0.0
+    assert math.isnan(powers.logarithm(math.nan))
+
+
+def test_a_law_may_branch(tmp_path):
+    """Branches become choices, and the law stays one of arithmetic."""
+    source = """
+def force(depth, rate, stiffness):
+    grown = stiffness * depth**1.5
+    if rate > 0 and depth > 0:
+        factor = 1 + 0.5 * rate / ONE
+    elif rate < -2 * ONE:
+        return 0.0 * grown
+    else:
+        factor = 1 + 0.25 * rate / ONE
+    return grown * factor
+Bad = ContactLaw(words="", parameters=(Parameter("ONE", "m/s", default=1.0),), force=force)
+"""
+    path = file_with(tmp_path, {"law": "bad:Bad"})
+    text = source.replace("stiffness):", "stiffness, ONE):")
+    (tmp_path / "bad.py").write_text(HEAD + text, encoding="utf-8")
+    law = in_lanes(load_scene(path).effects.contact.declared)
+    par = np.array([1e9, 1.0])
+    for rate, factor in ((1.0, 1.5), (-1.0, 0.75), (-3.0, 0.0), (0.0, 1.0)):
+        found = law.force(par, 0, 1e-4, rate, 0.0, 0.0, 0, 1)
+        assert found == pytest.approx(1e3 * factor, rel=1e-14)
+
+
+# ---- on ranks, in files -------------------------------------------------------------------------------------------
+def test_samples_with_a_user_s_law_are_the_same_on_two_ranks(tmp_path):
+    """The source goes to the ranks with the scene; the design variable is a parameter of the law."""
+    study = {
+        "study": {
+            "samples": 6,
+            "variables": {"factor": {"path": "effects.contact.force_at", "range": [200.0, 400.0]}},
+        }
+    }
+    path = file_with(tmp_path, POWER, energy=False, rtol=1e-6)
+    path.write_text(path.read_text("utf-8") + "\n" + tomli_w.dumps(study), encoding="utf-8")
+    written = []
+    for ranks in (0, 2):
+        output = tmp_path / f"samples_{ranks}.nc"
+        code, said = commands.run(["sample", str(path), "-o", str(output)], ranks)
+        assert code == 0, said
+        written.append(output.read_bytes())
+    assert written[0] == written[1]
+    assert b"def grown(" in written[0]
+
+
+def test_laws_are_listed_with_their_sources():
+    code, said = commands.run(["laws"], 0)
+    assert code == 0
+    for word in ("hunt-crossley", "flores", "lugre", "doi:10.1007/s11044-010-9237-4", "s/m"):
+        assert word in said
