@@ -12,6 +12,7 @@ from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
+from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.cases import Case
@@ -30,13 +31,12 @@ from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.asking import Search, Task, made, minimise
-from hpcclear.statistics.search.mopso import swarm
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import ends_in_all, excess, guessed
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.surrogates import coordinate
+from hpcclear.study.surrogates import coordinate, method_of
 
 Draws = tuple[int, np.random.Generator] | dict[str, Array] | None
 """How many Monte Carlo draws of which generator, the draws themselves, or none for an exact rule."""
@@ -236,13 +236,14 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the search a study asks for can be had, before anything is simulated.
+    """That the surrogate and the search a study asks for can be had, before anything is simulated.
 
     Raises
     ------
     InputError
-        Its package is not installed, or it is no search.
+        A package is not installed, or it is none.
     """
+    method_of(scene)
     for case in scene.required_study.cases:
         region = box(scene, scene.required_study.design_variables(case.name))
         _begun(scene, region, len(case.goals), np.random.default_rng(0))
@@ -267,7 +268,7 @@ def _begun(
         ),
     )
     name = settings.algorithm or "swarm"
-    source = getattr(foreign, name.removeprefix("pymoo:")) if ":" in name else swarm
+    source = SEARCHES.get(name, scene.plugin_texts)
     maker = partial(foreign.adapted, source) if foreign.is_algorithm(source) else source
     return made(maker, name, task), task, name
 

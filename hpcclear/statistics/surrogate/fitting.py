@@ -42,13 +42,13 @@ class KrigingMethod:
         rng: np.random.Generator,
         names: Sequence[str] | None = None,
     ) -> Kriging:
-        """See `fit_kriging`."""
+        """As `fit_kriging`, of points (n, d), values (n,) and bounds (d, 2)."""
         return fit_kriging(
             points, values, bounds, rng=rng, names=names, restarts=self.restarts, kernel=self.kernel
         )
 
     def restored(self, arrays: Mapping[str, np.ndarray]) -> Kriging:
-        """See `Kriging.from_arrays`."""
+        """As `Kriging.from_arrays`; shapes by `FIELDS`, (n, d) for inputs."""
         return Kriging.from_arrays(arrays)
 
 

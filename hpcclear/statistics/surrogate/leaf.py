@@ -75,7 +75,7 @@ class Leaf(Protocol):
         """What `to_arrays` gives."""
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """The model as plain arrays, without pickle."""
+        """The model as plain arrays, without pickle; shapes by `fields`."""
 
 
 class Method(Protocol):
@@ -101,7 +101,7 @@ class Method(Protocol):
         """A model of values (n,), NaN where a sample failed, at points (n, d) within bounds (d, 2)."""
 
     def restored(self, arrays: Mapping[str, np.ndarray]) -> Leaf:
-        """The model that `Leaf.to_arrays` gave; it predicts the same to the last bit."""
+        """The model that `Leaf.to_arrays` gave, arrays of the same shapes; it predicts the same to the last bit."""
 
 
 def checked_samples(
@@ -111,7 +111,9 @@ def checked_samples(
     names: Sequence[str] | None,
     needed: int,
 ) -> tuple[tuple[str, ...], Booleans]:
-    """The inputs' names (default x1, x2, ...), and which samples count; NaN values are failed samples.
+    """The inputs' names (default x1, x2, ...), and which samples count, (n,); NaN values are failed samples.
+
+    Points have shape (n, d), values (n,), bounds (d, 2).
 
     Raises
     ------
