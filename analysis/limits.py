@@ -2,7 +2,7 @@
 
     python analysis/limits.py                  # 200 repeats of three designs, ten designs of the box; some twenty minutes
     python analysis/limits.py --repeats 20     # a look
-    python analysis/limits.py --set study.verification.accuracy.deviation=0.01 --truth 32768
+    python analysis/limits.py --set study.accuracy.deviation=0.01 --truth 32768
 
 Mean, deviation and 95th percentile of the paper's case 2, as `hpcclear run` finds them: scrambled Sobol sequences,
 doubled until the accuracy asked for is met. Each repeat has scramblings of its own; the truth is one long sequence.

@@ -17,6 +17,8 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TSITOURAS
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
+# first numbers of the laws that it has
+STIFFNESS, COEFFICIENT = at.CONTACT_NUMBERS, at.FRICTION_NUMBERS
 OUTPUTS = ("objective", "slider_position", "slider_velocity", "evaluations", "steps", "status")
 
 _C = TSITOURAS.a.sum(axis=1)
@@ -36,12 +38,12 @@ def joint(p, base, latched, active, inverse_impact, ex, ey, vx, vy, spin_journal
     if gap <= 0.0 or (latched and not active):
         return gap, rate, 0.0, 0.0, 0.0, 0.0
     factor = 1.0 + p[base + at.DAMPING] * rate * (inverse_impact if latched else 1.0)
-    normal = max(p[base + at.CONTACT_STIFFNESS] * gap * math.sqrt(gap) * factor, 0.0)
+    normal = max(p[base + STIFFNESS] * gap * math.sqrt(gap) * factor, 0.0)
     arm_bearing = p[base + at.BEARING_RADIUS] + 0.5 * gap
     arm_journal = p[base + at.JOURNAL_RADIUS] - 0.5 * gap
     sliding = vy * nx - vx * ny + spin_journal * arm_journal - spin_bearing * arm_bearing
     ramp = min(max(sliding * p[base + at.INVERSE_RAMP], -1.0), 1.0)
-    tangential = normal * p[base + at.FRICTION] * ramp
+    tangential = normal * p[base + COEFFICIENT] * ramp
     fx, fy = normal * nx - tangential * ny, normal * ny + tangential * nx
     return gap, rate, fx, fy, arm_bearing * tangential, -arm_journal * tangential
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -67,7 +68,8 @@ def scene(
 def setup(chosen: Scene, par: Array) -> Setup:
     """Problem, parameters and start states; without friction its coefficient is 0 for codes that always ask."""
     if chosen.effects.friction.law == "none":
-        Parameters(par).friction = 0.0
+        for joint in (at.JOINT_12, at.JOINT_23):
+            par[:, joint + at.FRICTION_NUMBERS] = 0.0
     return Setup(problem_of(chosen), par, start_states(chosen, par))
 
 

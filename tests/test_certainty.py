@@ -200,9 +200,8 @@ def contested(monkeypatch, contest: int, origin: str = "search") -> list[int]:
     scene = load_scene(ROBUST).with_(
         {
             "study.cases": {"one": ["C"]},
-            "study.verification": {
-                "accuracy": {"mean": 0.5, "deviation": 0.005}, "contest": contest, "most_samples": 4096,
-            },
+            "study.accuracy": {"mean": 0.5, "deviation": 0.005},
+            "study.verification": {"contest": contest, "most_samples": 4096},
         }
     )  # fmt: skip
     run = SimpleNamespace(study=scene.required_study)
@@ -218,7 +217,7 @@ def contested(monkeypatch, contest: int, origin: str = "search") -> list[int]:
 
     monkeypatch.setattr(truth, "_values", drawn)
     made = drawn(run, choices, "", "", 32, 0)
-    return [one[0].size for one in truth._contested(run, choices, made, "", "")]
+    return [one[0].size for one in truth.contested(run, choices, made, "", "")]
 
 
 def test_who_contests_an_end_gets_more_simulations(monkeypatch):
@@ -315,7 +314,7 @@ def test_small_steps_that_a_search_wins_count_together():
     scene = load_scene(ROBUST)
     run = SimpleNamespace(scene=scene, study=scene.required_study)
     (case, *_) = (one.name for one in scene.required_study.cases)
-    share = scene.required_study.verification.accuracy.deviation
+    share = scene.required_study.wanted.deviation
     names = scene.required_study.design_variables(case)
 
     def met(steps):

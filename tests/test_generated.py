@@ -274,11 +274,11 @@ def test_generated_motions_are_packed(mechanism):
     text = one_text(loop_over(lane.text.source, joints), f"packed_{W}", effects=effects, W=W)
     inside = lane_function(text)
 
-    @njit(error_model="numpy")
-    def run(lanes):
-        inside(lanes, beyond(lanes, 51200))
-
-    run(np.ones(51200 + 32000))
+    # the compiler has to know where parameters begin, as in a motion
+    names = {"inside": inside, "beyond": beyond}
+    exec(f"def run(lanes):\n    inside(lanes, beyond(lanes, {at.WORK * W}))", names)
+    run = njit(names["run"], error_model="numpy")
+    run(np.ones(at.BANK * W))
     found = executed_arithmetic(run.inspect_asm(run.signatures[0]))
     assert found.packed.total() > 100
     assert found.packed_share >= 0.9

@@ -238,7 +238,7 @@ def test_where_nothing_keeps_the_constraints_proposals_go_towards_them() -> None
 SMALL = (
     "study.samples=40", "study.test_samples=10", "study.sensitivity.groups=[]", "study.sensitivity.sobol_samples=0",
     "study.swarm.runs=1", "study.swarm.particles=16", "study.swarm.iterations=10", "study.surrogate.r2=0.5",
-    "study.surrogate.rmae=2.0", "study.verification.accuracy.mean=0.05", "study.verification.accuracy.deviation=0.2",
+    "study.surrogate.rmae=2.0", "study.accuracy={mean=0.05, deviation=0.2}",
     "study.verification.most_samples=512", "study.verification.infill_rounds=2", "study.verification.infill_samples=64",
     "study.verification.infill_designs=4", "study.verification.designs=2", "study.verification.audit_samples=0",
     "study.verification.response_copies=2", "study.verification.response_windows=2",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
-from hpcclear.base.arrays import Array, Records
+from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
@@ -23,7 +23,7 @@ from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.study import budget, extent, lives
+from hpcclear.study import extent, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -56,18 +56,10 @@ class Row:
     """Core-seconds of one sample."""
     reached: str
     """Limits that the samples tried came to; empty where the file names no target error."""
-    simulations: int | None = None
-    """Of the whole study, if they go by the row; None: those of the plan."""
-    label: str = ""
-    """What is asked, in words; empty: the error."""
 
     def settings(self) -> str:
         """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
         n = self.scene.numerics
-        if self.simulations is not None and self.scene.study is not None:
-            verified = self.scene.study.verification
-            shares = _percent(verified.accuracy.mean, verified.accuracy.deviation)
-            return f"rtol {n.rtol:.0e} + {shares}"
         if self.reached:
             return ", ".join(self.reached.split(", ")[:2])
         return f"rtol {n.rtol:.1e}, {n.transient_revolutions}+{n.averaged_revolutions} rev"
@@ -92,10 +84,9 @@ class Plan:
     responses: int = 0
     """Single responses of `run`, which rank 0 simulates alone."""
 
-    def simulations(self, row: Row) -> int:
-        """Of the command that is planned, at a row."""
-        if row.simulations is not None:
-            return row.simulations
+    @property
+    def simulations(self) -> int:
+        """Of the command that is planned."""
         return self.samples if self.study is None else self.study
 
     def core_seconds(self, row: Row, simulations: int, ranks: int) -> float:
@@ -130,7 +121,7 @@ def measure(
         With a study.
     ranks : Ranks
     errors : tuple of float
-        Target errors of the ladder; a study that asks for an accuracy has a ladder of its own.
+        Target errors of the ladder.
     workers : int
         Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
         clock are slower together.
@@ -160,17 +151,9 @@ def measure(
     def made() -> Plan:
         peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         startup = process_age_at_start()
-        known = next(
-            (row.simulations for row in rows if row.error is None and row.simulations), whole
-        )
-        return Plan(tuple(rows), study.samples, known, startup, peak, len(study.variables), alone)
+        return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
 
     with _company(scene, points, workers if ranks.size == 1 else 1, tell):
-        if study.accuracy is not None:
-            wanted = []
-            for row in splits(scene, points, ranks, tell, progress_style):
-                rows.append(row)
-                show(made())
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
             told = "the settings of the file" if error is None else f"a target error of {error:g}"
@@ -180,52 +163,6 @@ def measure(
             if k + 1 < len(wanted):
                 show(made())
     return made()
-
-
-FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
-"""Accuracies of the ladder of a study that asks for one, over that."""
-
-
-def splits(
-    scene: Scene,
-    points: Points,
-    ranks: Ranks,
-    tell: Callable[[str], object],
-    style: Style = "quiet",
-) -> Iterator[Row]:
-    """The ladder of a study of which an accuracy is asked: how each would be shared out, its pilot among its simulations."""
-    known: dict[tuple[float, bytes], tuple[Array, float]] = {}
-
-    def simulate(label: str, one: Scene, few: Points) -> tuple[Array, float]:
-        key = one.numerics.rtol, few.values.tobytes()  # pilots share what they begin with
-        if key not in known:
-            known[key] = budget.simulated(ranks, one, few, Progress("plan: pilot", style))
-        return known[key]
-
-    wanted = budget.asked(scene)
-    for k, factor in enumerate(FACTORS):
-        mean, deviation = np.minimum(factor * wanted, 0.99).tolist()
-        asked_for = _percent(mean, deviation)
-        tell(
-            f"measuring {k + 1} of {len(FACTORS)}: an accuracy of {asked_for}, with a pilot of its own"
-        )
-        asked = {"study.accuracy.mean": mean, "study.accuracy.deviation": deviation}
-        one = scene if factor == 1.0 else scene.with_(asked)
-        made = budget.spread(one, simulate)
-        split = made.split
-        final = budget.settled(one, split)
-        # simulations at other tolerances count by their price
-        each = made.found.evaluations[split.rung]
-        count = round((split.evaluations + made.pilot) / each)
-        seconds, _ = cost(final, points, ranks, RUNG_SECONDS, f"split {k}", style)
-        label = asked_for + ("" if split.sure else " ?")
-        yield Row(None if factor == 1.0 else factor, final, seconds, "", count, label)
-
-
-def _percent(mean: float, deviation: float) -> str:
-    """Of mean and deviation, once if they are the same."""
-    texts = dict.fromkeys(f"{100 * one:.2g} %" for one in (mean, deviation))
-    return ", ".join(texts)
 
 
 def cost(
@@ -297,8 +234,7 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
 
 
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
-    """Errors to measure: `TARGETS`, and the one asked for; none where an accuracy is asked of a whole study, or where lives are
-    followed, which have copies of their own.
+    """Errors to measure: `TARGETS`, and the one asked for; none where lives are followed, which have copies of their own.
 
     Raises
     ------
@@ -307,13 +243,10 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
     """
     lives.check(scene)
     study = scene.study
-    if study is None or (study.accuracy is None and not study.worn):
+    if study is None or not study.worn:
         return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
     if error is not None:
         reason = "lives of worn joints are followed at the settings of the file"
         remedy = "Leave it out, and set wear.tolerance and wear.copies"
-        if study.accuracy is not None:
-            reason = "the study asks for an accuracy of its own, which decides the tolerance"
-            remedy = "Leave it out, and set study.accuracy"
         raise InputError("--error", error, reason, remedy)
     return ()

@@ -16,8 +16,8 @@ RESERVE = 1.5
 def preview(plan: Plan, ranks: int) -> str:
     """Return what the latest row means for the job, in a line: the answer so far, while the next row is measured."""
     row = plan.rows[-1]
-    simulations = plan.simulations(row)
-    name = row.label or ("settings of the file" if row.error is None else f"error {row.error:g}")
+    simulations = plan.simulations
+    name = "settings of the file" if row.error is None else f"error {row.error:g}"
     return (
         f"{name}: {1e3 * row.seconds:.3g} ms a sample, {simulations} simulations take "
         f"{duration(plan.wall_seconds(row, simulations, ranks))} on {ranks} ranks"
@@ -28,35 +28,25 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
     out = console()
     row = next((row for row in plan.rows if row.error == error), plan.rows[0])
-    simulations = plan.simulations(row)
-    split = row.simulations is not None
+    simulations = plan.simulations
     command = "sample" if plan.study is None else "run"
     made = Table(
         title=f"{command}: {simulations} simulations on {ranks} ranks", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
-    first = "accuracy" if split else "error"
-    extra = "simulations" if split else "core-h"
-    for name in (first, "settings", "ms/sample", "core-s", extra, "wall time"):
+    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
         made.add_column(name, no_wrap=True, justify="right" if name != "settings" else "left")
     for one in plan.rows:
-        count = plan.simulations(one)
-        total = plan.core_seconds(one, count, ranks)
+        total = plan.core_seconds(one, simulations, ranks)
         made.add_row(
-            one.label or ("file" if one.error is None else f"{one.error:.0e}"),
+            "file" if one.error is None else f"{one.error:.0e}",
             one.settings(),
             f"{1e3 * one.seconds:.3g}",
             f"{total:.4g}",
-            f"{count}" if split else f"{total / 3600:.2g}",
-            duration(plan.wall_seconds(one, count, ranks)),
+            f"{total / 3600:.2g}",
+            duration(plan.wall_seconds(one, simulations, ranks)),
         )
     out.print(made)
-    if split:
-        doubtful = any("?" in one.label for one in plan.rows)
-        text = (
-            "accuracy of mean and standard deviation: part of the tolerance + part of the samples"
-        )
-        out.print(text + ("; ?: cannot be promised" if doubtful else "") + "\n")
     out.print(table("The job", _needs(plan, row, simulations, command, ranks)))
     overrides = "" if row.error is None else f" --set numerics.target_error={row.error:g}"
     for line in slurm(plan, row, simulations, ranks):

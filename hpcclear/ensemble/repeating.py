@@ -81,10 +81,6 @@ def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated
         )
     if kind == "response":
         told, (ours, theirs) = "its series", _series(content, scene)
-    elif scene.study is not None and scene.study.accuracy is not None:
-        return Repeated(
-            name, "not simulated: its study chose the tolerances of its samples", (), changed
-        )
     else:
         chosen = np.unique(np.linspace(0, content.sizes["sample"] - 1, count).round().astype(int))
         theirs = content.isel(sample=chosen)

@@ -440,7 +440,7 @@ def _next(
         yield "a larger study.samples, since the surrogate error is large and a better design may have been missed"
     twins = alike.others(ours, best)
     if twins and ours.attrs.get("method") == "qmc":
-        yield "a smaller study.verification.accuracy, to separate equivalent designs"
+        yield "a smaller study.accuracy, to separate equivalent designs"
     elif twins and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} for confidence intervals a third as wide"
     found, name = files.get("chaos"), str(best["design"].item())

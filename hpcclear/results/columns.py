@@ -188,6 +188,9 @@ VERIFICATION: Columns = {
     "mean_within": number(("design",), "1",
         "relative half-width of the limits of the mean, what the tolerance may add included"),
     "deviation_within": number(("design",), "1", "the same of the deviation"),
+    "mean_tolerance": number(("design",), "1",
+        "what the tolerance takes of the mean, by pairs at a stricter one, part of its limits; relative"),
+    "deviation_tolerance": number(("design",), "1", "the same of the deviation"),
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "how it stands to the constraints of its case"),
     "samples": count(("design",), "number of simulations"),
@@ -195,24 +198,6 @@ VERIFICATION: Columns = {
     "beyond_hertz": count(("design",), "number of simulations whose penetration left the range of Hertz theory"),
     "random": text(("design",), "random inputs of its case"),
     "on_bounds": text(("design",), "variables that sit on a bound of the study, and on which"),
-}
-
-BUDGET: Columns = {
-    "rung": count(("rung",), "rung of tolerances; the last looked at is what the others are measured against"),
-    "design": text(("design",), "design of the pilot"),
-    "moment": text(("moment",), "what the error is of"),
-    "rtol": number(("rung",), "1", "relative tolerance of a step", required=True),
-    "evaluations": number(("rung",), "1", "evaluations of the equations of motion, a simulation", required=True),
-    "bias": number(("rung", "moment"), "1",
-        "relative error that the tolerance makes, root mean square over designs; missing where not looked at", required=True),
-    "bias_error": number(("rung", "moment"), "1", "standard error of its mean", required=True),
-    "chosen": flag(("rung",), "whether verified designs are simulated at it", required=True),
-    "reach": number(("design", "moment"), "1", "relative half-width of the limits by the pilot's points", required=True),
-    "power": number(("moment",), "1", "power of the number of simulations that it falls by", required=True),
-    "tolerance_share": number(("moment",), "1", "what the tolerance takes of the accuracy", required=True),
-    "sampling_share": number(("moment",), "1", "what is left to the samples; squares add up", required=True),
-    "reached": number(("moment",), "1",
-        "what verified designs came to at worst, the tolerance included; missing until they are", required=True),
 }
 
 CHAOS: Columns = {

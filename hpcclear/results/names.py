@@ -111,7 +111,6 @@ KINDS = {
     ),
     "front": _kind("Fronts of mean and deviation", columns.FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", columns.VERIFICATION, ("design",)),
-    "budget": _kind("An accuracy shared out over a study", columns.BUDGET),
     "chaos": _kind("How much of the scatter of designs is chaos", columns.CHAOS),
     "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),

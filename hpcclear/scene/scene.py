@@ -8,8 +8,9 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
-from hpcclear.scene import budget, citation, describing, domain
+from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.tables import SceneTables, plain
@@ -35,7 +36,6 @@ class Scene(SceneTables):
         if self.study is None:
             return self
         self._check_worn_inputs()
-        budget.check(self.study, self.numerics)
         numbers = self._numbers()
         for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
             for row in rows:
@@ -122,7 +122,7 @@ class Scene(SceneTables):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Texts whose unit left open what is meant, and how each was read, a sentence each."""
+        """Texts whose unit left open what is meant, entries of an earlier version, and how each was read, a sentence each."""
         return self._readings
 
     @property
@@ -186,13 +186,14 @@ def scene_of(content: Mapping[str, Any]) -> Scene:
 
     Source text that it carries is run: `load_scene` sees to it that it may be.
     """
+    content, former = renewed(content)
     read: dict[str, str] = {}
     with noting(read.__setitem__), using(texts_of(content)) as packages:
         scene = validated(Scene, content)
         rows = {name: {"version": version} for name, version in sorted(packages.items())}
         if rows != content.get("plugins", {}).get("packages", {}):
             scene = validated(Scene, replace(content, "plugins.packages", rows))
-    scene._readings = tuple(_placed(content, read)) if read else ()
+    scene._readings = (*former, *(_placed(content, read) if read else ()))
     return scene
 
 

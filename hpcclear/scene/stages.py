@@ -203,10 +203,8 @@ class Verification(Table):
     """Chosen designs through the true dynamics."""
 
     method: Literal["qmc", "monte-carlo"] | None = None
-    """What is simulated of a design: "qmc", 16 scramblings of a Sobol sequence over the random inputs, as long as `accuracy`
-    asks for; or "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
-    accuracy: MomentAccuracy = MomentAccuracy()
-    """Half-widths of the limits that "qmc" goes on for, from `least_samples` a design, doubled until they are met."""
+    """What is simulated of a design: "qmc", 16 scramblings of a Sobol sequence over the random inputs, as long as
+    `study.accuracy` asks for; or "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
     least_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] | None = None
     """Simulations of a design from which its accuracy is judged, for "qmc"; default 512, as far as it may have so many."""
     most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
@@ -250,7 +248,7 @@ class Verification(Table):
         if self.method == "qmc" and self.samples is not None:
             raise invalid(
                 "how many points of a Sobol sequence are simulated follows from the accuracy",
-                'Leave it out and set accuracy or most_samples, or write method = "monte-carlo"',
+                'Leave it out and set study.accuracy or most_samples, or write method = "monte-carlo"',
                 key="samples",
                 value=self.samples,
             )

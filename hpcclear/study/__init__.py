@@ -1,7 +1,6 @@
 """The study, from a scene to verified designs: read this after the README.
 
 0. Lives, where a clearance is random as wear leaves it: they are followed, and what their joints come to is the distribution.
-0. Where an accuracy is asked of the whole study: how it is shared out over tolerance and samples.
 0. On request the certificate of effects: what the scene could do without.
 1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
    in which they can be trusted, the influential variables, global indices.
@@ -21,7 +20,7 @@ is done, and each finished sample within seconds, so that the same command goes 
 and ends with the same bytes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +38,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points
 from hpcclear.study import (
-    budget,
     certificate,
     chaos,
     fronts,
@@ -54,6 +52,7 @@ from hpcclear.study import (
     truth,
     verification,
 )
+from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.simulations import Simulations
 from hpcclear.study.stages import Stages
@@ -143,10 +142,7 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
 
 def _tell_the_story(given: StudyRun, written: Scene) -> None:
     """All stages after the lives; `written` is the scene as it was, without what these told."""
-    run, shared = given, None
-    if given.study.accuracy is not None:
-        shared = budget.share_out(given)
-        run = given.of(budget.searching(given.scene, shared))
+    run = given
     sensitivity: Result | None = None
     if run.study.certificate is not None:
         certificate.certify(run)
@@ -166,14 +162,13 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
 
     designs = [*ends, *(finalists or between)]
     designs += [*verification.original(run), *paper.printed_designs(run.scene)]
-    if shared is None:
-        true = run.stage("verification", truth.simulate, designs, "verification")
-        table = verification.named(run, designs, true)
-    else:
-        run, shared, true, table = tolerance.verified(
-            run, budget.asked(given.scene), shared, designs
-        )
+    true = run.stage("verification", _verified, designs)
+    table = verification.named(run, designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
+    if run.study.paired:
+        text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
+        run.tell(text)
+        remarks += more
     remarks += verification.missed(run, table.choices, true, model)
     for text in remarks:
         run.tell(text)
@@ -181,11 +176,7 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
     over_life: Result = {}
     if written.required_study.worn:
         over_life = run.stage("lives", lives.of_designs, written, table.choices)
-    within = None if shared is None else budget.within(shared, true)
-    verification.write(run, table, true, model, remarks, printed, over_life, within)
-    if shared is not None:
-        names = [choice.name for choice in table.choices]
-        budget.reached(run, given.scene, shared, true, names)
+    verification.write(run, table, true, model, remarks, printed, over_life)
 
     scatter = run.stage("chaos", chaos.simulate, designs)
     chaos.write(run, table.choices, {name: one[table.rows] for name, one in scatter.items()})
@@ -193,6 +184,13 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
     series = given.stage("responses", responses.simulate_all, table.choices)
     responses.write(given, table.choices)
     paper.write_findings(run, sensitivity, kriging, series)
+
+
+def _verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
+    """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
+    if run.study.paired:
+        return tolerance.verified(run, designs)
+    return truth.simulate(run, designs, "verification")
 
 
 def _write_samples(run: StudyRun) -> None:
@@ -219,5 +217,4 @@ def _results(scene: Scene) -> list[str]:
     names = ["samples.nc", "kriging.nc", "front.nc", "verification.nc"]
     names += ["sensitivity.nc"] if scene.required_study.groups else []
     names += ["effects.nc"] if scene.required_study.certificate is not None else []
-    names += ["budget.nc"] if scene.required_study.accuracy is not None else []
     return names + paper.files(scene)

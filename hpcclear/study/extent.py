@@ -13,28 +13,26 @@ from hpcclear.study import (
     responses,
     sensitivities,
     surrogates,
+    tolerance,
     truth,
 )
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.paper import readings
 from hpcclear.study.paper.printed import printed_designs
 
-VERIFYING = frozenset({"verification", "lives", "chaos", "readings"})
-"""Stages of `samples_of` that come after the search, at the tolerance of verified designs."""
 
-
-def samples_of(scene: Scene, verified: int | None = None) -> dict[str, int]:
+def samples_of(scene: Scene) -> dict[str, int]:
     """Samples on the ranks by stage, if no surface or model is refused.
 
     The most there can be then, if the number of draws of a design is given: a front may be short, or stand early. For an
-    accuracy verified designs are taken to need what the paper's did, unless `verified` says what each will take.
+    accuracy verified designs are taken to need what the paper's did.
 
     Raises
     ------
     InputError
         If the scene has no study.
     """
-    found = _of_stages(scene, verified)
+    found = _of_stages(scene)
     asked = scene.required_study.certificate
     if asked is not None:
         most = certificate_samples(scene) if asked.samples is None else asked.samples
@@ -42,12 +40,12 @@ def samples_of(scene: Scene, verified: int | None = None) -> dict[str, int]:
     return found
 
 
-def _of_stages(scene: Scene, each: int | None = None) -> dict[str, int]:
+def _of_stages(scene: Scene) -> dict[str, int]:
     """The same of all stages but the certificate, whose size goes by theirs."""
     study = scene.required_study
     extremes, spread = optimisation.chosen_in_all(study)
     verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
-    count = truth.expected(study.verification) if each is None else each
+    count = truth.expected(study)
     if study.verification.infill_rounds:
         verified += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
     begun, rounds = refinement.simulations(study)
@@ -58,6 +56,7 @@ def _of_stages(scene: Scene, each: int | None = None) -> dict[str, int]:
         "check": begun,
         "infill": rounds,
         "verification": (extremes + verified) * count,
+        "pairs": tolerance.simulations(study),
         "lives": lives.simulations_of_designs(scene),
         "chaos": (extremes + verified) * 2 * chaos.PAIRS,
         "readings": readings.simulations(scene)[0],

@@ -237,7 +237,7 @@ def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
     broken = before.excess[before.best()].min()
     if broken > 0.0 and now.excess[now.best()].min() < broken:
         return "still came nearer to the constraints"
-    case, accuracy = run.study.case(name), run.study.verification.accuracy
+    case, accuracy = run.study.case(name), run.study.wanted
     shares, relative = zip(*(wanted(goal, accuracy) for goal in case.goals), strict=True)
     gains = _gains(old, new, relative)
     counts = np.asarray(gains > np.array(shares))

@@ -10,7 +10,6 @@ from hpcclear.study import paper
 
 _WORDS = {
     "wear": "lives of joints that wear",
-    "budget": "how the accuracy asked for is shared out",
     "effects": "which effects could be left out",
     "sensitivity": "which variables matter",
     "kriging": "models of the objective",
@@ -35,7 +34,6 @@ class Stages:
         steps = ["kriging", "optimisation", "verification", "responses"]
         steps = (["sensitivity"] if scene.required_study.groups else []) + steps
         steps = (["effects"] if scene.required_study.certificate is not None else []) + steps
-        steps = (["budget"] if scene.required_study.accuracy is not None else []) + steps
         if scene.required_study.worn:
             steps = ["wear", *steps[:-1], "lives", steps[-1]]
         self._steps = steps + (["readings"] if "readings.nc" in paper.files(scene) else [])

@@ -1,185 +1,226 @@
-"""Whether the tolerance that a pilot chose is good enough for alpha and beta, before all else is verified at it.
+"""What the tolerance of the integration takes of an accuracy that is asked of a study (`study.accuracy`).
 
-The pilot tells what tolerances do to other designs than these, and the least deviation has the largest relative errors. So
-verification begins with as many simulations of each design as show which are the ends; these are finished first, and pairs
-of their own points at a tighter tolerance tell the bias. If it is too large, all goes on at the next tolerance.
+The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
+again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
+tolerance does. That is part of all limits of the case, and the samples have to meet what it leaves of the accuracy.
+
+Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
+variance of paired samples).
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.scene.stages import SCRAMBLINGS
-from hpcclear.statistics.random.allocation import FALL, Evidence, biases
-from hpcclear.study import truth, verification
-from hpcclear.study.budget import Budget, reach_of
+from hpcclear.scene import Scene
+from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy
+from hpcclear.scene.study import Study
+from hpcclear.statistics.random.replicates import spread
+from hpcclear.study import goals, truth, verification
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.pilot import LADDER, PAIRS
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verification import Table
 
-APART, NEAREST = 2, len(LADDER) - 1
-"""Rungs to the tolerance that one is measured against, if there are so many, and the loosest that any is: what is nearer leaves
-most of a bias."""
+STRICTER, STRICTEST = 100.0, 1e-14
+"""By how much the tolerance of pairs is stricter, and how strict it may be."""
+
+FALL = 0.5
+"""What a tolerance ten times stricter leaves of a bias. Medians of 80 designs are 0.8 from 1e-3 to 1e-4, where contacts and
+stability keep steps short, then 0.7, 0.55 and 0.35 to 1e-7. What the stricter one leaves counts too."""
+
+FIRST, LEAST = 4, 4
+"""Pairs are made of one in so many of a design's points at first, and of so many of each scrambling at least: where few motions
+go another way, fewer may miss them all."""
 
 HIDDEN = 0.25
-"""Standard error of a bias of alpha or beta, over the accuracy, that is small enough."""
+"""Standard error of a bias, over the accuracy, that is small enough."""
 
-FIRST = 4
-"""Pairs are made of one in so many of a design's points at first: where few motions go another way, fewer may miss them all."""
+ROOM = 0.75
+"""Share of an accuracy from which on the tolerance dominates: the samples then have to meet the accuracy by themselves."""
 
-SURELY = 3.0
-"""Standard errors by which a bias is beyond what is left to it, before it is believed at once: it is asked several times."""
+NOTHING = 1e-9
+"""Share of the mean below which a deviation is round-off."""
 
-
-def verified(
-    run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice]
-) -> tuple[StudyRun, Budget, Result, Table]:
-    """The stage of verification, at the loosest tolerance from the split's on that is good enough for alpha and beta; at the
-    tightest if none is. `wanted`: the accuracy asked, shape (2,)."""
-    true = run.stage("verification", _verify, wanted, made, designs)
-    rung, ends = int(true.pop("rung")), true.pop("ends")
-    before, rtol = made.split, float(made.found.rtol[rung])
-    spent = made.pilot + float(true.pop("pairs_evaluations"))
-    made = replace(made, split=replace(before, rung=rung, rtol=rtol), pilot=spent, ends=ends)
-    if rung != before.rung:
-        run.tell(
-            f"Pairs on alpha and beta show that rtol {before.rtol:.0e} takes more of their accuracy than the samples leave: "
-            f"designs are verified at {rtol:.0e}."
-        )
-    run = run.of(run.scene.with_({"numerics.rtol": rtol}))
-    return run, made, true, verification.named(run, designs, true)
+Taken = tuple[Array, Array]
+"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.told_each`, without what chance made; and
+the standard error."""
 
 
-def _verify(run: StudyRun, wanted: Array, made: Budget, designs: Sequence[Choice]) -> Result:
-    """What `truth.simulate` returns; ``rung``, what its tolerance takes of the ends at worst (2,), evaluations of pairs."""
-    ladder = Ladder(run, made.found, designs)
-    rung, last = made.split.rung, len(made.found.rtol) - 1
-    taken: dict[int, Array] = {}
-    while True:
-        ladder.begin(rung)
-        true = ladder.told(rung)
-        fresh = sorted(set(_ends(run, designs, true)) - set(taken))
-        if not fresh:
-            if ladder.finish(rung, range(len(designs))):
-                continue  # other designs may be the ends
-            worst = np.max(list(taken.values()), axis=0, initial=0.0)
-            spent = np.asarray(ladder.spent)
-            return true | {"rung": np.asarray(rung), "ends": worst, "pairs_evaluations": spent}
-        ladder.finish(rung, fresh)
-        # what samples leave, at least the split's share: where `most_samples` ended them no tolerance makes up for it
-        reach = reach_of(ladder.told(rung))[fresh]
-        left = np.sqrt(np.fmax(wanted**2 - reach**2, np.fmin(made.split.tolerance, wanted) ** 2))
-        against = max(min(rung, last - 1), 0)
-        tight = min(max(against + APART, NEAREST), last)
-        bias, error = ladder.bias(against, tight, fresh, left, wanted)
-        if rung == last:
-            bias, error = FALL * bias, FALL * error
-        # what chance may have made counts no more: a needless tolerance is dear
-        known = np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0)))
-        if rung < last and not (known <= left).all():
-            rung, taken = rung + 1, {}
-            continue
-        taken |= dict(zip(fresh, known, strict=True))
+def simulations(study: Study) -> int:
+    """Simulations in pairs, at the fewest."""
+    if not study.paired:
+        return 0
+    return goals.ends_in_all(study) * SCRAMBLINGS * _first(truth.first_length(study.verification))
 
 
-def _ends(run: StudyRun, designs: Sequence[Choice], true: Result) -> list[int]:
+def stricter(scene: Scene) -> tuple[Scene, float]:
+    """The scene that pairs are simulated by, and what share of a bias is left there."""
+    numerics = scene.numerics
+    if numerics.target_error is not None:
+        return scene.with_({"numerics.target_error": 0.5 * numerics.target_error}), 0.5
+    rtol = max(numerics.rtol / STRICTER, STRICTEST)
+    changes = {"numerics.rtol": rtol}
+    if numerics.atol is not None:
+        changes["numerics.atol"] = numerics.atol * rtol / numerics.rtol
+    return scene.with_(changes), FALL ** float(np.log10(numerics.rtol / rtol))
+
+
+def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
+    """What `truth.simulate` returns, with what the tolerance takes in all limits.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and deviation of the designs of
+        its case, at worst, relative; and to what standard error that is known.
+    """
+    settings, everything = run.study.verification, range(len(designs))
+    made = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    length = truth.first_length(settings)
+    truth.lengthen(run, designs, made, everything, "verification", "verification", length)
+    taken: dict[int, Taken] = {}
+    while fresh := sorted(set(_ends(run, designs, made)) - set(taken)):
+        taken |= _taken(run, designs, made, fresh)
+        made = truth.doubled(
+            run, designs, "verification", "verification", length, settings.most_samples, made,
+            _left(run.study.wanted, list(taken.values())),
+        )  # fmt: skip
+        made = truth.contested(run, designs, made, "verification", "verification")
+    return _widened(run, designs, truth.told_of(run, designs, made), taken)
+
+
+def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:
     """Rows of the designs that are the ends of their cases, by what is known."""
-    table = verification.named(run, designs, true)
+    table = verification.named(run, designs, truth.told_of(run, designs, made))
     named = zip(table.choices, table.rows, strict=True)
     return [row for one, row in named if one.name in run.study.case(one.case).ends]
 
 
-class Ladder:
-    """Simulations of designs at several tolerances, the same points at each.
+def _left(wanted: MomentAccuracy, taken: Sequence[Taken]) -> MomentAccuracy:
+    """What the tolerance leaves the samples of an accuracy: squares of both add up to its own."""
+    share = np.max([one[0][:2] for one in taken], axis=0)
+    asked = np.array([wanted.mean, wanted.deviation])
+    share = np.where(share < ROOM * asked, share, 0.0)
+    mean, deviation = np.sqrt(asked**2 - share**2).tolist()
+    return wanted.model_copy(update={"mean": mean, "deviation": deviation})
 
-    Parameters
-    ----------
-    run : StudyRun
-    found : Evidence
-        Of a pilot: its tolerances, and what a simulation takes at each.
-    designs : sequence of Choice
 
-    Attributes
-    ----------
-    spent : float
-        Evaluations of the equations of motion that went into pairs, as many as the pilot's designs take.
-    """
+def _first(length: int) -> int:
+    """Points of each scrambling that pairs are made of at first, of so many."""
+    return min(max(length // FIRST, LEAST), length)
 
-    def __init__(self, run: StudyRun, found: Evidence, designs: Sequence[Choice]) -> None:
-        self._run, self._designs, self.spent = run, designs, 0.0
-        self._rtol, self._evaluations = found.rtol, found.evaluations
-        self._scenes = [run.scene.with_({"numerics.rtol": float(one)}) for one in found.rtol]
-        self._made = [[np.empty((2, SCRAMBLINGS, 0))] * len(designs) for _ in found.rtol]
 
-    def begin(self, rung: int) -> None:
-        """As many points of each design as accuracy is judged from."""
-        length = truth.first_length(self._run.study.verification)
-        self._lengthen(rung, range(len(self._designs)), length, "verification")
+def _taken(
+    run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], rows: Sequence[int]
+) -> dict[int, Taken]:
+    """What the tolerance takes of some designs: by more and more of their points until that is known well enough, or all are
+    paired."""
+    scene, left = stricter(run.scene)
+    wanted = run.study.wanted
+    asked = HIDDEN * np.array([wanted.mean, wanted.deviation])
+    strict = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    tight, open_, length = run.of(scene), list(rows), _first(min(made[k].shape[2] for k in rows))
+    found: dict[int, Taken] = {}
+    while open_:
+        more = length - strict[open_[0]].shape[2]
+        truth.lengthen(tight, designs, strict, open_, "pairs", "verification", more)
+        for k in open_:
+            bias, error = _apart(run, designs[k], made[k][0][:, :length], strict[k][0])
+            bias, error = bias / (1.0 - left), error / (1.0 - left)
+            # a bias that chance may have made counts for nothing
+            found[k] = np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
+        length *= 2
+        open_ = [k for k in open_ if (found[k][1][:2] > asked).any() and length <= made[k].shape[2]]
+    run.simulations.next = tight.simulations.next
+    return found
 
-    def finish(self, rung: int, rows: Sequence[int]) -> bool:
-        """Double designs until they are accurate; whether there was anything to do."""
-        settings, made = self._run.study.verification, self._made[rung]
-        before = [made[k] for k in rows]
-        few = [self._designs[k] for k in rows]
-        with self._at(rung) as run:
-            first = truth.first_length(settings)
-            after = truth.doubled(
-                run, few, "verification", "verification", first, settings.most_samples, before
-            )
-        for k, one in zip(rows, after, strict=True):
-            made[k] = one
-        return any(a.size > b.size for a, b in zip(after, before, strict=True))
 
-    def told(self, rung: int) -> Result:
-        """What is known of all designs at a tolerance."""
-        return truth.told_of(self._run, self._designs, self._made[rung])
+def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
+    """By how much what is told of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    both = np.isfinite(ours) & np.isfinite(theirs)
+    one, other = (truth.told_each(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs))
+    scale = _scales(run, choice, np.array([told.value for told in other]))
+    bias = np.array([a.value - b.value for a, b in zip(one, other, strict=True)]) / scale
+    shifts = np.array([a.shifts - b.shifts for a, b in zip(one, other, strict=True)])
+    return bias, spread(shifts) / scale
 
-    def bias(
-        self, rung: int, against: int, rows: Sequence[int], left: Array, wanted: Array
-    ) -> tuple[Array, Array]:
-        """Relative biases of mean and deviation of some designs, and their standard errors, (rows, 2) each.
 
-        By as few pairs as tell whether they are more than what is `left` to them, or chance hides no more than a part of the
-        accuracy; at most by as many as a design has.
-        """
-        found = np.zeros((2, len(rows), 2))
-        lengths = [self._made[rung][k].shape[2] for k in rows]
-        length, open_ = max(min(lengths) // FIRST, PAIRS), list(range(len(rows)))
-        while open_:
-            few = [rows[k] for k in open_]
-            self._lengthen(rung, few, length, "verification")
-            self._lengthen(against, few, length, "pairs")
-            values = [[self._made[one][k][0][:, :length] for k in few] for one in (rung, against)]
-            found[:, open_] = np.array(biases(self._rtol[[rung, against]], np.array(values)))[:, 0]
-            bias, error = abs(found[0]), found[1]
-            told = (bias + 2.0 * error <= left).all(axis=1) | (bias - SURELY * error > left).any(
-                axis=1
-            )
-            told |= (error <= HIDDEN * wanted).all(axis=1)
-            length *= 2
-            open_ = [k for k in open_ if not told[k] and length <= lengths[k]]
-        return found[0], found[1]
+def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
+    """What errors of all that is told of a design are relative to: (k,) as `truth.told_each` returns them."""
+    case, scale = run.study.case(choice.case), np.abs(values)
+    scale[1] = max(scale[1], NOTHING * scale[0])
+    for k, goal in enumerate((*case.goals, *case.kept), 3):
+        if not goals.wanted(goal, run.study.wanted)[1]:
+            scale[k] = 1.0
+    return np.where(scale > 0.0, scale, 1.0)
 
-    def _lengthen(self, rung: int, rows: Sequence[int], length: int, stage: str) -> None:
-        """At least so many points of each scrambling of some designs."""
-        made = self._made[rung]
-        lengths = {k: made[k].shape[2] for k in rows if made[k].shape[2] < length}
-        for short in sorted(set(lengths.values())):
-            few = [k for k, one in lengths.items() if one == short]
-            with self._at(rung) as run:
-                truth.lengthen(run, self._designs, made, few, stage, "verification", length - short)
-            if stage == "pairs":
-                self.spent += (
-                    len(few) * SCRAMBLINGS * (length - short) * float(self._evaluations[rung])
-                )
 
-    @contextmanager
-    def _at(self, rung: int) -> Iterator[StudyRun]:
-        """The run at a tolerance; what follows is numbered on."""
-        run = self._run.of(self._scenes[rung])
-        yield run
-        self._run.simulations.next = run.simulations.next
+def _widened(
+    run: StudyRun, designs: Sequence[Choice], true: Result, taken: dict[int, Taken]
+) -> Result:
+    """All limits with what the tolerance takes, the worst of the ends of a case for all its designs."""
+    true["tolerance"], true["tolerance_error"] = np.zeros((2, len(designs), 2))
+    for k, choice in enumerate(designs):
+        ends = [one for row, one in taken.items() if designs[row].case == choice.case]
+        if not ends:
+            continue
+        share, error = (np.max([one[part] for one in ends], axis=0) for part in (0, 1))
+        true["tolerance"][k], true["tolerance_error"][k] = share[:2], error[:2]
+        count = len(share) - 3
+        values = np.array(
+            [true[name][k] for name in ("mean", "deviation", "percentile")]
+            + true["goal"][k, :count].tolist()
+        )
+        wider = share * _scales(run, choice, values)
+        for name, more in zip(("mean_reach", "deviation_reach"), wider[:2], strict=True):
+            true[name][k] = np.hypot(true[name][k], more)
+        for lower, upper, value, more in (
+            (true["percentile_lower"][k:], true["percentile_upper"][k:], values[2:3], wider[2:3]),
+            (true["goal_lower"][k], true["goal_upper"][k], values[3:], wider[3:]),
+        ):
+            number = len(value)
+            lower[:number] = value - np.hypot(value - lower[:number], more)
+            upper[:number] = value + np.hypot(upper[:number] - value, more)
+    return true
+
+
+def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, list[str]]:
+    """What verified designs reached of the accuracy, in a sentence; and what a reader should know, a sentence each."""
+    wanted = np.array([run.study.wanted.mean, run.study.wanted.deviation])
+    moments = ("mean", "deviation")
+    within = np.column_stack([true[f"{name}_reach"] / abs(true[name]) for name in moments])
+    worst = np.nanmax(within, axis=0, initial=0.0)
+    share, doubt = (np.nanmax(true[name], axis=0) for name in ("tolerance", "tolerance_error"))
+    tight, _ = stricter(run.scene)
+    numerics, level = tight.numerics, f"{run.study.verification.confidence:.0%}"
+    pairs = f"target error {numerics.target_error:g}" if numerics.target_error else f"rtol {numerics.rtol:.0e}"  # fmt: skip
+    text = (
+        f"Reached at {level}: {_shares(worst)}, at worst, of {_shares(wanted)} asked; of that the tolerance takes "
+        f"{_shares(share)}, by pairs at {pairs}."
+    )
+    remarks = []
+    if (share > ROOM * wanted).any():
+        tenths = np.ceil(np.log((share / (0.5 * wanted)).max()) / -np.log(FALL))
+        lower = "numerics.target_error"
+        if run.scene.numerics.target_error is None:
+            lower = f"numerics.rtol, to {run.scene.numerics.rtol / 10.0**tenths:.0e} say"
+        remarks.append(
+            f"The tolerance dominates: it takes {_shares(share)} of an accuracy of {_shares(wanted)}; lower {lower}."
+        )
+    elif (doubt > 2.0 * HIDDEN * wanted).any():
+        remarks.append(
+            f"Chaos hides what the tolerance takes of the accuracy: it is known to {_shares(doubt)}, no better."
+        )
+    missed = [
+        name for name, row in zip(names, within, strict=True) if not (row <= 1.0001 * wanted).all()
+    ]
+    if missed and not (share > ROOM * wanted).any():
+        remarks.append(
+            f"{len(missed)} of {len(names)} designs did not reach the accuracy, {missed[0]} among them: "
+            "raise study.verification.most_samples."
+        )
+    return text, remarks
+
+
+def _shares(values: Array) -> str:
+    return f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the deviation"

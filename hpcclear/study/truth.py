@@ -8,8 +8,9 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import SCRAMBLINGS, Verification
-from hpcclear.statistics.random.replicates import moments, quantile, student
+from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
+from hpcclear.scene.study import Study
+from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import goals
 from hpcclear.study.optimisation import Choice
@@ -79,7 +80,7 @@ def simulate(
     if settings.draws is not None:
         return told_of(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
     made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-    return told_of(run, choices, _contested(run, choices, made, stage, purpose))
+    return told_of(run, choices, contested(run, choices, made, stage, purpose))
 
 
 def scrambled_length(simulations: int) -> int:
@@ -93,12 +94,13 @@ def first_length(settings: Verification) -> int:
     return scrambled_length(min(least, settings.most_samples))
 
 
-def expected(settings: Verification) -> int:
+def expected(study: Study) -> int:
     """Simulations of a design, on average: what the deviation of the paper's designs took, whose limits were 1.4 % of it after
     512 and fell as the power 0.6 of the simulations."""
+    settings = study.verification
     if settings.draws is not None:
         return settings.draws
-    needed = FIRST * max(0.014 / settings.accuracy.deviation, 1.0) ** 1.7
+    needed = FIRST * max(0.014 / study.wanted.deviation, 1.0) ** 1.7
     return int(np.clip(needed, first_length(settings) * SCRAMBLINGS, settings.most_samples))
 
 
@@ -117,14 +119,17 @@ def doubled(
     length: int,
     most: int,
     before: Sequence[Array] = (),
+    wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each scrambling,
-    doubled until accurate or beyond `most` simulations; what was made `before` is gone on from."""
+    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
+    from."""
+    wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
     while True:
         rows = [
             k for k, one in enumerate(made)
-            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0]))
+            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0], wanted))
         ]  # fmt: skip
         if not rows:
             return made
@@ -150,10 +155,11 @@ def lengthen(
         made[k] = np.concatenate([made[k], one], axis=2)
 
 
-def _contested(
+def contested(
     run: StudyRun, choices: Sequence[Choice], made: list[Array], stage: str, purpose: str
 ) -> list[Array]:
-    """Designs doubled further while the ends of a front are not decided, the shortest first."""
+    """Designs doubled further while the ends of a front are not decided, the shortest first; `made`, shape (2, replicates,
+    values) each, as `doubled` returns it."""
     settings = run.study.verification
     most = [min(one[0].size * settings.contest, settings.most_samples) for one in made]
     while True:
@@ -180,7 +186,7 @@ def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array])
         shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in told]), 1, 0)
         less = Compared(values, shifts, settings.confidence).less
         for column, goal in enumerate(case.goals):
-            share, relative = goals.wanted(goal, settings.accuracy)
+            share, relative = goals.wanted(goal, run.study.wanted)
             own = values[:, column]
             if not np.isfinite(own).any():
                 continue
@@ -224,12 +230,11 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
     )  # type: ignore[return-value]
 
 
-def _accurate(run: StudyRun, choice: Choice, values: Array) -> bool:
+def _accurate(run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy) -> bool:
     """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
-    wanted = settings.accuracy
     good = reach[0] <= wanted.mean * abs(mean)
     good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
     if good and not case.plain:
@@ -248,6 +253,12 @@ def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.told(goal, values, choice.design, level) for goal in asked]
+
+
+def told_each(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.Told]:
+    """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
+    percentile = quantile(values, QUANTILE, run.study.verification.confidence)
+    return [*moments(values), percentile, *_goals(run, choice, values)]
 
 
 def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:

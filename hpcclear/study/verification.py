@@ -191,7 +191,6 @@ def write(
     remarks: Sequence[str],
     printed: Mapping[str, Array],
     over_life: Mapping[str, Array],
-    within: Array | None = None,
 ) -> None:
     """Write verification.nc.
 
@@ -209,8 +208,6 @@ def write(
         ``mean`` and ``deviation`` of the same designs in a publication, to stand beside ours.
     over_life : mapping of str to array, shape (n,)
         Of `hpcclear.study.lives.of_designs`; empty where nothing wears.
-    within : array, shape (n, 2), optional
-        What each reached of an accuracy asked of the study (`hpcclear.study.budget.within`).
     """
     study, choices = run.study, table.choices
     surrogate = predicted(run, choices, model)
@@ -229,8 +226,9 @@ def write(
             value, reach = over_life[name], over_life[f"{name}_reach"]
             data[f"life_{name}"] = value
             data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
-        if within is not None:
-            data[f"{name}_within"] = within[:, column]
+        if study.paired:
+            data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
+            data[f"{name}_tolerance"] = true["tolerance"][:, column]
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):

@@ -42,13 +42,13 @@ class KrigingMethod:
         rng: np.random.Generator,
         names: Sequence[str] | None = None,
     ) -> Kriging:
-        """As `fit_kriging`, of points (n, d), values (n,) and bounds (d, 2)."""
+        """Fit values (n,) at points (n, d); see `fit_kriging` for shapes and errors."""
         return fit_kriging(
             points, values, bounds, rng=rng, names=names, restarts=self.restarts, kernel=self.kernel
         )
 
     def restored(self, arrays: Mapping[str, np.ndarray]) -> Kriging:
-        """As `Kriging.from_arrays`; shapes by `FIELDS`, (n, d) for inputs."""
+        """Return the model of stored arrays; shapes as in `Kriging.from_arrays`."""
         return Kriging.from_arrays(arrays)
 
 

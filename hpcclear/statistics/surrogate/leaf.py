@@ -75,7 +75,7 @@ class Leaf(Protocol):
         """What `to_arrays` gives."""
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """The model as plain arrays, without pickle; shapes by `fields`."""
+        """Return the model as plain arrays, without pickle; their shapes are those of `fields`."""
 
 
 class Method(Protocol):
@@ -101,7 +101,7 @@ class Method(Protocol):
         """A model of values (n,), NaN where a sample failed, at points (n, d) within bounds (d, 2)."""
 
     def restored(self, arrays: Mapping[str, np.ndarray]) -> Leaf:
-        """The model that `Leaf.to_arrays` gave, arrays of the same shapes; it predicts the same to the last bit."""
+        """Return the model of the arrays that `Leaf.to_arrays` gave, shapes as there; it predicts the same to the last bit."""
 
 
 def checked_samples(
@@ -111,9 +111,7 @@ def checked_samples(
     names: Sequence[str] | None,
     needed: int,
 ) -> tuple[tuple[str, ...], Booleans]:
-    """The inputs' names (default x1, x2, ...), and which samples count, (n,); NaN values are failed samples.
-
-    Points have shape (n, d), values (n,), bounds (d, 2).
+    """Return the inputs' names (default x1, x2, ...), and which of the samples (n,) count; NaN values are failed samples.
 
     Raises
     ------

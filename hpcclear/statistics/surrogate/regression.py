@@ -175,12 +175,12 @@ class Regression:
 
     @cached_property
     def fitted(self) -> Array:
-        """Predictions at the training points, (n,)."""
+        """Predictions at the training points, shape (n,)."""
         return self.predict(self.inputs)
 
     @cached_property
     def left_out(self) -> Array:
-        """At each training point what a model without a fifth of the points, this one among them, predicts, (n,)."""
+        """Prediction at each training point, shape (n,), of a model without a fifth of the points, this one among them."""
         if "left_out" in self.stored:
             return self.stored["left_out"]
         fold, found = np.arange(len(self.values)) % FOLDS, np.empty(len(self.values))
@@ -190,7 +190,7 @@ class Regression:
         return found
 
     def leave_one_out(self) -> Array:
-        """See `left_out`, (n,)."""
+        """Return `left_out`, shape (n,)."""
         return self.left_out
 
     def steepest(self) -> int:
@@ -213,12 +213,12 @@ class Regression:
         return scale * _numbers(found, shape, self.label, "moments") + [mean, 0.0]
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """The training points, (n, d), and what came of them; `FIELDS` names the dimensions."""
+        """Return training points and predictions; `FIELDS` names the dimensions, which are the shapes."""
         return {name: np.asarray(getattr(self, name)) for name in FIELDS}
 
 
 def restored(arrays: Mapping[str, np.ndarray], source: Any = None) -> Regression:
-    """The model of stored arrays, their shapes by `FIELDS`, and its label; without a source it does not predict."""
+    """Return the model of stored arrays, shapes as in `FIELDS`; without a source it does not predict."""
     found = {
         name: np.asarray(arrays[name], np.float64)
         for name in FIELDS

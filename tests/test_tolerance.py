@@ -1,0 +1,324 @@
+"""An accuracy of a whole study: pairs at a stricter tolerance, and limits that hold what the tolerance takes."""
+
+import pathlib
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from commands import warm
+from patience import crowded
+
+from hpcclear.base.errors import InputError
+from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ranks.boundary import alone
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
+from hpcclear.study import extent, run_study, simulations, tolerance
+from hpcclear.study.optimisation import Choice
+
+PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
+MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
+
+STUDY = """
+[study]
+seed = 3
+samples = 20
+test_samples = 8
+accuracy = { mean = 0.005, deviation = 0.01 }
+[study.variables]
+m2 = { range = [0.105, 0.42] }
+C = { range = ["0.3 mm", "1 mm"] }
+[study.random]
+C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+m2 = { distribution = "uniform", half_width = 0.005 }
+[study.cases]
+play = ["C", "m2"]
+[study.sensitivity]
+groups = []
+[study.surrogate]
+r2 = 0.5
+restarts = 0
+[study.swarm]
+particles = 10
+iterations = 5
+runs = 1
+archive = 8
+[study.verification]
+designs = 2
+infill_rounds = 1
+infill_designs = 4
+response_windows = 2
+response_copies = 2
+"""
+BIAS = 15.0  # of f over rtol: 0.15 % at 1e-4
+SHARE = BIAS * (1e-4 - 1e-6) / (1.0 - 0.25)  # that of pairs at 1e-6, which leave a quarter of it
+
+
+def scene_of(*overrides: str):
+    return load_scene(tomllib.loads(formula.PHYSICS + STUDY), ["numerics.rtol=1e-4", *overrides])
+
+
+@pytest.fixture(autouse=True)
+def _dynamics(monkeypatch):
+    formula.replace_dynamics(monkeypatch.setattr)
+    monkeypatch.setattr(formula, "BIAS", BIAS)
+
+
+# -- pairs of values --------------------------------------------------------------------------------
+
+
+def apart(ours, theirs, *overrides):
+    scene = scene_of(*overrides)
+    return tolerance._apart(
+        SimpleNamespace(study=scene.required_study), Choice("", "play", {"m2": 0.2}), ours, theirs
+    )
+
+
+def drawn(seed=1, length=64):
+    """Values of mean 1 and deviation 0.1."""
+    return 1.0 + 0.1 * np.random.default_rng(seed).standard_normal((16, length))
+
+
+def test_a_bias_is_found_to_the_last_digit_where_pairs_meet_the_same_scatter():
+    exact = drawn()
+    bias, error = apart(1.02 * exact, exact)
+    np.testing.assert_allclose(bias[:3], 0.02, rtol=1e-9)  # mean, deviation, percentile
+    assert (error[:3] < 2e-3).all()
+    wider, _ = apart(1.0 + 1.5 * (exact - 1.0), exact)
+    assert wider[0] == pytest.approx(0.0, abs=5e-3)
+    assert wider[1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_what_chance_does_to_pairs_is_within_its_standard_error():
+    """Of 60 pairs of independent draws; and the error is that of two means of 1024 values."""
+    found = [apart(drawn(2 * k), drawn(2 * k + 1)) for k in range(60)]
+    bias, error = (np.array([one[part][:2] for one in found]) for part in (0, 1))
+    np.testing.assert_allclose(error[:, 0].mean(), np.sqrt(2.0) * 0.1 / 32.0, rtol=0.1)
+    np.testing.assert_allclose((bias / error).std(axis=0), 1.0, atol=0.35)
+
+
+def test_failed_simulations_are_left_out_in_pairs():
+    exact = drawn()
+    ours, theirs = 1.02 * exact, exact.copy()
+    ours[3, ::2], theirs[5, 1::3] = np.nan, np.nan
+    np.testing.assert_allclose(apart(ours, theirs)[0][:2], 0.02, rtol=1e-9)
+
+
+def test_what_a_case_asks_besides_has_its_share_too():
+    rows = '[{statistic="quantile", level=0.9}, {statistic="exceedance", limit="1.1 m"}]'
+    asked = f'study.cases.play={{random=["C"], objectives={rows}}}'
+    exact = drawn()
+    bias, error = apart(1.02 * exact, exact, asked)
+    assert len(bias) == len(error) == 5
+    assert bias[3] == pytest.approx(0.02, rel=1e-9)
+    assert bias[4] == pytest.approx((1.02 * exact > 1.1).mean() - (exact > 1.1).mean(), rel=1e-6)
+
+
+def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():
+    tight, left = tolerance.stricter(scene_of("numerics.atol=1e-7"))
+    assert (tight.numerics.rtol, tight.numerics.atol) == pytest.approx((1e-6, 1e-9))
+    assert left == pytest.approx(0.25)
+    tight, left = tolerance.stricter(scene_of("numerics.rtol=1e-13"))
+    assert tight.numerics.rtol == pytest.approx(1e-14)
+    assert left == pytest.approx(0.5)
+    tight, left = tolerance.stricter(scene_of("numerics.target_error=0.02"))
+    assert (tight.numerics.target_error, left) == (0.01, 0.5)
+
+
+# -- a study ----------------------------------------------------------------------------------------
+
+
+def contents(place: pathlib.Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(place)): path.read_bytes()
+        for path in sorted(place.rglob("*.nc"))
+        if path.name != "timing.nc"
+    }
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A study in one go, and what it told."""
+    place, told = tmp_path_factory.mktemp("accurate") / "whole", []
+    with pytest.MonkeyPatch.context() as patch:
+        formula.replace_dynamics(patch.setattr)
+        patch.setattr(formula, "BIAS", BIAS)
+        run_study(scene_of(), place, alone(), progress_style="quiet", tell=told.append)
+    return place, told
+
+
+def test_limits_hold_the_tolerance_and_the_truth(done):
+    found = dataset.read(done[0] / "verification.nc")
+    low, high, mid = 3e-4, 1e-3, 6.5e-4
+    for k in range(found.sizes["design"]):
+        one = found.isel(design=k)
+        m2 = float(one["m2"])
+        constant = 4 - 5 * m2 + 3 * 0.14 - 10 * 0.06 + 500 * 2.6e-4
+        mean = 1e-4 * constant + (0.1 + 0.5 * m2) * mid
+        play, mass = (high - low) ** 2 / 12, 0.005**2 / 3
+        spread = (0.1 + 0.5 * m2) ** 2 * play + 0.25 * mass * play + (0.5 * mid - 5e-4) ** 2 * mass
+        for name, exact, asked in (("mean", mean, 0.005), ("deviation", spread**0.5, 0.01)):
+            value = float(one[f"{name}_true"])
+            assert float(one[f"{name}_tolerance"]) == pytest.approx(SHARE, rel=1e-3)
+            assert SHARE < float(one[f"{name}_within"]) <= asked
+            assert float(one[f"{name}_lower"]) <= exact <= float(one[f"{name}_upper"])
+            half = (float(one[f"{name}_upper"]) - float(one[f"{name}_lower"])) / 2.0
+            assert half == pytest.approx(value * float(one[f"{name}_within"]))
+
+
+def test_what_was_reached_is_told(done):
+    said = " ".join(done[1])
+    assert "Reached at 95%: " in said
+    assert "of 0.5 % of the mean and 1 % of the deviation asked" in said
+    assert "takes 0.2 % of the mean and 0.2 % of the deviation, by pairs at rtol 1e-06" in said
+    assert "dominates" not in said
+
+
+def test_a_study_that_is_stopped_after_each_stage_ends_with_the_same_bytes(done, tmp_path):
+    assert formula.run_in_pieces(scene_of(), str(tmp_path / "out"), alone()) > 4
+    assert contents(tmp_path / "out") == contents(done[0])
+
+
+@pytest.mark.mpi
+def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(scene_of().text)
+    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
+    made = subprocess.run(
+        [str(MPIEXEC), "-n", "2", *program, str(BIAS)],
+        capture_output=True,
+        text=True,
+        timeout=crowded(120),
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr
+    assert contents(tmp_path / "out") == contents(done[0])
+
+
+def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(formula, "BIAS", 100.0)  # 1 % at 1e-4
+    told: list[str] = []
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    (remark,) = [text for text in told if "tolerance dominates" in text]
+    assert "lower numerics.rtol, to 1e-07 say" in remark  # 1.3 % of 0.25 % by halves
+    found = dataset.read(tmp_path / "it" / "verification.nc")
+    assert (found["mean_within"] > 0.01).all()
+    assert remark in found.attrs["remarks"]
+
+
+def test_the_share_is_that_of_the_ends_which_are_the_worst(tmp_path, monkeypatch):
+    """Half of alpha's samples scatter beyond the largest m2, where f is ten times as wrong."""
+    monkeypatch.setattr(formula, "BEYOND", 10.0)
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
+    found = dataset.read(tmp_path / "it" / "verification.nc")
+    assert float(found["m2"].sel(design="play alpha")) == pytest.approx(0.42, abs=1e-3)
+    assert (found["mean_tolerance"] > 4.0 * SHARE).all()
+
+
+def test_designs_that_most_samples_end_are_named(tmp_path):
+    told: list[str] = []
+    few = scene_of("study.verification.most_samples=128", "study.accuracy=0.003")
+    run_study(few, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    assert any("did not reach the accuracy" in text and "most_samples" in text for text in told)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Simulations by stage and tolerance."""
+    count: Counter[tuple[str, float]] = Counter()
+
+    def counted(scene, points, *arguments, stage, **named):
+        count[stage.partition(":")[0].partition("-")[0], scene.numerics.rtol] += len(points)
+        return sample_points(scene, points, *arguments, stage=stage, **named)
+
+    monkeypatch.setattr(simulations, "sample_points", counted)
+    return count
+
+
+def test_pairs_are_of_points_that_are_verified_anyway(tmp_path, made):
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
+    found = dataset.read(tmp_path / "it" / "verification.nc")
+    ends = found["samples"].sel(design=["play alpha", "play beta"]).sum()
+    once = found["samples"].sum() - ends  # they are ends of the swarm too, and stand there twice
+    assert made["verification", 1e-4] == once
+    pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
+    assert pairs == extent.samples_of(scene_of())["pairs"]  # nothing is chaotic here
+    assert [rtol for stage, rtol in made if stage == "pairs"] == pytest.approx([1e-6])
+
+
+def test_without_an_accuracy_nothing_is_paired(tmp_path, made):
+    scene = scene_of().with_({"study.accuracy": None})
+    run_study(scene, tmp_path / "it", alone(), progress_style="quiet")
+    assert {rtol for _, rtol in made} == {1e-4}
+    assert extent.samples_of(scene)["pairs"] == 0
+    assert "mean_tolerance" not in dataset.read(tmp_path / "it" / "verification.nc")
+
+
+# -- what is refused, and what an earlier version wrote ----------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("overrides", "key", "value"),
+    [
+        (["study.accuracy=0"], "study.accuracy", 0),
+        (["study.accuracy=1.5"], "study.accuracy", 1.5),
+        (["study.accuracy='tight'"], "study.accuracy", "tight"),
+        (["study.accuracy={mean=-1}"], "study.accuracy.mean", -1),
+        (["study.accuracy={means=0.1}"], "study.accuracy.means", 0.1),
+    ],
+)
+def test_nonsense_is_refused_with_key_value_and_remedy(overrides, key, value):
+    with pytest.raises(InputError) as caught:
+        scene_of(*overrides)
+    assert caught.value.key == key
+    assert value is ... or caught.value.value == value
+    assert caught.value.reason
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("entry", ["0.01", "'1 %'", "{mean = 0.01, deviation = 0.01}", "{deviation = 0.01}"])  # fmt: skip
+def test_one_number_stands_for_mean_and_deviation(entry):
+    scene = scene_of(f"study.accuracy={entry}")
+    assert scene.study.accuracy.mean == scene.study.accuracy.deviation == 0.01
+    assert load_scene(tomllib.loads(scene.to_toml())) == scene
+
+
+@pytest.mark.parametrize(
+    ("old", "expected"),
+    [
+        ("{mean = 0.01, deviation = 0.02}", (0.01, 0.02)),
+        ("{deviation = 0.01}", (0.002, 0.01)),  # the other one had that default
+        ("{mean = 0.002, deviation = 0.005}", None),  # nothing but the defaults
+    ],
+)
+def test_an_accuracy_of_verification_is_read_as_that_of_the_study(old, expected):
+    bare = STUDY.replace("accuracy = { mean = 0.005, deviation = 0.01 }\n", "")
+    scene = load_scene(
+        tomllib.loads(formula.PHYSICS + bare), [f"study.verification.accuracy={old}"]
+    )
+    given = scene.required_study.accuracy
+    assert (given and (given.mean, given.deviation)) == expected
+    assert len(scene.readings) == (expected is not None)
+    assert load_scene(tomllib.loads(scene.to_toml())) == scene
+
+
+def test_an_accuracy_of_verification_beside_another_is_not_used_and_said_so():
+    scene = scene_of("study.verification.accuracy.mean=0.1")
+    assert scene.required_study.wanted.mean == 0.005
+    assert "not used beside study.accuracy" in scene.readings[0]
+
+
+def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path, made):
+    scene = scene_of("study.verification.samples=100")
+    told: list[str] = []
+    run_study(scene, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    assert any("study.accuracy is not used" in text for text in told)
+    assert {rtol for _, rtol in made} == {1e-4}
+    assert extent.samples_of(scene)["pairs"] == 0
