@@ -293,7 +293,7 @@ class Study(Table):
             )
         if self.cases:
             inputs = max(len(model) for model in self.models)
-            if self.samples < inputs + 2:
+            if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
                 raise invalid(
                     f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
                     f"Ask for at least {10 * inputs} samples",
