@@ -89,29 +89,21 @@ class Samples:
         return np.array(self.values)[np.minimum((chance * count).astype(np.int64), count - 1)]
 
 
-@dataclass(frozen=True)
-class Named:
-    """A distribution of scipy.stats, cut off at two limits."""
+class Cut:
+    """A distribution in scipy's shape, cut off at two limits."""
 
-    name: str
-    """In scipy.stats."""
-    shapes: tuple[float, ...]
-    location: float = 0.0
-    scale: float = 1.0
-    lower: float = -inf
-    upper: float = inf
+    lower: float
+    upper: float
     """lower and upper: where it is cut off; infinite for the whole of it."""
-
-    @cached_property
-    def _whole(self) -> Any:
-        from scipy import stats  # most of a second, which few scenes need
-
-        return getattr(stats, self.name)(*self.shapes, loc=self.location, scale=self.scale)
+    whole: Any
+    """All of it: ``ppf``, and ``cdf`` where it is cut off; of arrays."""
 
     @cached_property
     def chances(self) -> tuple[float, float]:
         """Probabilities of lying below either limit."""
-        return float(self._whole.cdf(self.lower)), float(self._whole.cdf(self.upper))
+        if (self.lower, self.upper) == (-inf, inf):
+            return 0.0, 1.0
+        return float(self.whole.cdf(self.lower)), float(self.whole.cdf(self.upper))
 
     @cached_property
     def span(self) -> tuple[float, float]:
@@ -119,29 +111,58 @@ class Named:
         from scipy.special import ndtr
 
         rare = ndtr(-TAIL)
-        ends = float(self._whole.ppf(rare)), float(self._whole.isf(rare))
-        return max(ends[0], self.lower), min(ends[1], self.upper)
+        upper = self.whole.isf(rare) if hasattr(self.whole, "isf") else self.whole.ppf(1 - rare)
+        return max(float(self.whole.ppf(rare)), self.lower), min(float(upper), self.upper)
 
     def __call__(self, chance: Array) -> Array:
         """Quantiles, of any shape."""
         below, above = self.chances
-        return np.clip(self._whole.ppf(below + chance * (above - below)), *self.span)
+        return np.clip(self.whole.ppf(below + chance * (above - below)), *self.span)
+
+
+@dataclass(frozen=True)
+class Foreign(Cut):
+    """One that a plug-in made."""
+
+    whole: Any
+    lower: float = -inf
+    upper: float = inf
+
+
+@dataclass(frozen=True)
+class Named(Cut):
+    """One of scipy.stats."""
+
+    name: str
+    parameters: tuple[tuple[str, float], ...]
+    """By their names there."""
+    lower: float = -inf
+    upper: float = inf
+
+    @cached_property
+    def whole(self) -> Any:
+        """All of it."""
+        from scipy import stats  # most of a second, which few scenes need
+
+        return getattr(stats, self.name)(**dict(self.parameters))
 
 
 def lognormal(mean: float, deviation: float, lower: float = -inf, upper: float = inf) -> Named:
     """A lognormal with that mean and standard deviation, both of all of it, before it is cut off."""
     variance = log1p((deviation / mean) ** 2)
     middle = mean / sqrt(1.0 + (deviation / mean) ** 2)
-    return Named("lognorm", (sqrt(variance),), scale=middle, lower=lower, upper=upper)
+    return Named("lognorm", (("s", sqrt(variance)), ("scale", middle)), lower, upper)
 
 
 def beta(shapes: tuple[float, float], lower: float, upper: float) -> Named:
     """A beta distribution over ``[lower, upper]``."""
-    return Named("beta", shapes, lower, upper - lower, lower, upper)
+    over = ("a", shapes[0]), ("b", shapes[1]), ("loc", lower), ("scale", upper - lower)
+    return Named("beta", over, lower, upper)
 
 
 def weibull(
     scale: float, shape: float, location: float, lower: float = -inf, upper: float = inf
 ) -> Named:
     """A Weibull distribution from `location` on."""
-    return Named("weibull_min", (shape,), location, scale, lower, upper)
+    entries = ("c", shape), ("loc", location), ("scale", scale)
+    return Named("weibull_min", entries, lower, upper)

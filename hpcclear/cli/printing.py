@@ -203,6 +203,14 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
                     f"{variable.ratio[0]:g} to {variable.ratio[1]:g}: {variable.ratio_words}",
                 )
             )
+    for row in study.random:
+        if row.parameters is not None:
+            unit = "" if scene.unit(row.paths[0]) == "" else f" {scene.unit(row.paths[0])}"
+            least, most = row.span
+            text = f"{row.shape_words}, {least:g} to {most:g}{unit}"
+            rows.append(
+                (f"{row.name} random", text + ("" if row.absolute else " about the design"))
+            )
     for row in study.worn:
         from hpcclear.study import lives
 

@@ -24,7 +24,7 @@ __all__ = [
 CONTACT_LAWS = Registry("contact law", "hpcclear.contact_laws")
 FRICTION_LAWS = Registry("friction law", "hpcclear.friction_laws")
 OBJECTIVES = Registry("objective", "hpcclear.objectives")
-DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions")
+DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions", needs=("ppf",))
 SURROGATES = Registry("surrogate", "hpcclear.surrogates")
 SEARCHES = Registry("search", "hpcclear.searches")
 

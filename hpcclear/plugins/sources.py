@@ -21,6 +21,9 @@ from hpcclear.base.errors import InputError
 REFERENCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,39}):([A-Za-z_][A-Za-z0-9_]{0,79})")
 """``"module:Name"``."""
 
+SCIPY = "scipy"
+"""In place of a module: what scipy.stats has."""
+
 
 class _Reading(NamedTuple):
     """What names of plug-ins stand for while a scene is read."""

@@ -10,7 +10,7 @@ from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.registry import Registry
-from hpcclear.plugins.sources import REFERENCE, digest, is_trusting
+from hpcclear.plugins.sources import REFERENCE, SCIPY, digest, is_trusting
 from hpcclear.scene.fields import Converted, NamedRows, Table, invalid
 
 
@@ -89,7 +89,7 @@ def modules_named(content: Any) -> set[str]:
     """Modules of all texts in the content of a scene that read ``"module:Name"``."""
     if isinstance(content, str):
         found = REFERENCE.fullmatch(content)
-        return {found.group(1)} if found else set()
+        return {found.group(1)} - {SCIPY} if found else set()
     if isinstance(content, Mapping):
         content = list(content.values())
     inner = content if isinstance(content, (list, tuple)) else ()

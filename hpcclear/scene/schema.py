@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.base.objectives import ENDS
+from hpcclear.scene.distributions import OURS
 from hpcclear.scene.fields import LONGEST_CURVE, Table
 from hpcclear.scene.scene import Scene
 
@@ -102,7 +103,12 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
+    definitions["RandomInput"]["additionalProperties"] = (
+        True  # parameters of a distribution from elsewhere
+    )
     entries = definitions["RandomInput"]["properties"]
+    names = {"anyOf": [{"enum": list(OURS)}, {"type": "string"}]}
+    entries["distribution"] = {**names, "description": entries["distribution"]["description"]}
     for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
                        ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
         entries[key] = {"type": "string", "description": words}

@@ -3,15 +3,14 @@
 import re
 from collections.abc import Mapping
 from functools import cached_property
-from math import inf
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
 from hpcclear.base import quantiles
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
+from hpcclear.scene.distributions import OF_LIMITS, converted, form_of, is_ours
 from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, invalid, nearest
 from hpcclear.scene.paths import described, quantities
 
@@ -207,18 +206,6 @@ def is_link_inertia(path: str) -> bool:
     return path in LINK_INERTIAS
 
 
-_NEEDED: Mapping[str, tuple[frozenset[str], frozenset[str]]] = {
-    "uniform": (frozenset({"half_width"}), frozenset({"mean"})),
-    "normal": (frozenset({"deviation"}), frozenset({"mean"})),
-    "truncated-normal": (frozenset({"deviation", "half_width"}), frozenset({"mean"})),
-    "lognormal": (frozenset({"mean", "deviation"}), frozenset({"range", "about_design"})),
-    "beta": (frozenset({"shapes", "half_width"}), frozenset({"mean"})),
-    "weibull": (frozenset({"scale", "shape"}), frozenset({"location", "range", "about_design"})),
-    "samples": (frozenset({"values"}), frozenset({"about_design"})),
-    "wear": (frozenset({"cycles"}), frozenset({"half_width"})),
-}
-"""Entries that a distribution needs, and those that it may have; "uniform" and "beta" take a range in place of both others."""
-
 _LEAST_SHARE = 1e-9
 """Least probability that a range may leave of a distribution it cuts."""
 
@@ -233,12 +220,11 @@ class RandomInput(NamedInput):
         "column": ("says which column of a file is meant, and there is none", "Add file = ..."),
     }  # fmt: skip
 
-    distribution: Literal[
-        "uniform", "normal", "truncated-normal", "lognormal", "beta", "weibull", "samples", "wear"
-    ]
-    """Its law; "samples" are measured values, "wear" takes the clearances of the lives of `[wear]`."""
+    distribution: str
+    """Its law; "samples" are measured values, "wear" takes the clearances of the lives of `[wear]`. Besides those of this list
+    any continuous one of scipy.stats, "scipy:weibull_min" say, that of an installed package, or "module:Name" of a file."""
     range: Range | None = None
-    """Bounds of a "uniform" or "beta" distribution; where "lognormal" and "weibull" are cut off. SI."""
+    """Bounds of a "uniform" or "beta" distribution; where others are cut off. SI."""
     mean: float | None = None
     """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; left out, the distribution lies about the value of the
     design. Of "lognormal" its mean, before it is cut off."""
@@ -259,12 +245,18 @@ class RandomInput(NamedInput):
     `column`, as its first row has it."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
+    parameters: dict[str, float] | None = None
+    """Of distributions from elsewhere, which may stand beside the other entries, too: shapes, loc and scale of one of scipy's;
+    whatever a plug-in takes. Texts are converted to the unit of the input."""
     about_design: bool | None = None
-    """Of "lognormal", "weibull" and "samples": whether what scatters is the difference from the design's value."""
+    """Of all but "uniform", "normal", "truncated-normal", "beta" and "wear": whether what scatters is the
+    difference from the design's value."""
 
     @classmethod
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         quantity = quantities()[paths[0]]
+        if not is_ours(row.get("distribution")):
+            row = _gathered(row, quantity.unit)
         offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
             row["range"] = _range(row["range"], offset, "range")
@@ -286,7 +278,8 @@ class RandomInput(NamedInput):
 
     @model_validator(mode="after")
     def _parameters_fit(self) -> "RandomInput":
-        needed, further = _NEEDED[self.distribution]
+        form = form_of(self.distribution, self.parameters or {})
+        needed, further = form.needs, form.may_have
         if self.range is not None and self.distribution in ("uniform", "beta"):
             needed, further = (needed - {"half_width"}) | {"range"}, frozenset()
         for key in (name for name in type(self).model_fields if name not in _COMMON):
@@ -305,8 +298,15 @@ class RandomInput(NamedInput):
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
             raise invalid("a lognormal has a mean above 0", "Mend it, or use another", "mean")
-        if self.distribution in ("lognormal", "weibull") and self.range is not None:
-            below, above = self.law.chances  # type: ignore[attr-defined]
+        if self.worn:
+            return
+        law = self.law  # of a plug-in found now, while it is known where its file is
+        if (
+            isinstance(law, quantiles.Cut)
+            and self.range is not None
+            and self.distribution != "beta"
+        ):
+            below, above = law.chances
             if above - below < _LEAST_SHARE:
                 raise invalid(
                     f"holds less than {_LEAST_SHARE:g} of the distribution",
@@ -317,9 +317,9 @@ class RandomInput(NamedInput):
     @property
     def absolute(self) -> bool:
         """Whether the distribution stays where it is when the design moves."""
-        if self.distribution in ("lognormal", "weibull", "samples", "wear"):
-            return not self.about_design
-        return self.range is not None or self.mean is not None
+        if self.distribution in ("uniform", "normal", "truncated-normal", "beta"):
+            return self.range is not None or self.mean is not None
+        return not self.about_design
 
     @property
     def worn(self) -> bool:
@@ -335,13 +335,14 @@ class RandomInput(NamedInput):
         InputError
             Only lives of worn joints can tell.
         """
-        if self.worn:
-            raise InputError(
-                f"study.random.{self.name}.distribution", self.distribution,
-                "is known once the lives of [wear] have been followed, which `hpcclear run` does first",
-                'Use `hpcclear run`, or give clearances of your own: distribution = "samples", values = [...]',
-            )  # fmt: skip
-        return _law(self.distribution, self.model_dump(exclude_none=True))
+        form = form_of(self.distribution, self.parameters or {})
+        return form.law(self.model_dump(exclude_none=True))
+
+    @property
+    def shape_words(self) -> str:
+        """The distribution with its parameters, in words."""
+        given = ", ".join(f"{key} = {value:g}" for key, value in (self.parameters or {}).items())
+        return f"{self.distribution}({given})" if given else self.distribution
 
     @property
     def span(self) -> Range:
@@ -349,24 +350,14 @@ class RandomInput(NamedInput):
         return self.law.span
 
 
-def _law(distribution: str, entries: Mapping[str, Any]) -> quantiles.Quantiles:
-    """The quantile function that entries of a random input stand for, which were checked."""
-    ends = entries.get("range", (-inf, inf))
-    match distribution:
-        case "samples":
-            return quantiles.Samples(entries["values"])
-        case "lognormal":
-            return quantiles.lognormal(entries["mean"], entries["deviation"], *ends)
-        case "weibull":
-            location = entries.get("location", 0.0)
-            return quantiles.weibull(entries["scale"], entries["shape"], location, *ends)
-    middle, reach = entries.get("mean", 0.0), entries.get("half_width", inf)
-    if "range" in entries:
-        middle, reach = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
-    match distribution:
-        case "uniform":
-            return quantiles.Uniform(middle, reach)
-        case "beta":
-            ends = ends if "range" in entries else (middle - reach, middle + reach)
-            return quantiles.beta(entries["shapes"], *ends)
-    return quantiles.Normal(middle, entries["deviation"], reach)
+def _gathered(row: dict[str, Any], unit: str) -> dict[str, Any]:
+    """The row of a distribution from elsewhere, its own parameters in one table."""
+    if "parameters" in row:
+        own, kept = row["parameters"], row
+        if not isinstance(own, Mapping):
+            return row
+    else:
+        rest = {*_COMMON, *OF_LIMITS}
+        own = {key: value for key, value in row.items() if key not in rest}
+        kept = {key: value for key, value in row.items() if key in rest}
+    return {**kept, "parameters": converted(row["distribution"], own, unit)}
