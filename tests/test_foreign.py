@@ -4,19 +4,21 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 from test_mopso import dtlz2
 
 from hpcclear.base.errors import InputError
+from hpcclear.plugins import SEARCHES
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.scene.stages import FEWEST, Swarm
+from hpcclear.scene.stages import FEWEST
 from hpcclear.statistics.search import foreign
+from hpcclear.statistics.search.asking import Task, minimise
 from hpcclear.statistics.search.pareto import Front, hypervolume
+from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
@@ -28,15 +30,12 @@ UNIT = np.array([[0.0, 1.0]] * 6)
 
 def search(name: str, function=dtlz2, seed: int = 1, bounds=UNIT, objectives: int = 3) -> Front:
     rng = np.random.default_rng(seed)
-    return foreign.minimise(
-        name, function, bounds, objectives, iterations=50, particles=40, rng=rng, size=60
-    )
+    task = Task(bounds, objectives, rng, 50, SwarmSettings(particles=40))
+    return minimise(getattr(foreign, name)(task), function, task, 60)
 
 
 def test_the_scene_knows_all_of_them_and_no_others():
-    kind, none = get_args(Swarm.model_fields["algorithm"].annotation)
-    assert none is type(None)
-    assert [f"pymoo:{name}" for name in foreign.ALGORITHMS] == list(get_args(kind))
+    assert ["swarm", *(f"pymoo:{name}" for name in foreign.ALGORITHMS)] == list(SEARCHES.ours())
 
 
 @pytest.mark.parametrize("name", foreign.ALGORITHMS)
@@ -161,8 +160,8 @@ def test_the_swarm_needs_no_pymoo():
 @pytest.mark.parametrize(
     ("entry", "key", "reason"),
     [
-        ("study.swarm.algorithm=pymoo:NSGA5", "study.swarm.algorithm", "not one of the known"),
-        ("study.swarm.algorithm=NSGA2", "study.swarm.algorithm", "not one of the known"),
+        ("study.swarm.algorithm=pymoo:NSGA5", "study.swarm.algorithm", "there is no pymoo.py"),
+        ("study.swarm.algorithm=NSGA2", "study.swarm.algorithm", "no search that is known"),
         (f"study.swarm.particles={FEWEST - 1}", "study.swarm.particles", f"{FEWEST} at a time"),
     ],
 )
@@ -171,5 +170,3 @@ def test_what_it_cannot_be_is_refused(entry, key, reason):
         scene_of(entry)
     assert caught.value.key == key
     assert reason in caught.value.reason
-    with pytest.raises(InputError, match="not known"):
-        foreign.check("NSGA5")

@@ -15,14 +15,14 @@ from plain_lane import joints_of as joints_of_lane
 from scipy.integrate import solve_ivp
 from some_laws import STIFFNESS, effects_with
 
-from hpcclear.base.bits import beyond
-from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.jit import FASTMATH
 from hpcclear.base.one_text import module_of, one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.compiled import _HEAD
+from hpcclear.dynamics.linkage.compiled import _HEAD, module_with
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.parts import ConstantSpeed
+from hpcclear.dynamics.linkage.rhs import compiled_motion
 from hpcclear.dynamics.linkage.slider_crank import joints_of, motion_of
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
@@ -271,14 +271,7 @@ def test_generated_motions_are_packed(mechanism):
     lane = Lane(mechanism, On(friction=True))
     joints, W = joints_of_lane(mechanism), 32
     effects = effects_with({"fixed", "coulomb"})
-    text = one_text(loop_over(lane.text.source, joints), f"packed_{W}", effects=effects, W=W)
-    inside = lane_function(text)
-
-    @njit(error_model="numpy")
-    def run(lanes):
-        inside(lanes, beyond(lanes, 51200))
-
-    run(np.ones(51200 + 32000))
-    found = executed_arithmetic(run.inspect_asm(run.signatures[0]))
+    code = compiled_motion(module_with(lane.text, joints), effects, W)
+    found = executed_arithmetic(code._library.get_asm_str())
     assert found.packed.total() > 100
     assert found.packed_share >= 0.9

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
+from some_laws import effects_with
 
 from hpcclear.base.jit import lane_function, scalar_function, written_kind
 from hpcclear.base.one_text import one_text, text_of
@@ -112,7 +113,7 @@ def test_two_branches_that_return_keep_their_order():
 
 
 def test_a_motion_holds_its_effects_alone():
-    known = {"effects": at.Effects(crank_rod=1, rod_slider=1), "W": 16}
+    known = {"effects": effects_with({"crank_rod", "rod_slider"}), "W": 16}
     text = text_of(written_by(known["effects"]).motion, "motion", known)
     clearance, gravity = (
         rf"par\w*\[{row * 16} \+ i\w*\]" for row in (at.JOINT_12 + at.CLEARANCE, at.GRAVITY)
@@ -125,7 +126,7 @@ def test_a_motion_holds_its_effects_alone():
 
 
 def test_a_text_is_a_file_and_written_once():
-    effects = at.Effects(rod_slider=1)
+    effects = effects_with({"rod_slider"})
     motion = written_by(effects).motion
     text = one_text(motion, "kept", effects=effects, W=3)
     path = Path(text.__code__.co_filename)

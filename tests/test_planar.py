@@ -7,15 +7,16 @@ import tomllib
 import numpy as np
 import pytest
 from running import scene_with
+from some_laws import STIFFNESS
 
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.tables import planar_mechanism, slider_crank_mechanism
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Parameters
 
 TEXT = """
 kind = "planar"
@@ -170,7 +171,8 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     np.testing.assert_allclose(assembly.q[order], start.coordinates(4)[0], atol=1e-14)
     np.testing.assert_allclose(assembly.v[order], start.velocities(4)[0], rtol=1e-9, atol=1e-9)
     stiffness = [joint.stiffness for joint in mechanism.clearances]
-    np.testing.assert_allclose(stiffness, Parameters(par).stiffness[0, :2], rtol=1e-15)
+    found = [par[0, first + STIFFNESS] for first in (at.JOINT_12, at.JOINT_23)]
+    np.testing.assert_allclose(stiffness, found, rtol=1e-15)
 
 
 def test_guide_friction_and_load_are_written_out_too():

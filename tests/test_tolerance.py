@@ -272,9 +272,6 @@ def test_without_an_accuracy_nothing_is_paired(tmp_path, made):
         (["study.accuracy='tight'"], "study.accuracy", "tight"),
         (["study.accuracy={mean=-1}"], "study.accuracy.mean", -1),
         (["study.accuracy={means=0.1}"], "study.accuracy.means", 0.1),
-        (["study.verification.samples=100"], "study.accuracy", ...),
-        (["study.verification.method='monte-carlo'"], "study.accuracy", ...),
-        (["study.cases={}"], "study.accuracy", ...),
     ],
 )
 def test_nonsense_is_refused_with_key_value_and_remedy(overrides, key, value):
@@ -316,8 +313,12 @@ def test_an_accuracy_of_verification_beside_another_is_not_used_and_said_so():
     scene = scene_of("study.verification.accuracy.mean=0.1")
     assert scene.required_study.wanted.mean == 0.005
     assert "not used beside study.accuracy" in scene.readings[0]
-    fixed = STUDY.replace("accuracy = { mean = 0.005, deviation = 0.01 }\n", "")
-    entries = ["study.verification.accuracy.mean=0.1", "study.verification.samples=100"]
-    scene = load_scene(tomllib.loads(formula.PHYSICS + fixed), entries)
-    assert scene.required_study.accuracy is None
-    assert "not used beside study.verification.samples" in scene.readings[0]
+
+
+def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path, made):
+    scene = scene_of("study.verification.samples=100")
+    told: list[str] = []
+    run_study(scene, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    assert any("study.accuracy is not used" in text for text in told)
+    assert {rtol for _, rtol in made} == {1e-4}
+    assert extent.samples_of(scene)["pairs"] == 0

@@ -142,7 +142,7 @@ def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
 
 @pytest.mark.parametrize("lanes", [1, 16])
 def test_single_responses_ask_for_such_vectors_and_ensembles_do_not(lanes):
-    text = inspect.getsource(one_text(explicit_steps, f"explicit_{lanes}", W=lanes))
+    text = inspect.getsource(one_text(explicit_steps, f"explicit_{lanes}", W=lanes, stages=7))
     assert ("narrow_vectors()" in text) == (lanes == 1)
 
 

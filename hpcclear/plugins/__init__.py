@@ -28,5 +28,10 @@ DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions", needs=("ppf",
 SURROGATES = Registry("surrogate", "hpcclear.surrogates")
 SEARCHES = Registry("search", "hpcclear.searches")
 
+SURROGATES.add("kriging", "hpcclear.statistics.surrogate.fitting:KrigingMethod")
+SEARCHES.add("swarm", "hpcclear.statistics.search.mopso:swarm")
+for _name in ("AGEMOEA", "AGEMOEA2", "GDE3", "NSGA2", "NSGA3", "RVEA", "SMSEMOA", "UNSGA3"):
+    SEARCHES.add(f"pymoo:{_name}", f"hpcclear.statistics.search.foreign:{_name}")
+
 KINDS = (CONTACT_LAWS, FRICTION_LAWS, OBJECTIVES, DISTRIBUTIONS, SURROGATES, SEARCHES)
 """Every registry."""

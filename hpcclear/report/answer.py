@@ -415,7 +415,9 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     text = f"{count} simulations of it"
     text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
     if np.isfinite(level):
-        text += f"; {level:.0%} confidence intervals, which cover sampling error only"
+        paired = np.isfinite(float(best.get("mean_tolerance", np.nan)))
+        covered = "sampling error and integration tolerance" if paired else "sampling error only"
+        text += f"; {level:.0%} confidence intervals, which cover {covered}"
     errors = _surrogate_errors(best)
     if len(errors) == 2:
         text += f". Surrogate error: mean {errors[0]:+.1%}, standard deviation {errors[1]:+.1%}"

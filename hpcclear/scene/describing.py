@@ -104,6 +104,8 @@ def warnings(scene: SceneTables) -> Iterator[str]:
 def unused(scene: SceneTables) -> Iterator[str]:
     """What a study states and nothing of it reads."""
     study = scene.study
+    if study is not None and study.accuracy is not None and study.verification.draws is not None:
+        yield "study.accuracy is not used: study.verification names how many draws a design gets"
     if study is None or study.groups or study.sensitivity.groups == ():
         return
     if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own

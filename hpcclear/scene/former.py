@@ -23,10 +23,8 @@ def _accuracy(content: dict[str, Any], words: list[str]) -> None:
         return
     rest = {name: entry for name, entry in verification.items() if name != "accuracy"}
     content["study"] = {**study, "verification": rest}
-    fixed = "samples" in rest or rest.get("method") == "monte-carlo"
-    if "accuracy" in study or fixed:
-        other = "study.verification.samples" if fixed else "study.accuracy"
-        words.append(f"study.verification.accuracy is not used beside {other}")
+    if "accuracy" in study:
+        words.append("study.verification.accuracy is not used beside study.accuracy")
         return
     wanted = verification["accuracy"]
     if isinstance(wanted, Mapping):  # one of the two left the other at its default

@@ -11,7 +11,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.plugins import SEARCHES, SURROGATES
 from hpcclear.scene.fields import Count, Quantity, Table, invalid
+from hpcclear.scene.plugged import PluginName
 
 Names = tuple[str, ...]
 Share = Annotated[float, Quantity("", above=0, below=1)]
@@ -78,8 +80,11 @@ class Sensitivity(Table):
 
 
 class Surrogate(Table):
-    """Kriging models (the paper's section 4.2)."""
+    """Surrogates of the objective: Kriging models (the paper's section 4.2), or others in their place."""
 
+    model: Annotated[str, PluginName(SURROGATES)] | None = None
+    """Default "kriging"; or "module:Name", anything with scikit-learn's `fit` and `predict` in a Python file beside the scene,
+    or the name that an installed package offers."""
     models: tuple[Names, ...] | None = None
     """Inputs of each model; default each group of the sensitivity with its parameter."""
     optimisation: Names | None = None
@@ -93,7 +98,7 @@ class Surrogate(Table):
     cuts: Annotated[int, Count(0, 6)] = 1
     """How often an interval may be halved where a model is refused."""
     restarts: Annotated[int, Count(0, 100)] = 2
-    """Further starts of the likelihood search."""
+    """Further starts of Kriging's likelihood search."""
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None
     """Covariance function: "squared-exponential", the default, for what is smooth, or "matern-5/2", which can be differentiated
     twice, for what has kinks or bends fast in places; under it the swarm averages over 256 points of a Sobol sequence."""
@@ -117,15 +122,10 @@ FEWEST = 8
 class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
 
-    algorithm: (
-        Literal[
-            "pymoo:AGEMOEA", "pymoo:AGEMOEA2", "pymoo:GDE3", "pymoo:NSGA2", "pymoo:NSGA3", "pymoo:RVEA",
-            "pymoo:SMSEMOA", "pymoo:UNSGA3",
-        ]
-        | None
-    ) = None  # fmt: skip
-    """Default the swarm; or an algorithm of pymoo, which `pip install 'hpcclear[pymoo]'` brings, with its own settings and as
-    many evaluations: `particles` designs at a time, `iterations` times."""
+    algorithm: Annotated[str, PluginName(SEARCHES)] | None = None
+    """Default "swarm"; or "pymoo:NSGA2" and others of pymoo, which `pip install 'hpcclear[pymoo]'` brings, with their own
+    settings; or "module:Name" of a Python file beside the scene, or the name that an installed package offers. Each has as many
+    evaluations: `particles` designs at a time, `iterations` times."""
     particles: Annotated[int, Count(2, 10**6)] = 100
     """Designs that are moved at a time."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
@@ -147,7 +147,7 @@ class Swarm(Table):
 
     @model_validator(mode="after")
     def _enough(self) -> "Swarm":
-        if self.algorithm is not None and self.particles < FEWEST:
+        if (self.algorithm or "").startswith("pymoo:") and self.particles < FEWEST:
             raise invalid(
                 f"{self.algorithm} makes designs of each other, and needs {FEWEST} at a time",
                 f"Ask for {FEWEST} or more",

@@ -108,7 +108,6 @@ class Study(Table):
         self._check_correlation()
         self._check_cases()
         self.sensitivity.check()
-        self._check_accuracy()
         self._check_names()
         self._check_sizes()
         return self
@@ -219,22 +218,6 @@ class Study(Table):
                 )
             self._check_goals(case)
 
-    def _check_accuracy(self) -> None:
-        if self.accuracy is None:
-            return
-        if not self.cases:
-            raise invalid(
-                "nothing is verified without a case, so there is no moment to be accurate",
-                "Name a case in study.cases, or leave it out",
-                key="accuracy",
-            )
-        if self.verification.draws is not None:
-            raise invalid(
-                "how many draws a design gets is fixed beside it",
-                'Leave it out, or study.verification.samples and method = "monte-carlo"',
-                key="accuracy",
-            )
-
     def _check_goals(self, case: Case) -> None:
         own = self.design_variables(case.name)
         if self.swarm.archive < len(case.goals):
@@ -310,7 +293,7 @@ class Study(Table):
             )
         if self.cases:
             inputs = max(len(model) for model in self.models)
-            if self.samples < inputs + 2:
+            if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
                 raise invalid(
                     f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
                     f"Ask for at least {10 * inputs} samples",
@@ -335,6 +318,11 @@ class Study(Table):
     def wanted(self) -> MomentAccuracy:
         """Half-widths that verified designs are simulated for: those asked for, or usual ones."""
         return MomentAccuracy() if self.accuracy is None else self.accuracy
+
+    @property
+    def paired(self) -> bool:
+        """Whether the tolerance has a share in an accuracy that is asked for; a fixed number of draws leaves none to meet."""
+        return self.accuracy is not None and self.verification.draws is None
 
     def case(self, name: str) -> Case:
         """The case of that name; KeyError if there is none."""

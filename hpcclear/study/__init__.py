@@ -165,7 +165,7 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
     true = run.stage("verification", _verified, designs)
     table = verification.named(run, designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
-    if run.study.accuracy is not None:
+    if run.study.paired:
         text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
         run.tell(text)
         remarks += more
@@ -188,7 +188,7 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
 
 def _verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
-    if run.study.accuracy is not None:
+    if run.study.paired:
         return tolerance.verified(run, designs)
     return truth.simulate(run, designs, "verification")
 

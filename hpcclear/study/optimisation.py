@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import moocore
 import numpy as np
@@ -11,6 +12,7 @@ from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
+from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
 from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.cases import Case
@@ -28,13 +30,13 @@ from hpcclear.statistics.random.distributions import (
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import foreign
-from hpcclear.statistics.search.mopso import minimise
+from hpcclear.statistics.search.asking import Search, Task, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import ends_in_all, excess, guessed
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.surrogates import coordinate
+from hpcclear.study.surrogates import coordinate, method_of
 
 Draws = tuple[int, np.random.Generator] | dict[str, Array] | None
 """How many Monte Carlo draws of which generator, the draws themselves, or none for an exact rule."""
@@ -234,16 +236,41 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the search a study asks for can be had, before anything is simulated.
+    """That the surrogate and the search a study asks for can be had, before anything is simulated.
 
     Raises
     ------
     InputError
-        Its package is not installed.
+        A package is not installed, or it is none.
     """
-    asked = scene.required_study.swarm.algorithm
-    if asked is not None:
-        foreign.check(asked.removeprefix("pymoo:"))
+    method_of(scene)
+    for case in scene.required_study.cases:
+        region = box(scene, scene.required_study.design_variables(case.name))
+        _begun(scene, region, len(case.goals), np.random.default_rng(0))
+
+
+def _begun(
+    scene: Scene, region: Box, objectives: int, rng: np.random.Generator
+) -> tuple[Search, Task, str]:
+    """The search of a study at its start, what it was made for, and its name."""
+    settings = scene.required_study.swarm
+    task = Task(
+        bounds=np.column_stack([region.lower, region.upper]),
+        objectives=objectives,
+        rng=rng,
+        iterations=settings.iterations,
+        settings=SwarmSettings(
+            particles=settings.particles,
+            c1=settings.c1,
+            c2=settings.c2,
+            inertia_first=settings.inertia[0],
+            inertia_last=settings.inertia[1],
+        ),
+    )
+    name = settings.algorithm or "swarm"
+    source = SEARCHES.get(name, scene.plugin_texts)
+    maker = partial(foreign.adapted, source) if foreign.is_algorithm(source) else source
+    return made(maker, name, task), task, name
 
 
 def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
@@ -270,33 +297,8 @@ def _minimised(
     objectives: int,
     rng: np.random.Generator,
 ) -> Front:
-    settings = run.study.swarm
-    bounds = np.column_stack([problem.region.lower, problem.region.upper])
-    if settings.algorithm is not None:
-        return foreign.minimise(
-            settings.algorithm.removeprefix("pymoo:"),
-            function,
-            bounds,
-            objectives,
-            iterations=settings.iterations,
-            particles=settings.particles,
-            rng=rng,
-            size=settings.archive,
-        )
-    return minimise(
-        function,
-        bounds,
-        iterations=settings.iterations,
-        rng=rng,
-        size=settings.archive,
-        settings=SwarmSettings(
-            particles=settings.particles,
-            c1=settings.c1,
-            c2=settings.c2,
-            inertia_first=settings.inertia[0],
-            inertia_last=settings.inertia[1],
-        ),
-    )
+    search, task, name = _begun(run.scene, problem.region, objectives, rng)
+    return minimise(search, function, task, run.study.swarm.archive, name)
 
 
 @dataclass(frozen=True)

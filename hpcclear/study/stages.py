@@ -9,17 +9,17 @@ from hpcclear.scene import Scene
 from hpcclear.study import paper
 
 _WORDS = {
-    "wear": "lives of joints that wear",
-    "effects": "which effects could be left out",
-    "sensitivity": "which variables matter",
-    "kriging": "models of the objective",
-    "optimisation": "the swarm on the model",
-    "check": "its designs by direct simulation",
-    "infill": "more designs where the front is decided",
-    "verification": "the best designs by direct simulation",
-    "lives": "lives of the original and the best designs",
-    "responses": "responses of the original and the best designs",
-    "readings": "the printed designs under readings of the text",
+    "wear": "wear over the service life",
+    "effects": "effect screening",
+    "sensitivity": "sensitivity analysis",
+    "kriging": "surrogate models",
+    "optimisation": "search on the surrogate",
+    "check": "simulation of its designs",
+    "infill": "adaptive refinement of the Pareto front",
+    "verification": "verification of the best designs",
+    "lives": "wear of the baseline and the best designs",
+    "responses": "responses of the baseline and the best designs",
+    "readings": "published designs under alternative interpretations",
 }
 """What each stage does, by its name without the number of a round."""
 

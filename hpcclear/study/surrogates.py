@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box
@@ -15,6 +16,7 @@ from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.piecewise import Piecewise, stored_fields
+from hpcclear.statistics.surrogate.regression import RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import rows_of
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 from hpcclear.study.run import Result, StudyRun
@@ -35,8 +37,19 @@ def domain(run: StudyRun, names: Sequence[str]) -> Box:
 
 
 def method_of(scene: Scene) -> Method:
-    """The kind of surrogate that a study asks for."""
+    """The kind of surrogate that a study asks for.
+
+    Raises
+    ------
+    InputError
+        What its scene names has no `fit` or no `predict`.
+    """
     settings = scene.required_study.surrogate
+    if settings.model is not None:
+        source = SURROGATES.get(settings.model, scene.plugin_texts)
+        if source is not KrigingMethod:
+            made(source, settings.model, 0)  # so that it is refused before anything is simulated
+            return RegressionMethod(source, settings.model)
     return KrigingMethod(settings.restarts, settings.kernel or SQUARED_EXPONENTIAL)
 
 
@@ -132,6 +145,8 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     content = dataset.dataset(
         "kriging", coords, data, None, _units(run), run.scene.objective, run.words
     )
+    if leaves[0][1].label and "surrogate" in content:
+        content.attrs["title"] = f"Surrogates of the objective, {leaves[0][1].label}"
     run.write(content, "kriging.nc")
 
 

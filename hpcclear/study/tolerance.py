@@ -48,7 +48,7 @@ the standard error."""
 
 def simulations(study: Study) -> int:
     """Simulations in pairs, at the fewest."""
-    if study.accuracy is None:
+    if not study.paired:
         return 0
     return goals.ends_in_all(study) * SCRAMBLINGS * _first(truth.first_length(study.verification))
 

@@ -226,7 +226,7 @@ def write(
             value, reach = over_life[name], over_life[f"{name}_reach"]
             data[f"life_{name}"] = value
             data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
-        if study.accuracy is not None:
+        if study.paired:
             data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
             data[f"{name}_tolerance"] = true["tolerance"][:, column]
         if name in printed:

@@ -40,9 +40,8 @@ def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
     """Return a sentence for each surrogate of a file (kind ``sensitivity`` or ``kriging``) that does not fit."""
     if content is None or "r2" not in content:
         return []
-    word, known = (
-        ("response surface", of_surfaces) if kind == "sensitivity" else ("Kriging model", of_models)
-    )
+    model = "Kriging model" if "surrogate" not in content else "surrogate"
+    word, known = ("response surface", of_surfaces) if kind == "sensitivity" else (model, of_models)
     return [
         f"{word} in {', '.join(name.split())}: {text}"
         for name, r2 in known(content).items()

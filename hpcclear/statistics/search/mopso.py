@@ -15,58 +15,31 @@ setting for all problems:
   velocity is kept. It keeps the swarm from collapsing to one point and pays off most with many
   variables; `mutation_share=0` leaves eqs. 22-23 alone.
 - **Constraints** (Deb 2000, doi:10.1016/S0045-7825(99)00389-8): feasible beats infeasible, among
-  infeasible points the smaller total violation wins. A point whose objectives are not all finite
-  is infeasible, without limit if no violation was given. Only feasible points enter the archive.
+  infeasible points the smaller total violation wins. Only feasible points enter the archive.
   Once one was broken the feasible region may be thin or in pieces, which flying past it misses, and the front
   may lie on its borders: then `BROKEN_SHARE` of the particles continue from children, of which `BROKEN_ANEW` get
   one coordinate anew from its whole range. Half of them are made by simulated binary crossover, half by steps along the front
   (`children`); before any feasible point is known, as without constraints, of the least violating. Leaders and parents are as
   many members of the archive as there are particles (`Archive.elite`); the one that the front would lose most without wins.
-- **Front**: the archive cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken).
 
+The front of what it met is made by `hpcclear.statistics.search.asking`, as for every search.
 All objectives are minimised. Positions live in the unit cube, so variables may differ in scale.
 """
-
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.search import children
-from hpcclear.statistics.search import generator_state as rng_state
-from hpcclear.statistics.search.pareto import (
-    Archive,
-    Front,
-    best_subset,
-    cut,
-    hypervolume,
-    relative_gain,
-)
+from hpcclear.statistics.search import asking, children
+from hpcclear.statistics.search.asking import Function, Task
+from hpcclear.statistics.search.pareto import Archive, Front
 from hpcclear.statistics.search.settings import SwarmSettings, checked_bounds, whole
 
-_SETTLED = 1e-3  # relative hypervolume gain over the last tenth of the iterations
 BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""
 BROKEN_ANEW = 0.3
 """Share of these children that get a coordinate anew."""
-
-_ARRAYS = (
-    "positions",
-    "velocities",
-    "personal_positions",
-    "personal_values",
-    "personal_violations",
-    "earlier_values",
-    "history",
-    "lower",
-    "upper",
-    "reference",
-)
-_COUNTS = ("iterations", "iteration", "evaluations", "failed", "infeasible")
 
 
 class ParticleSwarm:
@@ -83,8 +56,6 @@ class ParticleSwarm:
     settings : SwarmSettings, optional
     start : array_like, shape (k, d), optional
         Known designs that replace the first k random particles.
-    reference : array_like, shape (m,), optional
-        Reference point of the hypervolume in `history`; without it no history is kept.
 
     Raises
     ------
@@ -100,18 +71,14 @@ class ParticleSwarm:
         *,
         settings: SwarmSettings | None = None,
         start: ArrayLike | None = None,
-        reference: ArrayLike | None = None,
     ) -> None:
         whole("iterations", iterations)
         self.settings = SwarmSettings() if settings is None else settings
         self._lower, self._upper = checked_bounds(bounds)
         self.iterations = int(iterations)
         self.iteration = 0
-        self.evaluations = self.failed = self.infeasible = 0
         self._rng = rng
-        self._reference = (
-            np.empty(0) if reference is None else np.atleast_1d(np.array(reference, dtype=float))
-        )
+        self._constrained = False  # whether a design broke a constraint
         shape = (self.settings.particles, len(self._lower))
         self._positions: Array = rng.random(shape)
         if start is not None:
@@ -123,8 +90,6 @@ class ParticleSwarm:
         self._archive = Archive(
             self.settings.archive_capacity, np.empty((0, shape[1])), np.empty((0, 0))
         )
-        self._earlier_values: Array = np.empty((0, 0))
-        self._history: Array = np.empty(0)
 
     @property
     def done(self) -> bool:
@@ -135,20 +100,22 @@ class ParticleSwarm:
         """Points to evaluate, shape (particles, d); the same ones until `tell` is called."""
         return self._points(self._positions)
 
-    def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
-        """Take the objectives of the points asked for and move the swarm on.
+    def tell(self, designs: ArrayLike, objectives: ArrayLike, constraints: ArrayLike) -> None:
+        """Take the objectives of the designs asked for and move the swarm on.
 
         Parameters
         ----------
-        values : array_like, shape (n, m)
-            Objectives, minimised; a row with a number that is not finite is infeasible.
-        violations : array_like, shape (n,) or (n, c), optional
-            Constraint violations, > 0 where broken; c constraints are summed. NaN is infinite.
+        designs : array_like, shape (n, d)
+            All that were asked for, in their order.
+        objectives : array_like, shape (n, m)
+            Minimised; a row with a number that is not finite is infeasible.
+        constraints : array_like, shape (n,)
+            Total violations, 0 where no constraint is broken; infinite where that is not known.
 
         Raises
         ------
         InputError
-            For wrong shapes, or when all iterations are done.
+            For wrong shapes, other designs, or when all iterations are done.
         """
         if self.done:
             raise InputError(
@@ -157,77 +124,14 @@ class ParticleSwarm:
                 "the swarm has had all its iterations",
                 "Start another one with start=front.points.",
             )
-        told, total = self._checked(values, violations)
-        self._remember(told, total)
+        values, total = self._checked(designs, objectives, constraints)
+        self._constrained |= bool((np.isfinite(values).all(axis=1) & (total > 0.0)).any())
+        self._remember(values, total)
         feasible = total == 0.0
-        self._archive.add(self._positions[feasible], told[feasible])
+        self._archive.add(self._positions[feasible], values[feasible])
         self.iteration += 1
-        if len(self._reference):
-            grown = hypervolume(self._archive.values, self._reference)
-            self._history = np.append(self._history, grown)
-        if self.iteration == self.iterations - max(1, self.iterations // 10):
-            self._earlier_values = self._archive.values.copy()
         if not self.done:
             self._move()
-
-    def front(self, size: int = 100) -> Front:
-        """The best points so far, at most `size` (not below the number of objectives)."""
-        objectives = self._archive.values.shape[1]
-        if size < max(1, objectives):
-            raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
-        kept = (best_subset if self.infeasible else cut)(self._archive.values, size)
-        if len(kept):
-            kept = kept[np.lexsort(self._archive.values[kept].T[::-1])]
-        gain = self._gain()
-        return Front(
-            points=self._points(self._archive.positions[kept]),
-            values=self._archive.values[kept],
-            evaluations=self.evaluations,
-            failed=self.failed,
-            infeasible=self.infeasible,
-            history=self._history.copy(),
-            gain=gain,
-            settled=bool(self.done and gain < _SETTLED),
-            remark=self._remark(gain),
-        )
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the swarm knows, random generator included, as plain arrays (no objects)."""
-        state = {name: getattr(self, f"_{name}").copy() for name in _ARRAYS}
-        state["archive_positions"] = self._archive.positions.copy()
-        state["archive_values"] = self._archive.values.copy()
-        state["counts"] = np.array([getattr(self, name) for name in _COUNTS], dtype=np.int64)
-        state["settings"] = np.array([float(value) for value in asdict(self.settings).values()])
-        state["generator"] = rng_state.to_array(self._rng)
-        return state
-
-    @classmethod
-    def from_state(cls, state: Mapping[str, np.ndarray]) -> Self:
-        """A swarm that goes on, bit for bit, where the one that gave `state` stood."""
-        names = {*_ARRAYS, "archive_positions", "archive_values", "counts", "settings", "generator"}
-        if names - set(state):
-            found = sorted(state)
-            raise InputError(
-                "swarm state", found, "entries missing", "Save all of ParticleSwarm.state()."
-            )
-        swarm = cls.__new__(cls)  # the constructor would draw from the generator
-        swarm._rng = rng_state.from_array(state["generator"])
-        kinds = [type(value) for value in asdict(SwarmSettings()).values()]
-        told = zip(kinds, state["settings"], strict=True)
-        swarm.settings = SwarmSettings(*(kind(value) for kind, value in told))
-        for name, count in zip(_COUNTS, state["counts"], strict=True):
-            setattr(swarm, name, int(count))
-        for name in _ARRAYS:
-            setattr(swarm, f"_{name}", np.array(state[name], dtype=float))
-        swarm._archive = Archive(
-            swarm.settings.archive_capacity,
-            np.array(state["archive_positions"], dtype=float),
-            np.array(state["archive_values"], dtype=float),
-        )
-        shape = (swarm.settings.particles, len(swarm._lower))
-        if {swarm._positions.shape, swarm._velocities.shape} != {shape}:
-            raise InputError("swarm state", shape, "shapes differ", "Give what state() gave.")
-        return swarm
 
     def _place(self, start: Array) -> None:
         """Put known designs in the place of the first particles."""
@@ -243,30 +147,22 @@ class ParticleSwarm:
         # this form meets both bounds exactly; the clip removes the last rounding error inside
         return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
 
-    def _checked(self, values: ArrayLike, violations: ArrayLike | None) -> tuple[Array, Array]:
-        """Objectives (n, m) and total violation (n,), infinite where the objectives failed."""
-        told = np.array(values, dtype=float)
-        told = told[:, None] if told.ndim == 1 else told
+    def _checked(
+        self, designs: ArrayLike, objectives: ArrayLike, constraints: ArrayLike
+    ) -> tuple[Array, Array]:
+        """Objectives (n, m) and total violations (n,)."""
+        values, total = np.array(objectives, dtype=float), np.array(constraints, dtype=float)
         particles, known = self._personal_values.shape
-        if told.ndim != 2 or len(told) != particles or told.shape[1] != (known or told.shape[1]):
+        if not np.array_equal(designs, self.ask()):
+            raise InputError(
+                "designs", np.shape(designs), "not those asked for", "Give them as ask() did."
+            )
+        if values.shape != (particles, known or np.shape(values)[-1]) or values.size == 0:
             remedy = f"Give ({particles}, {known or 'm'}) objectives."
-            raise InputError("values", told.shape, "wrong shape", remedy)
-        if len(self._reference) not in (0, told.shape[1]) or told.shape[1] == 0:
-            found = (len(self._reference), told.shape[1])
-            raise InputError("reference, values", found, "lengths differ", "Give m >= 1 of each.")
-        total = np.zeros(particles)
-        if violations is not None:
-            broken = np.array(violations, dtype=float)
-            if broken.shape[:1] != (particles,):
-                raise InputError("violations", broken.shape, "wrong shape", "Give a row per point.")
-            broken = np.where(np.isnan(broken), np.inf, np.maximum(broken, 0.0))
-            total = broken.reshape(particles, -1).sum(axis=1)
-        failed = ~np.isfinite(told).all(axis=1)
-        self.evaluations += particles
-        self.failed += int(failed.sum())
-        self.infeasible += int((~failed & (total > 0.0)).sum())
-        # a model that skips the objectives of an infeasible point still gives its violation
-        return told, np.where(failed & (total == 0.0), np.inf, total)
+            raise InputError("objectives", values.shape, "wrong shape", remedy)
+        if total.shape != (particles,):
+            raise InputError("constraints", total.shape, "wrong shape", "Give one per design.")
+        return values, total
 
     def _remember(self, values: Array, total: Array) -> None:
         """Update the personal bests: the new point unless the old one is better or equal."""
@@ -288,7 +184,7 @@ class ParticleSwarm:
         if not len(archive):
             own = self._personal_positions
             return own, own, -self._personal_violations
-        if not self.infeasible:
+        if not self._constrained:
             return archive.positions, archive.values, archive.loneliness()
         rows, merit = archive.elite(len(self._positions))
         values = archive.values[rows]
@@ -318,47 +214,29 @@ class ParticleSwarm:
         self._positions = np.clip(moved, 0.0, 1.0)
 
         share = s.mutation_share
-        if self.infeasible and share:
+        if self._constrained and share:
             share = max(share, BROKEN_SHARE)
         chosen = np.flatnonzero(rng.random(particles) < share)
         partner = elite[rng.integers(len(elite), size=len(chosen))]
-        if self.infeasible and len(self._archive):
+        if self._constrained and len(self._archive):
             across = children.crossed(leader[chosen], partner, rng)
             along = children.stepped(elite, places, winner[chosen], rng)
             born = np.where(rng.random((len(chosen), 1)) < 0.5, across, along)
         else:
             born = children.mixed(leader[chosen], partner, rng)
         born = children.mutated(born, s.mutation_index, rng)
-        if self.infeasible:
+        if self._constrained:
             born = children.renewed(born, BROKEN_ANEW, rng)
         self._positions[chosen] = born
 
-    def _gain(self) -> float:
-        """Share of the hypervolume won in the last tenth of the iterations."""
-        if not self.done:
-            return float("nan")
-        return relative_gain(self._earlier_values, self._archive.values)
 
-    def _remark(self, gain: float) -> str:
-        if not len(self._archive):
-            least = float(self._personal_violations.min())
-            return f"no feasible point in {self.evaluations} evaluations; least violation {least:g}"
-        if not self.done:
-            text = f"not finished: {self.iteration} of {self.iterations} iterations"
-        elif np.isnan(gain):
-            text = "cannot tell whether settled: nothing feasible before the last iterations"
-        else:
-            word = "settled" if gain < _SETTLED else "still improving, give it more iterations"
-            text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
-        if len(self._archive) == 1 and self._archive.values.shape[1] > 1:
-            text += "; one point only: the objectives do not conflict, or the swarm collapsed"
-        if self.failed:
-            text += f"; {self.failed} of {self.evaluations} points failed"
-        return text
+def swarm(task: Task) -> ParticleSwarm:
+    """The swarm of a task."""
+    return ParticleSwarm(task.bounds, task.iterations, task.rng, settings=task.settings)
 
 
 def minimise(
-    function: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]],
+    function: Function,
     bounds: ArrayLike,
     *,
     iterations: int,
@@ -366,21 +244,9 @@ def minimise(
     size: int = 100,
     settings: SwarmSettings | None = None,
     start: ArrayLike | None = None,
-    reference: ArrayLike | None = None,
 ) -> Front:
-    """Run a swarm to its end.
-
-    `function` takes points (n, d) and returns objectives (n, m), or a tuple of them and violations
-    (see `ParticleSwarm.tell`). `size` is the largest number of points in the front. The other parameters
-    and the errors raised are those of `ParticleSwarm`.
-    """
-    swarm = ParticleSwarm(
-        bounds, iterations, rng, settings=settings, start=start, reference=reference
-    )
-    while not swarm.done:
-        told = function(swarm.ask())
-        if isinstance(told, tuple):
-            swarm.tell(*told)
-        else:
-            swarm.tell(told)
-    return swarm.front(size)
+    """Run a swarm to its end (`hpcclear.statistics.search.asking.minimise`); other parameters and errors: `ParticleSwarm`."""
+    settings = SwarmSettings() if settings is None else settings
+    search = ParticleSwarm(bounds, iterations, rng, settings=settings, start=start)
+    task = Task(np.array(bounds, dtype=float), 0, rng, iterations, settings)
+    return asking.minimise(search, function, task, size)

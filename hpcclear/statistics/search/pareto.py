@@ -15,8 +15,7 @@ class Front:
     """Result of a search: ``points (k, d)``, ``values (k, m)`` by rising first objective.
 
     `failed` counts points whose objectives were not finite, `infeasible` the others that broke a
-    constraint; both are part of `evaluations`. `history` is the archive's hypervolume after each
-    iteration (empty without a reference point). `gain` is the share of the hypervolume won in the
+    constraint; both are part of `evaluations`. `gain` is the share of the hypervolume won in the
     last tenth of the iterations, NaN if unknown; `settled` says that all iterations were done and
     the gain is below 1e-3. A settled search may still sit on a local front: compare several seeds.
     `remark` says this in words.
@@ -27,7 +26,6 @@ class Front:
     evaluations: int
     failed: int
     infeasible: int
-    history: Array
     gain: float
     settled: bool
     remark: str

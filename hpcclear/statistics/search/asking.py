@@ -1,0 +1,233 @@
+"""Searches through ask and tell: what is asked of them, how they are carried out, and the front of what they met.
+
+Whatever a search keeps for itself, the front is made here, alike for all: the archive of the feasible designs that no other
+one dominates, cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose
+objectives are not all finite is infeasible, without limit if no violation was given.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.statistics.search.pareto import Archive, Front, best_subset, cut, relative_gain
+from hpcclear.statistics.search.settings import SwarmSettings
+
+KEY = "study.swarm.algorithm"
+SETTLED = 1e-3
+"""Relative gain of hypervolume over the last tenth of the evaluations, below which a search has settled."""
+
+Function = Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
+"""Designs (n, d) to objectives (n, m), all minimised; or a tuple of them and violations (n,) or (n, c), > 0 where broken."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a search is made for.
+
+    Attributes
+    ----------
+    bounds : array, shape (d, 2)
+        Lower and upper bound of each variable.
+    objectives : int
+        m, all minimised; 0 where that is seen at the first evaluation.
+    rng : Generator
+        Its only source of random numbers.
+    iterations : int
+        Evaluations, in units of `particles`.
+    settings : SwarmSettings
+        Those of the swarm, `particles` among them.
+    """
+
+    bounds: Array
+    objectives: int
+    rng: np.random.Generator
+    iterations: int
+    settings: SwarmSettings
+
+    @property
+    def particles(self) -> int:
+        """Designs at a time; a search may ask for more or fewer."""
+        return self.settings.particles
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations in all; what is asked for beyond is not evaluated."""
+        return self.iterations * self.particles
+
+
+class Search(Protocol):
+    """A search that asks for designs and is told their objectives."""
+
+    def ask(self) -> Array | None:
+        """Designs to evaluate next, (n, d), within the bounds; None or none: it has come to its end."""
+
+    def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
+        """Take objectives (n, m), not finite where they failed, and total violations (n,), 0 where no constraint is broken."""
+
+
+def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:
+    """The search of a name.
+
+    Raises
+    ------
+    InputError
+        It cannot be made of a task, or has no `ask` or no `tell`.
+    """
+    try:
+        search = maker(task)
+    except InputError:
+        raise
+    except Exception as error:
+        raise _failed(name, "could not be made of a task", error) from error
+    missing = [one for one in ("ask", "tell") if not callable(getattr(search, one, None))]
+    if missing:
+        remedy = "Give it ask() and tell(designs, objectives, constraints)"
+        raise InputError(KEY, name, f"has no {' and no '.join(missing)}", remedy)
+    return search  # type: ignore[no-any-return]
+
+
+def minimise(search: Search, function: Function, task: Task, size: int, name: str = "") -> Front:
+    """Carry out a search.
+
+    Parameters
+    ----------
+    search : Search
+        Made for the task.
+    function : callable
+    task : Task
+    size : int
+        Points of the front at most.
+    name : str
+        What the search is called, in messages.
+
+    Raises
+    ------
+    InputError
+        The search failed, asks for what is no design within the bounds, or `size` is less than the number of objectives.
+    """
+    met = _Met(task)
+    while met.evaluations < task.evaluations:
+        designs = _asked(search, name, task.bounds)[: task.evaluations - met.evaluations]
+        if len(designs) == 0:
+            break
+        values, broken = _judged(function(designs), len(designs))
+        met.add(designs, values, broken)
+        try:
+            search.tell(designs, values, broken)
+        except InputError:
+            raise
+        except Exception as error:
+            raise _failed(name, "failed in tell", error) from error
+    return met.front(size)
+
+
+class _Met:
+    """What a search has met."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.objectives = task, task.objectives
+        nothing = np.empty((0, len(task.bounds))), np.empty((0, task.objectives))
+        self.archive = Archive(task.settings.archive_capacity, *nothing)
+        self.earlier = self.archive.values
+        self.evaluations = self.failed = self.infeasible = 0
+        self.least = np.inf
+        self._late = (task.iterations - max(1, task.iterations // 10)) * task.particles
+
+    def add(self, designs: Array, values: Array, broken: Array) -> None:
+        """Take in evaluated designs."""
+        self.objectives = values.shape[1]
+        failed = ~np.isfinite(values).all(axis=1)
+        feasible = broken == 0.0
+        self.archive.add(designs[feasible], values[feasible])
+        self.evaluations += len(designs)
+        self.failed += int(failed.sum())
+        self.infeasible += int((~failed & ~feasible).sum())
+        self.least = min(self.least, float(broken.min()))
+        if self.evaluations <= self._late:
+            self.earlier = self.archive.values
+
+    def front(self, size: int) -> Front:
+        """The best that was met."""
+        values, objectives = self.archive.values.reshape(-1, self.objectives), self.objectives
+        if size < objectives:
+            raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
+        kept = (best_subset if self.infeasible else cut)(values, size)
+        if len(kept):
+            kept = kept[np.lexsort(values[kept].T[::-1])]
+        gain = relative_gain(self.earlier, values)
+        done = self.evaluations >= self.task.evaluations
+        return Front(
+            points=self.archive.positions[kept],
+            values=values[kept],
+            evaluations=self.evaluations,
+            failed=self.failed,
+            infeasible=self.infeasible,
+            gain=gain,
+            settled=bool(done and gain < SETTLED),
+            remark=self._remark(gain),
+        )
+
+    def _remark(self, gain: float) -> str:
+        if not len(self.archive):
+            return f"no feasible point in {self.evaluations} evaluations; least violation {self.least:g}"
+        if np.isnan(gain):
+            text = "cannot tell whether settled: nothing feasible before the last iterations"
+        else:
+            word = "settled" if gain < SETTLED else "still improving, give it more iterations"
+            text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
+        if len(self.archive) == 1 and self.objectives > 1:
+            text += "; one point only: the objectives do not conflict, or the search collapsed"
+        if self.failed:
+            text += f"; {self.failed} of {self.evaluations} points failed"
+        return text
+
+
+def _asked(search: Search, name: str, bounds: Array) -> Array:
+    """Designs that a search asks for, shape (n, d); none where it has come to its end."""
+    remedy = f"Let ask() return designs of shape (n, {len(bounds)}) within the bounds of the task"
+    try:
+        found = search.ask()
+        designs = np.empty((0, len(bounds))) if found is None else np.array(found, dtype=float)
+    except InputError:
+        raise
+    except Exception as error:
+        raise _failed(name, "failed in ask", error) from error
+    if designs.ndim != 2 or designs.shape[1] != len(bounds):
+        reason = f"asks for an array of shape {designs.shape}, not (n, {len(bounds)})"
+        raise InputError(KEY, name, reason, remedy)
+    good = (designs >= bounds[:, 0]) & (designs <= bounds[:, 1])  # False for NaN
+    if not good.all():
+        row, column = np.argwhere(~good)[0]
+        low, high = bounds[column]
+        reason = f"asks for {designs[row, column]:.9g} in variable {column + 1}, outside [{low:.9g}, {high:.9g}]"
+        raise InputError(KEY, name, reason, remedy)
+    return designs
+
+
+def _judged(found: ArrayLike | tuple[ArrayLike, ArrayLike], count: int) -> tuple[Array, Array]:
+    """Objectives (n, m) and total violations (n,), infinite where neither is known."""
+    values, given = found if isinstance(found, tuple) else (found, np.zeros(count))
+    table = np.array(values, dtype=float)
+    table = table[:, None] if table.ndim == 1 else table
+    broken = np.array(given, dtype=float)
+    if table.ndim != 2 or len(table) != count or table.shape[1] == 0 or len(broken) != count:
+        shapes = (table.shape, broken.shape)
+        raise InputError("objectives, violations", shapes, "wrong shape", f"Give {count} rows.")
+    broken = np.where(np.isnan(broken), np.inf, np.maximum(broken, 0.0))
+    total = broken.reshape(count, -1).sum(axis=1)
+    # a model that skips the objectives of an infeasible point still gives its violation
+    failed = ~np.isfinite(table).all(axis=1)
+    return table, np.where(failed & (total == 0.0), np.inf, total)
+
+
+def _failed(name: str, what: str, error: Exception) -> InputError:
+    """What is said of an exception out of a user's code, with the last line of it."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
+    return InputError(KEY, name, reason, "Mend it, or leave the entry out")

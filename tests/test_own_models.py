@@ -1,0 +1,325 @@
+"""Surrogates and searches of a user: from a file beside the scene and from an installed package, on ranks, resumed, refused."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_plugins import install
+
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.figures import fits
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
+from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.search import asking
+from hpcclear.statistics.search.asking import Task
+from hpcclear.statistics.search.settings import SwarmSettings
+from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.statistics.surrogate.regression import RegressionMethod
+from hpcclear.statistics.surrogate.stored import models_in
+from hpcclear.study import run_study, surrogates
+
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+MPIEXEC = Path(sys.executable).parent / "mpiexec"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
+
+FOREST = """
+from sklearn.ensemble import ExtraTreesRegressor
+Model = ExtraTreesRegressor(n_estimators=20)
+"""
+RANDOM = """
+class Random:
+    def __init__(self, task):
+        self.task = task
+
+    def ask(self):
+        low, high = self.task.bounds.T
+        return low + (high - low) * self.task.rng.random((self.task.particles, len(low)))
+
+    def tell(self, designs, objectives, constraints):
+        assert len(designs) == len(objectives) == len(constraints)
+"""
+SMALL = """
+[study.sensitivity]
+groups = []
+[study.surrogate]
+model = "mymodels:Model"
+models = []
+optimisation = ["m2", "m3", "u2", "I2", "C"]
+r2 = 0.5
+rmae = 2.0
+cuts = 0
+[study.swarm]
+algorithm = "mysearch:Random"
+"""
+SQUARE = np.array([[-1.0, 3.0], [0.0, 1e-4]])
+
+
+@pytest.fixture(autouse=True)
+def _dynamics(monkeypatch):
+    formula.replace_dynamics(monkeypatch.setattr)
+
+
+def written(folder: Path, model: str = FOREST, search: str = RANDOM) -> Path:
+    """A scene file with a surrogate and a search beside it."""
+    head, rest = formula.STUDY.split("[study.sensitivity]")
+    swarm = rest.split("[study.swarm]")[1]
+    study = head + SMALL + swarm.replace("infill_rounds = 1", "infill_rounds = 0")
+    folder.mkdir(exist_ok=True)
+    (folder / "mymodels.py").write_text(model)
+    (folder / "mysearch.py").write_text(search)
+    (folder / "scene.toml").write_text(formula.PHYSICS + study)
+    return folder / "scene.toml"
+
+
+def contents(place: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in sorted(place.glob("*.nc")) if p.name != "timing.nc"}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    patch = pytest.MonkeyPatch()
+    formula.replace_dynamics(patch.setattr)
+    place = tmp_path_factory.mktemp("own")
+    run_study(load_scene(written(place)), place / "out", alone(), progress_style="quiet")
+    patch.undo()
+    return place
+
+
+def test_quality_is_reported_and_the_file_is_read_back(results):
+    found = dataset.read(results / "out" / "kriging.nc", "kriging")
+    assert found["surrogate"].to_numpy().tolist() == ["mymodels:Model"]
+    assert "mymodels:Model" in found.attrs["title"]
+    assert 0.3 < float(found["r2"][0]) < 1.0
+    (model,) = models_in(found).values()
+    (leaf,) = model.leaves
+    assert leaf.leave_one_out().tolist() == found["cross_validated"][0].to_numpy().tolist()
+    apart = np.corrcoef(leaf.leave_one_out(), leaf.values)[0, 1]
+    assert 0.5 < apart < 0.999  # forests of whole depth know their own points
+    with pytest.raises(InputError, match="no model that predicts"):
+        model.predict(leaf.inputs[:1])
+    found["r2"][0] = 0.6
+    assert fits.warnings("kriging", found)[0].startswith("surrogate in m2, m3")
+    front = dataset.read(results / "out" / "front.nc", "front")
+    assert np.isfinite(front["deviation"]).any()
+
+
+@pytest.mark.mpi
+@pytest.mark.timeout(300)
+def test_two_ranks_give_the_same_bytes(results, tmp_path):
+    command = [MPIEXEC, "-n", "2", sys.executable, PROGRAMS / "formula.py"]
+    subprocess.run([*command, results / "scene.toml", tmp_path / "out"], check=True, timeout=280)
+    assert contents(tmp_path / "out") == contents(results / "out")
+
+
+def test_a_study_in_pieces_ends_with_the_same_bytes(results, tmp_path):
+    scene = load_scene(results / "scene.toml")
+    assert formula.run_in_pieces(scene, tmp_path / "out", alone()) > 3
+    assert contents(tmp_path / "out") == contents(results / "out")
+
+
+def test_an_edited_file_is_another_run(results, tmp_path):
+    edited = load_scene(written(tmp_path / "edited", FOREST.replace("20", "21")))
+    with pytest.raises(InputError, match="mymodels"):
+        run_study(edited, results / "out", alone(), progress_style="quiet")
+
+
+def test_an_installed_package_offers_both(tmp_path, monkeypatch):
+    folder = tmp_path / "site"
+    install(folder, "hpcclear.surrogates", "trees", "their_models:Model")
+    (folder / "their_models.py").write_text(FOREST + RANDOM)
+    with (folder / "their_shapes-1.2.dist-info" / "entry_points.txt").open("a") as file:
+        file.write("[hpcclear.searches]\nany = their_models:Random\n")
+    monkeypatch.syspath_prepend(folder)
+    names = ["study.surrogate.model=trees", "study.swarm.algorithm=any"]
+    scene = load_scene(written(tmp_path / "scene"), names)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
+    found = dataset.read(tmp_path / "out" / "kriging.nc", "kriging")
+    assert found["surrogate"].to_numpy().tolist() == ["trees"]
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        ("class Model:\n    def fit(self, X, y): pass\n", "has no predict"),
+        ("class Model:\n    def predict(self, X): pass\n", "has no fit"),
+        ("Model = 3\n", "no class, no function and has no predict"),
+        ("class Model:\n    def __init__(self, size): pass\n", "could not be made: TypeError"),
+    ],
+)
+def test_no_surrogate_is_refused_before_anything_is_simulated(tmp_path, model, said):
+    scene = load_scene(written(tmp_path / "scene", model))
+    with pytest.raises(InputError, match=said) as caught:
+        run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
+    assert caught.value.key == "study.surrogate.model"
+    assert not (tmp_path / "out").exists()
+
+
+class Constant:
+    """Predicts whatever it is told to."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def fit(self, X, y):
+        assert X.min() >= 0.0
+        assert X.max() <= 1.0
+        assert len(y) < 30 or abs(y.mean()) < 1e-12  # of all points; a fifth is left out in turn
+
+    def predict(self, X):
+        return self.answer(X)
+
+
+def fitted(source):
+    rng = np.random.default_rng(1)
+    points = SQUARE[:, 0] + rng.random((30, 2)) * np.ptp(SQUARE, axis=1)
+    values = 1e-4 * points[:, 0] + points[:, 1]
+    return RegressionMethod(source, "mine").fit(points, values, SQUARE, rng=rng)
+
+
+def fails(_):
+    raise ZeroDivisionError("of mine")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda X: np.full(len(X), np.nan), "30 of 30 numbers that are not finite"),
+        (lambda X: np.zeros((len(X), 1)), r"shape \(30, 1\), not \(30,\)"),
+        (lambda X: "many", "predict returned str"),
+        (fails, r"failed in predict: ZeroDivisionError: of mine \(.*test_own_models.py, line"),
+    ],
+)
+def test_predictions_that_are_none_are_refused(answer, said):
+    leaf = fitted(lambda: Constant(answer))
+    with pytest.raises(InputError, match=said) as caught:
+        leaf.predict(leaf.inputs)
+    assert caught.value.key == "study.surrogate.model"
+
+
+def test_a_fit_that_does_not_come_out_again_is_refused():
+    source = np.random.default_rng(0)
+    method = RegressionMethod(lambda: Constant(lambda X: source.random(len(X))), "mine")
+    with pytest.raises(InputError, match="it is two models"):
+        method.restored(fitted(method.source).to_arrays())
+
+
+def test_units_are_taken_off_and_put_on_again():
+    leaf = fitted(lambda: Constant(lambda X: X[:, 0]))
+    mean, scale = leaf.values.mean(), leaf.values.std()
+    expected = mean + scale * (leaf.inputs[:, 0] + 1.0) / 4.0
+    np.testing.assert_allclose(leaf.predict(leaf.inputs), expected, rtol=1e-12)
+    assert leaf.steepest() == 0
+    with pytest.raises(InputError, match="does not extrapolate"):
+        leaf.predict([[4.0, 0.0]])
+
+
+def test_moments_are_averages_of_predictions_or_its_own():
+    draws = {"x2": np.linspace(0.0, 1e-4, 64)}
+    linear = fitted(lambda: Constant(lambda X: X[:, 0] + X[:, 1]))
+    own = fitted(lambda: Own(lambda X: X[:, 0]))
+    from hpcclear.statistics.random.distributions import Uniform
+    from hpcclear.statistics.random.inputs import RandomVariable
+
+    found = []
+    for leaf in (linear, own):
+        model = Piecewise((leaf,), np.ones(1), np.zeros(1), np.ones(1, bool))
+        random = [RandomVariable("x2", Uniform(0.0, 1e-4))]
+        found.append(RobustObjective(model, ("x1",), random, draws=draws)(np.array([[1.0]]))[0])
+    mean, scale = linear.values.mean(), linear.values.std()
+    unit = np.linspace(0.0, 1.0, 64)
+    np.testing.assert_allclose(found[0], [mean + scale, scale * unit.std(ddof=1)], rtol=1e-9)
+    np.testing.assert_allclose(found[1], [mean + 7.0 * scale, 2.0 * scale], rtol=1e-12)
+
+
+class Own(Constant):
+    """One with moments of its own."""
+
+    def moments(self, X):
+        assert X.shape == (1, 64, 2)
+        return np.array([[7.0, 2.0]])
+
+
+# -- searches ---------------------------------------------------------------------------------------
+
+
+class Fixed:
+    """Asks for what it is given."""
+
+    def __init__(self, designs):
+        self.designs, self.met = designs, []
+
+    def ask(self):
+        return self.designs() if callable(self.designs) else self.designs
+
+    def tell(self, designs, objectives, constraints):
+        self.met.append((designs, objectives, constraints))
+
+
+def task() -> Task:
+    return Task(SQUARE, 2, np.random.default_rng(0), 3, SwarmSettings(particles=4))
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (np.zeros((2, 3)), r"shape \(2, 3\), not \(n, 2\)"),
+        (np.array([[0.0, 1.0]]), "asks for 1 in variable 2, outside"),
+        (np.array([[np.nan, 0.0]]), "asks for nan in variable 1"),
+        (lambda: fails(0), "failed in ask: ZeroDivisionError: of mine"),
+    ],
+)
+def test_what_is_no_design_is_refused(asked, said):
+    with pytest.raises(InputError, match=said) as caught:
+        asking.minimise(Fixed(asked), lambda points: points, task(), 10, "mine")
+    assert caught.value.key == "study.swarm.algorithm"
+
+
+def test_designs_beyond_the_evaluations_are_left_out_and_failures_told():
+    search = Fixed(np.array([[0.5, 1e-5]] * 5))
+
+    def half(points):
+        values = points.copy()
+        values[0] = np.nan
+        return values
+
+    front = asking.minimise(search, half, task(), 10)
+    assert [len(one[0]) for one in search.met] == [5, 5, 2]
+    assert (front.evaluations, front.failed) == (12, 3)
+    assert search.met[0][2].tolist() == [np.inf, 0.0, 0.0, 0.0, 0.0]
+    assert asking.minimise(Fixed(None), half, task(), 10).evaluations == 0
+
+
+@pytest.mark.parametrize(
+    ("search", "said"),
+    [
+        ("class Random:\n    def __init__(self, task): pass\n    def ask(self): pass\n", "no tell"),
+        ("class Random:\n    pass\n", "could not be made of a task: TypeError"),
+    ],
+)
+def test_no_search_is_refused_before_anything_is_simulated(tmp_path, search, said):
+    scene = load_scene(written(tmp_path / "scene", search=search))
+    with pytest.raises(InputError, match=said) as caught:
+        run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
+    assert caught.value.key == "study.swarm.algorithm"
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_algorithm_of_pymoo_with_settings_of_ones_own_is_a_search(tmp_path):
+    text = "from pymoo.algorithms.moo.nsga2 import NSGA2\nRandom = NSGA2(pop_size=10)\n"
+    scene = load_scene(written(tmp_path / "scene", search=text))
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
+    front = dataset.read(tmp_path / "out" / "front.nc", "front")
+    assert np.isfinite(front["mean"]).sum() > 4
+
+
+def test_the_default_is_kriging_by_name_or_without(tmp_path):
+    scene = load_scene(written(tmp_path / "scene"))
+    for model in (None, "kriging"):
+        found = surrogates.method_of(scene.with_({"study.surrogate.model": model}))
+        assert found.label == ""
