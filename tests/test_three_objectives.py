@@ -24,7 +24,7 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import extent, lives, refinement, run_study
+from hpcclear.study import extent, lives, refinement, run_study, truth
 from hpcclear.study.optimisation import Choice
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
@@ -164,9 +164,11 @@ def test_each_solution_knows_all_three(study: Path) -> None:
 def test_the_search_counts_what_it_takes(study: Path) -> None:
     """The expected counts know three ends: two swarm's designs, a runner-up, a believed one and a response each."""
     two = 'study.cases={three={random=["C"]}}'
-    here, there = (extent.samples_of(scene, 64) for scene in (scene_of(), scene_of(two)))
-    assert here["verification"] - there["verification"] == (2 + 2) * 64
+    here, there = (extent.samples_of(scene) for scene in (scene_of(), scene_of(two)))
+    each = truth.expected(scene_of().required_study)
+    assert here["verification"] - there["verification"] == (2 + 2) * each
     assert here["check"] - there["check"] == 2 * 64
+    assert here["pairs"] > there["pairs"]
     assert extent.responses_of(scene_of()) - extent.responses_of(scene_of(two)) == 3
     assert (study / "responses" / "three_gamma.nc").exists()
     assert verified(study).sizes["design"] * 64 <= here["verification"]
