@@ -304,7 +304,7 @@ def test_a_sweep_is_packed(law: str):
     found = executed_arithmetic(sweep.inspect_asm(sweep.signatures[0]))
     assert found.packed.total() >= 60  # of one coordinate: they are a loop
     assert found.scalar.total() <= 10
-    effects = single(scene(law, 1e-6, 1, 1)).problem.effects
-    found = executed_arithmetic(force_evaluation(effects, lobatto.STAGES))
+    problem = single(scene(law, 1e-6, 1, 1)).problem
+    found = executed_arithmetic(force_evaluation(problem, lobatto.STAGES))
     assert found.packed.total() >= 100
     assert found.packed_share >= 0.9

@@ -46,9 +46,7 @@ def allowed(row):
             and row.get("bending", 2) is None
         ):
             return False
-    # neither bristles nor modes have a place among the nine coordinates
-    further = row.get("friction") == "lugre" or row.get("bending") is not None
-    return not further or row.get("formulation") != "baumgarte"
+    return True
 
 
 TABLE = pairwise_table(FACTORS, allowed)
@@ -112,14 +110,14 @@ def test_every_pair_of_effects_runs(row):
         assert abs(rest) < 1e-4 * passed
 
 
-ZEROS = {
-    "coulomb": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
-    "ambrosio": {at.JOINT_12 + at.FRICTION: 0.0, at.JOINT_23 + at.FRICTION: 0.0},
-    "gravity": {at.GRAVITY: 0.0},
-    "load": {at.LOAD: 0.0},
-    "load_table": {at.LOAD: 0.0},
-    "guide": {at.GUIDE_COEFFICIENT: 0.0},
-    "film": {},  # of no viscosity: rows of a scene without
+NO_FRICTION = {joint.block + at.FRICTION: 0.0 for joint in at.JOINTS[:2]}
+ZEROS = {  # flags of the kernel and rows of parameters, or entries of the scene
+    "coulomb": (("coulomb",), NO_FRICTION, {}),
+    "ambrosio": (("ambrosio",), NO_FRICTION, {}),
+    "load": ((), {}, {"effects.slider_load": 0.0}),
+    "load_table": ((), {}, {"effects.slider_load": [[0.0, 0.0], [3.0, 0.0]]}),
+    "guide": ((), {}, {"effects.guide_friction": {"coefficient": 0.0}}),
+    "film": (("film", "short_film", "long_film"), {}, {}),  # of no viscosity: rows without
 }
 
 
@@ -143,9 +141,9 @@ def assert_same_motion(one, other):
     ],
 )
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
-    scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
-    flags = dict.fromkeys((effect, "short_film", "long_film") if effect == "film" else (effect,), 1)
-    assert_same_motion(run(scene, flags, ZEROS[effect]), without)
+    flags, rows, changes = ZEROS[effect]
+    plain = {"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
+    assert_same_motion(run(scene_with(plain | changes), dict.fromkeys(flags, 1), rows), without)
 
 
 @pytest.mark.full

@@ -13,7 +13,6 @@ from hpcclear.dynamics.implicit.jacobian import difference_jacobian, evaluate_ba
 from hpcclear.dynamics.implicit.radau import new_memory
 from hpcclear.dynamics.implicit.stiff import blocks_of
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
@@ -62,7 +61,9 @@ def vector(m: np.ndarray, row: int) -> np.ndarray:
 
 def motions_and_tables(problem: Problem) -> tuple:
     """The motion of one lane, and of the bank's, as the stepper of lanes hands them on."""
-    return *(motion_of(problem.effects, width).address for width in (1, mem.LANES)), problem.tables
+    return *(
+        problem.motion(problem.effects, width).address for width in (1, mem.LANES)
+    ), problem.tables
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)

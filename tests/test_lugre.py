@@ -351,7 +351,7 @@ def test_points_keep_friction_at_rest_above_that_of_sliding():
             check_points(scene, points)
     points = Points(("mu",), np.array([[0.05], [0.15]]), ((paths[0],),))
     check_points(scene, points)
-    assert parameters(scene, points)[:, at.JOINT_12 + at.FRICTION].tolist() == [0.05, 0.15]
+    assert parameters(scene, points)[:, at.JOINTS[0].block + at.FRICTION].tolist() == [0.05, 0.15]
 
 
 def test_a_scene_tells_of_its_bristles():

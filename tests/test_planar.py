@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.tables import planar_mechanism, slider_crank_mechanism
+from hpcclear.dynamics.planar.tables import mechanism_of, planar_mechanism
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Parameters
 
@@ -159,7 +159,7 @@ TORQUE = {"drive": {"kind": "torque", "torque": 5.0, "initial_speed": 300.0}}
 @pytest.mark.parametrize("changes", [{}, TILTED, TORQUE], ids=["paper", "eccentric", "torque"])
 def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     scene = scene_with(changes, 1)
-    mechanism = slider_crank_mechanism(scene)
+    mechanism = mechanism_of(scene.linkage)
     par = parameters(scene)
     assembly = assemble(mechanism)
     start = start_states(scene, par)
@@ -177,7 +177,7 @@ def test_guide_friction_and_load_are_written_out_too():
     scene = scene_with(
         {"effects.guide_friction": {"coefficient": 0.1}, "effects.slider_load": -50.0}, 1
     )
-    mechanism = slider_crank_mechanism(scene)
+    mechanism = mechanism_of(scene.linkage)
     guide = next(joint for joint in mechanism.joints if isinstance(joint, Slide))
     assert guide.friction is not None
     assert guide.friction.coefficient == 0.1

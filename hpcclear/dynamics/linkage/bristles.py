@@ -19,8 +19,7 @@ def ratio_of(effects, work, par, joint, sliding, i, W):
     the length on which bristles give way, and no force jumps when contact begins.
     """
     if effects.lugre is not None:
-        only_second = effects.crank_rod is None and effects.rod_slider is not None
-        number = joint.place - (1 if only_second else 0)
+        number = joint.place - effects.first
         stiffness = par[at.BRISTLE_STIFFNESS * W + i]
         deflection = work[(at.VS + number) * W + i]
         held = stribeck(
