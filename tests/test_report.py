@@ -133,7 +133,7 @@ def test_the_page_says_what_was_found(tree: Tree) -> None:
         "1 hold on this data, 1 do not, and 1 are undecided",
         "numerics.max_steps was reached",
         "raise numerics.max_steps",
-        "beyond the range of Hertz contact",
+        "beyond the range of the contact law",
         "2 ranks worked on it",
         "accuracy.nc: the cost of accuracy was not measured",
         "mpiexec -n 2 hpcclear run",

@@ -18,6 +18,8 @@ from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.physics import powers
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.laws import ENTRIES
+from hpcclear.scene.paths import quantities
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "analysis"))
@@ -220,6 +222,47 @@ def test_a_law_with_a_fault_is_refused_with_the_reason(fault, tmp_path):
     assert caught.value.value == "bad:Bad"
     assert reason in caught.value.reason
     assert caught.value.remedy
+
+
+ONE_PARAMETER = """
+def force(depth, rate, stiffness, {name}):
+    return stiffness * depth**1.5 * (1 + {factor} * {name} * rate)
+Bad = ContactLaw(words="", parameters=(Parameter("{name}", "{unit}", default=0.5, least=0),), force=force)
+"""
+
+
+@pytest.mark.parametrize("name", ["damping", "only_here"])
+def test_a_unit_is_that_of_the_scene_s_own_law(name, tmp_path):
+    """One of our laws has a damping in s/m. Where laws of one process disagree, a design variable has no known unit."""
+    scenes = {}
+    for unit, factor in (("s/m", 1), ("ms/m", 1e-3)):
+        folder = tmp_path / unit.partition("/")[0]
+        folder.mkdir()
+        path = file_with(folder, {"law": "bad:Bad"})
+        text = HEAD + ONE_PARAMETER.format(name=name, unit=unit, factor=factor)
+        (folder / "bad.py").write_text(text, encoding="utf-8")
+        scenes[unit] = load_scene(path)
+    entry = f"effects.contact.{name}"
+    assert {unit: scene.unit(entry) for unit, scene in scenes.items()} == {
+        "s/m": "s/m",
+        "ms/m": "ms/m",
+    }
+    with pytest.raises(InputError, match="in ms/m and s/m") as caught:
+        quantities()[entry]
+    assert caught.value.key == entry
+    del ENTRIES[entry]["ms/m"]
+    assert quantities()[entry].unit == "s/m"
+
+
+@pytest.mark.parametrize("name", ["law", "units", "force", "minimum_impact_speed"])
+def test_a_parameter_is_not_called_like_an_entry_of_every_law(name, tmp_path):
+    path = file_with(tmp_path, {"law": "bad:Bad"})
+    text = HEAD + ONE_PARAMETER.format(name=name, unit="s/m", factor=1)
+    (tmp_path / "bad.py").write_text(
+        text.replace("def force(", "def its(").replace("force=force", "force=its")
+    )
+    with pytest.raises(InputError, match="an entry of every law's table"):
+        load_scene(path)
 
 
 def test_friction_that_drives_sliding_on_is_refused(tmp_path):

@@ -1,4 +1,4 @@
-"""Vectors of eight numbers as values of compiled code, for what eight samples do abreast.
+"""Vectors of eight numbers as values of compiled code, for eight samples in a batch.
 
 The compiler makes vectors of short loops only where it can show that no store meets a load, which it cannot once a row's
 place is a number that comes at run time; and Numba reads every one of eight copies that are written out instead, which took

@@ -138,6 +138,13 @@ def run_source(module: str, text: str) -> ModuleType:
     return made
 
 
+def raised(key: str, name: str, what: str, error: Exception) -> InputError:
+    """Return the error of an entry `key` whose plug-in `name` raised in use, with the line it came from."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
+    return InputError(key, name, reason, "Mend it, or leave the entry out")
+
+
 def _said(error: BaseException, path: str) -> str:
     """What was raised, and the line of the text it came from."""
     if isinstance(error, SyntaxError):

@@ -121,10 +121,10 @@ def validity(response: xr.Dataset) -> str:
     if not status.valid:
         return "the simulation failed: no number of it is a result"
     if flags & Flag.BEYOND_HERTZ:
-        return "outside the range of Hertz contact: forces are indicative only"
+        return "outside the range of the contact law: forces are indicative only"
     if flags & Flag.LATCHED:
-        return "within the range of Hertz contact; results may depend on the integration tolerance"
-    return "within the range of Hertz contact"
+        return "within the range of the contact law; results may depend on the integration tolerance"
+    return "within the range of the contact law"
 
 
 def share(contact: float) -> str:

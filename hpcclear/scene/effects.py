@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
-from hpcclear.scene.laws import LawTable
+from hpcclear.scene.laws import LawTable, quantity_of
 
 
 class Contact(LawTable):
@@ -70,6 +70,14 @@ class Effects(Table):
     left out is off."""
     guide_friction: GuideFriction | None = None
     """Friction of the slider in its guide; "none" or left out is off."""
+
+    def law_unit(self, path: str) -> str | None:
+        """Return the unit of a parameter of the scene's own laws by its path; None of any other entry."""
+        for table in (self.contact, self.friction):
+            if table is not None and path.startswith(f"effects.{table.kind}."):
+                parameter = table.declared.parameter(path.rpartition(".")[2])
+                return None if parameter is None else quantity_of(parameter).unit
+        return None
 
     @model_validator(mode="before")
     @classmethod

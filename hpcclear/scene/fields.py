@@ -40,6 +40,15 @@ def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
         raise invalid("is given twice, or not at all", remedy, key=key, value=value)
 
 
+def check_table(data: Any) -> None:
+    """Raise an error for validators unless this is a table whose keys are strings."""
+    if not isinstance(data, Mapping):
+        raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+    for key in data:
+        if not isinstance(key, str):
+            raise invalid("keys are strings", "Write the key as text", key=repr(key))
+
+
 class Table(BaseModel):
     """A table of the scene file: frozen, and closed against unknown keys."""
 
@@ -53,12 +62,9 @@ class Table(BaseModel):
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, Table):
             return data
-        if not isinstance(data, Mapping):
-            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
+        check_table(data)
         known = tuple(cls.model_fields)
         for key in data:
-            if not isinstance(key, str):
-                raise invalid("keys are strings", "Write the key as text", key=repr(key))
             if key not in known:
                 reason, remedy = cls.elsewhere.get(key, ("is not a known key", nearest(key, known)))
                 raise invalid(reason, remedy, key=key)

@@ -14,7 +14,7 @@ from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_valida
 from pydantic_core import CoreSchema
 
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
-from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+from hpcclear.scene.fields import Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
 
 _HOME = "hpcclear.dynamics.laws"
@@ -42,8 +42,8 @@ def named(law: Any, name: str) -> Any:
 PATTERN = r"^(expression|[A-Za-z_]\w*:[A-Za-z_]\w*)$"
 """Laws that are not ours."""
 
-ENTRIES: dict[str, Quantity] = {}
-"""Quantities of entries of users' laws that have been read, by path."""
+ENTRIES: dict[str, dict[str, Quantity]] = {}
+"""Quantities of entries of users' laws that this process has read, by path and unit."""
 
 
 @cache
@@ -64,6 +64,12 @@ def quantity_of(parameter: Any) -> Quantity:
     """Of a law's parameter."""
     p = parameter
     return Quantity(p.unit, above=p.above, below=p.below, least=p.least, most=p.most)
+
+
+def _declare(kind: str, parameter: Any) -> None:
+    """Make an entry of a user's law known by its path."""
+    quantity = quantity_of(parameter)
+    ENTRIES.setdefault(f"effects.{kind}.{parameter.name}", {})[quantity.unit] = quantity
 
 
 def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
@@ -95,11 +101,7 @@ class LawTable(Table):
         """The entries of the law, converted; overrides what a table without a law does."""
         if isinstance(data, Table):
             return data
-        if not isinstance(data, Mapping):
-            raise invalid("a table is expected here", "Write it as [table] or { key = value }")
-        for key in data:
-            if not isinstance(key, str):
-                raise invalid("keys are strings", "Write the key as text", key=repr(key))
+        check_table(data)
         default = cls.model_fields["law"].default
         name = data.get("law", default if isinstance(default, str) else None)
         if not isinstance(name, str):
@@ -177,16 +179,19 @@ class LawTable(Table):
         """Values of the law's parameters, defaults filled in."""
         found = {}
         for parameter in law.parameters:
+            if parameter.name in cls._own():
+                reason = f"{law.name} has a parameter {parameter.name!r}, which is an entry of every law's table"
+                raise invalid(reason, "Give the parameter another name", "law", law.name)
             value = data.get(parameter.name, parameter.default)
             if value is None:
-                example = parameter.example or f"a number in {parameter.unit}"
+                example = parameter.example or f"a number in {parameter.unit or 1}"
                 raise invalid(
                     f"the law {law.name!r} needs {_an(parameter)}",
                     f"Add {parameter.name} = {example} or so", parameter.name, None,
                 )  # fmt: skip
             found[parameter.name] = _value(parameter, value)
             if law.name not in our_laws(cls.kind) and parameter.count == 1:
-                ENTRIES[f"effects.{cls.kind}.{parameter.name}"] = quantity_of(parameter)
+                _declare(cls.kind, parameter)
         wrong = None if law.check is None else law.check(found)
         if wrong is not None:
             raise invalid(*wrong)

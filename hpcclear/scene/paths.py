@@ -8,6 +8,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from hpcclear.base.errors import InputError
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import CurveOf, NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
@@ -69,9 +70,21 @@ class Quantities(dict[str, Quantity]):
             self
         )
 
+    def __getitem__(self, path: str) -> Quantity:
+        """Return the quantity; raises InputError where laws that were read have it in several units."""
+        found = dict(ENTRIES.get(path, {}))
+        if not found:
+            return super().__getitem__(path)
+        if dict.__contains__(self, path):
+            ours = dict.__getitem__(self, path)
+            found[ours.unit] = ours
+        if len(found) > 1:
+            listed = " and ".join(unit or "no unit" for unit in sorted(found))
+            reason = f"laws that were read here have a parameter of this name in {listed}, so its unit is not known"
+            raise InputError(path, path, reason, "Give one of the parameters another name")
+        return next(iter(found.values()))
+
     def __missing__(self, path: str) -> Quantity:
-        if path in ENTRIES:
-            return ENTRIES[path]
         general = self._general(path)
         if general == path:
             raise KeyError(path)

@@ -54,9 +54,9 @@ class Study(Table):
     ] = "mean-gap"
     """What the study makes small: eq. 13, or another response."""
     accuracy: MomentAccuracy | None = None
-    """Half-widths of the limits of mean and deviation of verified designs, relative: a number for both, or a table. Each gets
-    simulations until its own are met, and what the tolerance takes of them is measured by pairs at a stricter one and is part
-    of them. Left out, mean = 0.002 and deviation = 0.005 of the samples alone."""
+    """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: a number for
+    both, or a table. Each design is simulated until it meets them. They include the error of the integration tolerance,
+    measured by pairs of samples at a stricter tolerance. Left out: mean = 0.002 and deviation = 0.005, sampling error only."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None

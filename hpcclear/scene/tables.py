@@ -368,7 +368,8 @@ class SceneTables(Table):
     def unit(self, path: str) -> str:
         """The SI unit of the physical number at a dotted path, "" for none; errors as `number`."""
         self.number(path)
-        return quantities()[path].unit
+        own = self.effects.law_unit(path)
+        return quantities()[path].unit if own is None else own
 
     def _numbers(self) -> Mapping[str, float]:
         if self._known_numbers is None:  # a scene never changes, and a swarm asks often

@@ -5,7 +5,6 @@ one dominates, cut to the size asked for (`pareto.cut`; `pareto.best_subset` whe
 objectives are not all finite is infeasible, without limit if no violation was given.
 """
 
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.plugins.sources import raised
 from hpcclear.statistics.search.pareto import Archive, Front, best_subset, cut, relative_gain
 from hpcclear.statistics.search.settings import SwarmSettings
 
@@ -84,7 +84,7 @@ def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:
     except InputError:
         raise
     except Exception as error:
-        raise _failed(name, "could not be made of a task", error) from error
+        raise raised(KEY, name, "could not be made of a task", error) from error
     missing = [one for one in ("ask", "tell") if not callable(getattr(search, one, None))]
     if missing:
         remedy = "Give it ask() and tell(designs, objectives, constraints)"
@@ -123,7 +123,7 @@ def minimise(search: Search, function: Function, task: Task, size: int, name: st
         except InputError:
             raise
         except Exception as error:
-            raise _failed(name, "failed in tell", error) from error
+            raise raised(KEY, name, "failed in tell", error) from error
     return met.front(size)
 
 
@@ -197,7 +197,7 @@ def _asked(search: Search, name: str, bounds: Array) -> Array:
     except InputError:
         raise
     except Exception as error:
-        raise _failed(name, "failed in ask", error) from error
+        raise raised(KEY, name, "failed in ask", error) from error
     if designs.ndim != 2 or designs.shape[1] != len(bounds):
         reason = f"asks for an array of shape {designs.shape}, not (n, {len(bounds)})"
         raise InputError(KEY, name, reason, remedy)
@@ -224,10 +224,3 @@ def _judged(found: ArrayLike | tuple[ArrayLike, ArrayLike], count: int) -> tuple
     # a model that skips the objectives of an infeasible point still gives its violation
     failed = ~np.isfinite(table).all(axis=1)
     return table, np.where(failed & (total == 0.0), np.inf, total)
-
-
-def _failed(name: str, what: str, error: Exception) -> InputError:
-    """What is said of an exception out of a user's code, with the last line of it."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
-    return InputError(KEY, name, reason, "Mend it, or leave the entry out")

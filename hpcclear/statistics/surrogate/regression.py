@@ -7,7 +7,6 @@ come out again bit for bit, because a study that goes on after an interruption f
 
 import copy
 import inspect
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.plugins.sources import raised
 from hpcclear.statistics.surrogate.leaf import Columns, Fields, checked_samples, inside
 
 KEY = "study.surrogate.model"
@@ -276,7 +276,7 @@ def _called(source: Any, label: str, seed: int) -> Any:
             return source(random_state=seed)
         return source()
     except Exception as error:
-        raise _failed(label, "could not be made", error) from error
+        raise raised(KEY, label, "could not be made", error) from error
 
 
 def _ask(model: Any, label: str, what: str, *arguments: Array) -> Any:
@@ -287,14 +287,7 @@ def _ask(model: Any, label: str, what: str, *arguments: Array) -> Any:
         with threadpool_limits(limits=1):
             return getattr(model, what)(*arguments)
     except Exception as error:
-        raise _failed(label, f"failed in {what}", error) from error
-
-
-def _failed(label: str, what: str, error: Exception) -> InputError:
-    """What is said of an exception out of a user's code, with the last line of it."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
-    return InputError(KEY, label, reason, "Mend it, or leave the entry out")
+        raise raised(KEY, label, f"failed in {what}", error) from error
 
 
 def _numbers(found: Any, shape: tuple[int, ...], label: str, what: str) -> Array:
