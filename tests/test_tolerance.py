@@ -175,9 +175,12 @@ def test_limits_hold_the_tolerance_and_the_truth(done):
 
 def test_what_was_reached_is_told(done):
     said = " ".join(done[1])
-    assert "Reached at 95%: " in said
-    assert "of 0.5 % of the mean and 1 % of the deviation asked" in said
-    assert "takes 0.2 % of the mean and 0.2 % of the deviation, by pairs at rtol 1e-06" in said
+    assert "Largest half-widths at 95%: " in said
+    assert "(target: 0.5 % of the mean and 1 % of the standard deviation)" in said
+    assert (
+        "contributes 0.2 % of the mean and 0.2 % of the standard deviation, by pairs at rtol 1e-06"
+        in said
+    )
     assert "dominates" not in said
 
 
@@ -207,7 +210,7 @@ def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeyp
     told: list[str] = []
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
     (remark,) = [text for text in told if "tolerance dominates" in text]
-    assert "lower numerics.rtol, to 1e-07 say" in remark  # 1.3 % of 0.25 % by halves
+    assert "Lower numerics.rtol, to 1e-07 say" in remark  # 1.3 % of 0.25 % by halves
     found = dataset.read(tmp_path / "it" / "verification.nc")
     assert (found["mean_within"] > 0.01).all()
     assert remark in found.attrs["remarks"]
@@ -226,7 +229,7 @@ def test_designs_that_most_samples_end_are_named(tmp_path):
     told: list[str] = []
     few = scene_of("study.verification.most_samples=128", "study.accuracy=0.003")
     run_study(few, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
-    assert any("did not reach the accuracy" in text and "most_samples" in text for text in told)
+    assert any("did not reach the target" in text and "most_samples" in text for text in told)
 
 
 @pytest.fixture

@@ -26,6 +26,7 @@ FILES = (
     "docs/reading-the-accuracy-figure.md",
     "docs/tutorial.md",
     "docs/validation.md",
+    "docs/how-to/accuracy.md",
     "docs/how-to/archive.md",
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",

@@ -416,7 +416,11 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
     if np.isfinite(level):
         paired = np.isfinite(float(best.get("mean_tolerance", np.nan)))
-        covered = "sampling error and integration tolerance" if paired else "sampling error only"
+        covered = (
+            "sampling error and the error of the tolerance as far as pairs show it"
+            if paired
+            else "sampling error only"
+        )
         text += f"; {level:.0%} confidence intervals, which cover {covered}"
     errors = _surrogate_errors(best)
     if len(errors) == 2:

@@ -123,7 +123,9 @@ def validity(response: xr.Dataset) -> str:
     if flags & Flag.BEYOND_HERTZ:
         return "outside the range of the contact law: forces are indicative only"
     if flags & Flag.LATCHED:
-        return "within the range of the contact law; results may depend on the integration tolerance"
+        return (
+            "within the range of the contact law; results may depend on the integration tolerance"
+        )
     return "within the range of the contact law"
 
 

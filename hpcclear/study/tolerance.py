@@ -195,7 +195,7 @@ def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, lis
     numerics, level = tight.numerics, f"{run.study.verification.confidence:.0%}"
     pairs = f"target error {numerics.target_error:g}" if numerics.target_error else f"rtol {numerics.rtol:.0e}"  # fmt: skip
     text = (
-        f"Reached at {level}: {_shares(worst)}, at worst, of {_shares(wanted)} asked; of that the tolerance takes "
+        f"Largest half-widths at {level}: {_shares(worst)} (target: {_shares(wanted)}). The integration tolerance contributes "
         f"{_shares(share)}, by pairs at {pairs}."
     )
     remarks = []
@@ -205,22 +205,24 @@ def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, lis
         if run.scene.numerics.target_error is None:
             lower = f"numerics.rtol, to {run.scene.numerics.rtol / 10.0**tenths:.0e} say"
         remarks.append(
-            f"The tolerance dominates: it takes {_shares(share)} of an accuracy of {_shares(wanted)}; lower {lower}."
+            f"The integration tolerance dominates: it contributes {_shares(share)} (target: {_shares(wanted)}). Lower {lower}."
         )
     elif (doubt > 2.0 * HIDDEN * wanted).any():
         remarks.append(
-            f"Chaos hides what the tolerance takes of the accuracy: it is known to {_shares(doubt)}, no better."
+            f"Chaotic motion hides the error of the integration tolerance: its standard error is {_shares(doubt)}."
         )
     missed = [
         name for name, row in zip(names, within, strict=True) if not (row <= 1.0001 * wanted).all()
     ]
     if missed and not (share > ROOM * wanted).any():
         remarks.append(
-            f"{len(missed)} of {len(names)} designs did not reach the accuracy, {missed[0]} among them: "
-            "raise study.verification.most_samples."
+            f"{len(missed)} of {len(names)} designs did not reach the target, {missed[0]} among them. "
+            "Raise study.verification.most_samples."
         )
     return text, remarks
 
 
 def _shares(values: Array) -> str:
-    return f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the deviation"
+    return (
+        f"{100 * values[0]:.2g} % of the mean and {100 * values[1]:.2g} % of the standard deviation"
+    )

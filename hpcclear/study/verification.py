@@ -52,8 +52,8 @@ def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecew
         good = abs(errors) <= (settings.tolerance, settings.deviation_tolerance)  # False for NaN
         if not good.all():
             texts.append(
-                f"At {choices[k].name} the surrogate's mean is {100 * errors[0]:+.1f} % and its "
-                f"deviation {100 * errors[1]:+.1f} % off the true one: trust the true values."
+                f"Surrogate error at {choices[k].name}: mean {100 * errors[0]:+.1f} %, standard deviation "
+                f"{100 * errors[1]:+.1f} %. Use the simulated values."
             )
     return texts
 
