@@ -21,6 +21,7 @@ from pydantic import ValidationError
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
 from hpcclear.scene import units as scene_units
+from hpcclear.scene.unit_names import UNITS
 from hpcclear.scene.domain import box
 from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
@@ -368,9 +369,10 @@ def test_widened_box_holds_every_random_inertia() -> None:
 
 def test_common_units_agree_with_pint() -> None:
     registry = pint.UnitRegistry()
-    for (unit, target), factor in scene_units._COMMON.items():
-        expected = registry.Quantity(1.0, unit).to(target).magnitude
-        assert float(factor) == pytest.approx(expected, rel=4e-16)
+    for unit, (size, powers) in UNITS.items():
+        expected = registry.Quantity(1.0, unit.replace("‰", "permille")).to_root_units()
+        assert float(size) == pytest.approx(expected.magnitude, rel=1e-15), unit
+        assert {str(k): v for k, v in expected.unit_items()} == powers, unit
 
 
 @pytest.mark.parametrize(
