@@ -103,6 +103,13 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
+    entries = definitions["Tolerance"]["properties"]
+    entries["range"] = {**_BOUNDS, "description": entries["range"]["description"]}
+    for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
+        required = definitions[name]["required"]
+        definitions[name]["required"] = [
+            k for k in required if k not in ("clearance", "bearing_radius")
+        ]
     definitions["RandomInput"]["additionalProperties"] = (
         True  # parameters of a distribution from elsewhere
     )

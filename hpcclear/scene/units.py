@@ -255,12 +255,18 @@ def noting(take: Callable[[str, str], None]) -> Iterator[None]:
         _NOTED.reset(token)
 
 
+def note(text: str, read: str) -> None:
+    """Note how a text of an entry is read, where that is not plain from the text."""
+    take = _NOTED.get()
+    if take is not None:
+        take(text.strip(), read)
+
+
 def note_turns(text: str, number: str, unit: str, target: str) -> None:
     """Note how `text` is read, where `number` of `unit`, which fits the target, is an angular speed in turns by time alone."""
-    take = _NOTED.get()
-    if take is not None and target == "rad/s" and "radian" not in _parsed(unit)[1]:
+    if target == "rad/s" and "radian" not in _parsed(unit)[1]:
         turns = float(60 * Fraction(number) * factor(unit, target) / _TURN)
-        take(text, f"{turns:.6g} rpm, revolutions per minute; for radians write rad/s")
+        note(text, f"{turns:.6g} rpm, revolutions per minute; for radians write rad/s")
 
 
 _EXAMPLES = {
