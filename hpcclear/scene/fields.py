@@ -208,6 +208,10 @@ a monotone cubic between: no higher than the higher of two rows, no lower than t
 _ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
 
 
+OF_FILE = {"type": "object", "title": "FileCurve"}
+"""JSON schema of a curve from a file; the schema of a scene puts that of its table in its place."""
+
+
 def _table_of_pairs(least: int) -> dict[str, Any]:
     """JSON schema of a table of at least so many pairs."""
     pair = {"type": "array", "items": _ENTRY, "minItems": 2, "maxItems": 2}
@@ -226,6 +230,11 @@ class CurveOf(Converted):
 
     def convert(self, value: Any) -> Curve:
         """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
+        if isinstance(value, Mapping) and "file" in value:
+            raise invalid(
+                "files are read where a scene is loaded, and this came another way",
+                "Load a scene with it, or give pairs [[angle, value], ...]",
+            )
         if not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
         remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...] over one turn"
@@ -248,7 +257,7 @@ class CurveOf(Converted):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {
-            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2)],
+            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2), OF_FILE],
             "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
         }
 
@@ -309,7 +318,7 @@ class MotionTable(Converted):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {
-            **_table_of_pairs(LEAST_ROWS),
+            "anyOf": [_table_of_pairs(LEAST_ROWS), OF_FILE],
             "description": "[[time in s, angle in rad], ...], until the motion repeats",
         }
 

@@ -61,7 +61,8 @@ def load_scene(
         content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     named = files_named(content)
-    content = dict(with_values(content, folder))
+    filled, read_as = with_values(content, folder)
+    content = dict(filled)
     own_plugins = "plugins" in content
     if not trust:
         check_trust(content, "mapping" if text is None else str(source))
@@ -72,7 +73,8 @@ def load_scene(
     if (
         text is None or named or own_plugins
     ):  # results carry the values: whoever has one need not have the file
-        scene._text = scene.to_toml()
+        scene._text = "".join(f"# {line}\n" for line in read_as) + scene.to_toml()
+        scene._readings = (*scene.readings, *read_as)
     else:
         # an empty line ends the notes, whatever a file's own first comment says
         own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text

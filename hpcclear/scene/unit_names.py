@@ -85,6 +85,7 @@ SPELLINGS = {
     }.items()
     for name in names.split()
 }
+SPELLINGS |= {f"bar{end}": "bar" for end in ("(a)", " a", " abs", " (abs)", " absolute", "(abs)")}
 """Other spellings that leave no doubt of what is meant."""
 
 TURNS_BY_TIME = ("U", "r", "tr")

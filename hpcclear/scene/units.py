@@ -296,7 +296,7 @@ def to_si(text: str, target: str) -> float:
     shown = target or "1"
     found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= _LONGEST else None
     number, unit = found.groups() if found else ("", "")
-    if found is None or (unit is not None and not _is_unit(text, unit)):
+    if found is None or (unit is not None and not _is_written(text, unit)):
         hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
         raise UnitError(
             f"the text is not a number with a unit of {shown}",
@@ -316,7 +316,15 @@ def to_si(text: str, target: str) -> float:
         raise UnitError("the number is too large", f"Write a finite number in {shown}") from None
 
 
-def _is_unit(text: str, unit: str) -> bool:
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, of whatever quantity."""
+    try:
+        return bool(_parsed(text))
+    except ValueError:
+        return False
+
+
+def _is_written(text: str, unit: str) -> bool:
     """Whether what follows the number of a text is made of names, powers and signs; "1/min" after a space only."""
     if unit.startswith("1") and not text[: text.rindex(unit)][-1:].isspace():
         return False
