@@ -18,6 +18,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from hpcclear.base.errors import nearest as nearest
 from hpcclear.scene.units import UnitError, to_si
+from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
@@ -66,7 +67,8 @@ class Table(BaseModel):
         known = tuple(cls.model_fields)
         for key in data:
             if key not in known:
-                reason, remedy = cls.elsewhere.get(key, ("is not a known key", nearest(key, known)))
+                unknown = "is not a known key", hint(key) + nearest(key, known)
+                reason, remedy = cls.elsewhere.get(key, unknown)
                 raise invalid(reason, remedy, key=key)
         return data
 
