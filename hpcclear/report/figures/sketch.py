@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.report.figures import labels, linkage_sketch, style
+from hpcclear.report.figures import curves, labels, linkage_sketch, style
 from hpcclear.report.figures.linkage_sketch import arrow, word
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import ClearanceJoint, Link, TorqueDrive
@@ -32,22 +32,26 @@ Pair = tuple[float, float]
 def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose] | None = None) -> "Figure":
     """The mechanism at a crank angle of 50 degrees, a linkage at its start; and a key with every number's place.
 
-    Lengths are to scale; plays are not, they would be invisible. `poses`: of a linkage, where its bodies are
+    Lengths are to scale; plays are not, they would be invisible. Tables of loads and motions are
+    drawn below. `poses`: of a linkage, where its bodies are
     (`hpcclear.dynamics.planar.problem.poses_at_start`).
     """
     key = linkage_sketch.key(scene, poses) if poses is not None else _key(scene)
     lines = [part for line in key for part in textwrap.wrap(line, _COLUMNS)]
     drawing = _DRAWING if poses is None else _LINKAGE
-    height = drawing + _LINE * len(lines)
+    tables = curves.tabulated(scene)
+    height = drawing + _LINE * len(lines) + curves.HEIGHT * len(tables)
     figure = style.page(height)
     figure.set_layout_engine("none")
-    below = _LINE * len(lines) / height
+    below = 1.0 - drawing / height
     axes = figure.add_axes((0.0, below, 1.0, 1.0 - below))
     if poses is not None:
         linkage_sketch.draw(axes, scene, poses)
     else:
         _mechanism(axes, scene)
     text = "\n".join(labels.literal(line) for line in lines)
+    curves.draw(figure, tables, below, curves.HEIGHT / height)
+    below = _LINE * len(lines) / height
     figure.text(0.02, below, text, va="top", fontsize=style.SMALL, linespacing=1.35)
     return figure
 
