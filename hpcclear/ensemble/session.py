@@ -349,6 +349,7 @@ def samples_of(
         objective,
         points.words,
         joints,
+        points.labels,
     )
 
 
