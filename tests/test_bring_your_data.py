@@ -323,3 +323,23 @@ def test_a_sketch_draws_each_table():
         assert "kN" in curve.get_title(loc="left")
         assert peak is None or values.max() == peak
     assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        " " * 90_000,
+        "C" + " " * 90_000,
+        "1," * 40_000,
+        "(" * 90_000,
+        "1 " * 40_000,
+        "a in " * 18_000,
+    ],
+)
+@pytest.mark.timeout(60)
+def test_hostile_lines_take_no_time(text, tmp_path):
+    path = tmp_path / "h.csv"
+    for body in (f"{text}\n1\n", f"C\n{text}\n"):
+        path.write_text(body)
+        with pytest.raises(InputError):
+            read_points(path, load_scene(JOBS / "slider_crank.toml"))
