@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
@@ -15,6 +16,7 @@ from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
 from hpcclear.dynamics.laws.lanes import in_lanes
+from hpcclear.dynamics.laws.objectives import rate_in_lanes
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, modes_of
 from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
@@ -220,6 +222,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         load_table=_flag(load_is_table),
         guide=_flag(e.guide_friction is not None),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
+        objective=rate_in_lanes(scene.objective) if scene.objective.rate else None,
         ledger=_flag(scene.numerics.energy if ledger is None else ledger),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
@@ -316,6 +319,26 @@ def _cells_of_curves(
     )
 
 
+def by_hand(scene: Scene) -> bool:
+    """Whether a slider-crank's motion is none of the generator's."""
+    return scene.numerics.formulation == "baumgarte" or not scene.clearance_joints()
+
+
+def check_objective(scene: Scene) -> None:
+    """InputError where the objective's rate has no motion that is integrated, or no joint, to be of."""
+    rate = scene.objective.rate_of
+    if rate and not coordinate_count(scene):
+        reason = "its rate is integrated along with the motion, and this motion is prescribed"
+    elif rate == "joints" and not scene.clearance_joints():
+        reason = "its rate is of joints with clearance, and there are none"
+    elif rate and not scene.is_planar and by_hand(scene):
+        reason = "the motion of this slider-crank is written by hand, without a place for its rate"
+    else:
+        return
+    key = "numerics.objective" if scene.study is None else "study.objective"
+    raise InputError(key, scene.objective.name, reason, 'Give a joint kind = "clearance"')
+
+
 def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
@@ -328,6 +351,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     cells = partial(periodic_cells, turns=turns, interpolation=scene.numerics.interpolation)
     if linkage is not None:
         curves = _cells_of_curves(linkage, curves_of(planar.tables_of(scene)), cells)
+    check_objective(scene)
     averaged: Any = scene.numerics.averaged_revolutions
     auto = averaged == "auto"
     return Problem(

@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from hpcclear.base.remarks import remark
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
+from hpcclear.scene.goals import ObjectiveName
 
 
 class Numerics(Table):
@@ -45,6 +47,8 @@ class Numerics(Table):
     """For "auto": relative standard error of the objective at which averaging ends."""
     max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
     """For "auto": the cap."""
+    objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
+    """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
     objective_joints: tuple[str, ...] = ()
     """Joints with clearance whose gaps or contact forces count for the objective; all, where none is named."""
     max_steps: Annotated[int, Count(1)] = 10_000_000

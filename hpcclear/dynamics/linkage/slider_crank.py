@@ -101,6 +101,7 @@ def motion_of(effects: at.Effects) -> Motion:
         series=bool(effects.series),
         responses=bool(effects.responses),
         follow="slider",
+        objective="" if effects.objective is None else effects.objective.of,
         waves=bool(effects.waves),
     )
     known = {
