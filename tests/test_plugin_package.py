@@ -3,14 +3,15 @@
 import sys
 from pathlib import Path
 
-import commands
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from test_own_models import written
 from test_plugins import install
 from test_user_laws import file_with
 
 from hpcclear import evaluate, load_scene
+from hpcclear.cli import cli
 from hpcclear.plugins import KINDS
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
@@ -37,13 +38,14 @@ Elastic = ContactLaw(
 )
 
 
-def ratio(speed, coefficient):
-    return coefficient * math.tanh(speed / 0.05)
+def ratio(speed, coefficient, ramp):
+    return coefficient * math.tanh(speed / ramp)
 
 
 Smooth = FrictionLaw(
-    words="a smooth ramp", ratio=ratio, parameters=(Parameter("coefficient", "", "far from rest", 0.1, least=0),)
-)
+    words="a smooth ramp", ratio=ratio, parameters=(
+    Parameter("coefficient", "", "far from rest", 0.1, least=0), Parameter("ramp", "m/s", "its width", 0.05, above=0),
+))
 
 
 def power(friction_force, sliding_speed):
@@ -112,7 +114,6 @@ def test_there_is_one_of_each_kind():
 
 
 def test_laws_and_objective_of_a_package_are_simulated(package, tmp_path):
-    """The loss is what the laws lose, less what the contact's damping does: below all, and above none."""
     path = file_with(
         tmp_path, {"law": "elastic"}, {"law": "smooth"}, objective="friction-loss", rtol=1e-6
     )
@@ -147,8 +148,8 @@ def test_distribution_surrogate_and_search_of_a_package_make_a_study(
 
 
 def test_all_of_them_are_listed_with_their_package(package):
-    code, said = commands.run(["laws"], 0, PYTHONPATH=f"{package}:{commands.ROOT}")
-    assert code == 0
+    done = CliRunner().invoke(cli, ["laws"])
+    assert done.exit_code == 0, done.output
     for name, _ in OFFERED.values():
-        assert name in said
-    assert said.count("their-shapes 1.2") == 4  # laws stand under their own names
+        assert name in done.output
+    assert done.output.count("their-shapes 1.2") == 6

@@ -1,14 +1,11 @@
 """The command `laws`: what laws, objectives and other plug-ins there are, with their parameters and sources."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from hpcclear.cli.options import of_one_process, show
 from hpcclear.ranks.stopping import Exit
-
-_LAWS = {"contact": "normal force", "friction": "friction"}
 
 
 @click.command(short_help="List laws, objectives and other plug-ins, with their sources.")
@@ -21,57 +18,55 @@ def laws() -> int:
 
     Example: hpcclear laws
     """
+    from hpcclear import plugins
     from hpcclear.cli.printing import console, table
     from hpcclear.scene.laws import known_laws
 
-    for kind, title in _LAWS.items():
-        show(f"effects.{kind}.law ({title})")
+    for registry in (plugins.CONTACT_LAWS, plugins.FRICTION_LAWS):
+        kind = registry.kind.partition(" ")[0]
+        show(f"effects.{kind}.law ({registry.kind})")
+        offered = registry.names()
         for name, law in known_laws(kind).items():
-            console().print(table(name, list(_rows(law))))
-    for title, rows in _others():
-        console().print(table(title, rows))
+            origin = registry.origin(name) if name in offered else ""
+            console().print(table(name, list(_rows(law, origin))))
+    for place, registry in _OTHERS.items():
+        _list(place, getattr(plugins, registry))
     return Exit.DONE
 
 
-def _others() -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """What else is known by a name: where it is written, and each with what it is or the package that it comes from."""
-    from hpcclear.plugins import DISTRIBUTIONS, OBJECTIVES, SEARCHES, SURROGATES
-
-    places = {
-        "study.objective": OBJECTIVES,
-        "study.random.*.distribution": DISTRIBUTIONS,
-        "study.surrogate.model": SURROGATES,
-        "study.swarm.algorithm": SEARCHES,
-    }
-    for place, registry in places.items():
-        ours = registry.ours()
-        rows = [
-            (name, _objective(registry, name) if registry is OBJECTIVES else "built-in")
-            for name in ours
-        ]
-        for name in registry.names()[len(ours) :]:
-            found = (
-                _objective(registry, name)
-                if registry is OBJECTIVES
-                else _first_line(registry.get(name))
-            )
-            rows.append((name, "; ".join(filter(None, (found, registry.origin(name))))))
-        if rows:
-            yield f"{place} ({registry.kind})", rows
+_OTHERS = {
+    "study.objective": "OBJECTIVES",
+    "study.random.*.distribution": "DISTRIBUTIONS",
+    "study.surrogate.model": "SURROGATES",
+    "study.swarm.algorithm": "SEARCHES",
+}
+"""Registries by the entries that name what is in them."""
 
 
-def _objective(registry: Any, name: str) -> str:
+def _list(place: str, registry: Any) -> None:
+    """Print the names of a registry; of objectives and of what packages offer, what they are."""
+    from hpcclear.cli.printing import console, table
+
+    names, ours = registry.names(), registry.ours()
+    show(f"{place} ({registry.kind}): {', '.join(names)}")
+    told = names if place == "study.objective" else names[len(ours) :]
+    rows = [(name, "; ".join(filter(None, _told(registry, name)))) for name in told]
+    if rows:
+        console().print(table(f"{registry.kind}s", rows))
+
+
+def _told(registry: Any, name: str) -> tuple[str, ...]:
+    """What a plug-in is, and the package that it comes from."""
     one = registry.get(name)
-    return ", ".join(filter(None, (one.words, one.unit, one.source)))
+    origin = registry.origin(name)
+    if hasattr(one, "words"):
+        return one.words, one.unit, one.source, origin
+    return (*(one.__doc__ or "").strip().splitlines()[:1], origin)
 
 
-def _first_line(value: Any) -> str:
-    """What a plug-in says of itself first."""
-    return ((value.__doc__ or "").strip().splitlines() or [""])[0]
-
-
-def _rows(law: Any) -> list[tuple[str, str]]:
+def _rows(law: Any, origin: str) -> list[tuple[str, str]]:
     texts = {"what": law.words, "formula": law.formula, "valid": law.valid, "source": law.source}
+    texts["package"] = origin
     rows = [(label, text) for label, text in texts.items() if text]
     for one in law.parameters:
         unit = f" in {one.unit}" if one.unit else ""

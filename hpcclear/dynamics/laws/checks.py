@@ -73,6 +73,7 @@ def check_shape(law: Law) -> None:
 # ---- units ----------------------------------------------------------------------------------------
 @lru_cache(maxsize=1)
 def registry() -> Any:
+    """Pint's units."""
     from pint import UnitRegistry
 
     return UnitRegistry()
