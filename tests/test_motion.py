@@ -1,17 +1,21 @@
 """Equations of motion against a dense nine-coordinate model that shares no formula with them."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
-from some_laws import STIFFNESS, effects_with, row
+from running import scene_with
+from some_laws import STIFFNESS, row
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.linkage import baumgarte as bg
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.linkage.rhs import motion_of
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.response import violation
+from hpcclear.dynamics.problem import problem_of
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}
@@ -68,41 +72,68 @@ def clip(x):
     return min(max(x, -1.0), 1.0)
 
 
+BASES = {name: at.JOINTS[k].block for k, name in enumerate(("crank_rod", "rod_slider"))}
+
+
+def bar(numbers):
+    return {**{k: v for k, v in numbers.items() if k != "u"}, "mass_center": numbers["u"]}
+
+
+@lru_cache(maxsize=64)
+def scene_of(effects):
+    """The scene of these effects (a frozen set), with this file's constants."""
+    friction = {"law": "none"}
+    if "coulomb" in effects:
+        friction = {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP}
+    if "ambrosio" in effects:
+        friction = {"law": "ambrosio", "coefficient": MU, "speeds": [DEAD, DEAD + RAMP]}
+    if "lugre" in effects:
+        friction = {
+            "law": "lugre", "coefficient": MU, "static_coefficient": BRISTLES["static"],
+            "bristle_stiffness": BRISTLES["stiffness"], "bristle_damping": BRISTLES["damping"],
+            "viscous_coefficient": BRISTLES["viscous"], "stribeck_speed": BRISTLES["speed"],
+        }  # fmt: skip
+    law = {"law": "hertz"}
+    if "fixed" in effects:
+        law = {"law": "hunt-crossley", "damping": DAMPING}
+    if "latched" in effects:
+        law = {"law": "lankarani-nikravesh", "restitution": 0.9}
+    changes = {
+        "mechanism.crank": bar(CRANK), "mechanism.rod": bar(ROD), "mechanism.slider.mass": SLIDER_MASS,
+        "drive": {"kind": "constant-speed", "speed": SPEED},
+        "effects": {"contact": law, "friction": friction, "gravity": 9.81 * ("gravity" in effects)},
+        "numerics.alpha": 250.0, "numerics.beta": 240.0,
+        "numerics.formulation": "baumgarte" if "baumgarte" in effects else "minimal",
+    }  # fmt: skip
+    if "torque" in effects:
+        changes["drive"] = {"kind": "torque", "torque": 2.5, "initial_speed": SPEED}
+    if "load" in effects:
+        changes["effects"]["slider_load"] = -35.0
+    if "guide" in effects:
+        changes["effects"]["guide_friction"] = {"coefficient": GUIDE[0], "ramp_speed": GUIDE[1]}
+    models = [model for model in ("short", "long") if f"{model}_film" in effects]
+    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
+        if name not in effects:
+            changes[f"joints.{name}"] = {"kind": "ideal"}
+            continue
+        changes[f"joints.{name}.clearance"] = clearance
+        if models:
+            film = {"viscosity": 0.05, "length": 0.02, "roughness": 1e-5}
+            changes[f"joints.{name}.film"] = {**film, "model": models.pop(0)}
+    return scene_with(changes)
+
+
 def row_of_parameters(effects, rng):
     """Parameters as the kernel reads them, with this file's constants and two different joints."""
-    par = np.ones(at.PARAMETERS)
-    values = {
-        at.SPEED: SPEED,
-        at.CRANK_LENGTH: CRANK["length"],
-        at.CRANK_MASS: CRANK["mass"],
-        at.CRANK_NEAR: CRANK["u"],
-        at.CRANK_OWN_INERTIA: CRANK["inertia"],
-        at.CRANK_MOMENT: CRANK["mass"] * CRANK["u"],
-        at.CRANK_INERTIA: CRANK["inertia"] + CRANK["mass"] * CRANK["u"] ** 2,
-        at.ROD_LENGTH: ROD["length"],
-        at.ROD_NEAR: ROD["u"],
-        at.ROD_FAR: ROD["length"] - ROD["u"],
-        at.ROD_MASS: ROD["mass"],
-        at.INV_ROD_MASS: 1 / ROD["mass"],
-        at.ROD_INERTIA: ROD["inertia"],
-        at.INV_ROD_INERTIA: 1 / ROD["inertia"],
-        at.SLIDER_MASS: SLIDER_MASS,
-        at.INV_SLIDER_MASS: 1 / SLIDER_MASS,
-        at.GRAVITY: 9.81,
-        at.LOAD: -35.0,
-        at.TORQUE: 2.5,
-        at.GUIDE_COEFFICIENT: GUIDE[0],
-        at.GUIDE_INVERSE_RAMP: 1 / GUIDE[1],
-        at.BAUMGARTE_ALPHA2: 2 * 250.0,
-        at.BAUMGARTE_BETA2: 240.0**2,
-    }
-    for base, clearance in ((at.JOINT_12, 3e-4), (at.JOINT_23, 5e-4)):
+    par = parameters(scene_of(frozenset(effects)))[0]
+    values = {}
+    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
+        base = BASES[name]
+        if name not in effects:
+            continue
         values |= {
-            base + at.CLEARANCE: clearance,
             base + STIFFNESS: 3e9 * (1 + clearance),
             base + STIFFNESS + 1: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
-            base + at.BEARING_RADIUS: 0.02,
-            base + at.JOURNAL_RADIUS: 0.02 - clearance,
             base + at.FILM_SHORT: FILM["short"],
             base + at.FILM_LONG: FILM["long"],
             base + at.FILM_SHEAR: FILM["shear"],
@@ -157,12 +188,15 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
 def dense_model(effects, par, contacts, feedback=False):
     on = effects.__contains__
     joints = {}
-    for k, (name, base, flag) in enumerate(
-        (("o12", at.JOINT_12, "crank_rod"), ("o23", at.JOINT_23, "rod_slider"))
-    ):
+    for k, (name, flag) in enumerate((("o12", "crank_rod"), ("o23", "rod_slider"))):
         if on(flag):
             joints[name] = joint_of(
-                effects, par, base, contacts[k], 1 / contacts[at.MAX_JOINTS + k], DEFLECTIONS[k]
+                effects,
+                par,
+                BASES[flag],
+                contacts[k],
+                1 / contacts[at.MAX_JOINTS + k],
+                DEFLECTIONS[k],
             )
     return Dense(
         CRANK,
@@ -197,20 +231,22 @@ def random_state(mech, rng, par):
 def reduced(effects, values):
     """Minimal coordinates among the nine."""
     topology = ("crank_rod" in effects, "rod_slider" in effects)
-    rows = {(True, True): [X2, Y2, THETA2, X3], (False, False): []}.get(topology, [THETA2, X3])
+    rows = [X2, Y2, THETA2, X3] if all(topology) else [THETA2, X3]
     return values[rows + [PHI] * ("torque" in effects)]
 
 
 def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
-    flags = effects_with(effects)
+    problem = problem_of(
+        scene_of(frozenset(effects)), series="series" in effects, ledger="ledger" in effects
+    )
     if "lugre" in effects:
         z = deflected(effects)
         q, v = np.concatenate([np.full(len(z), 7.0), q]), np.concatenate([z, v])
     out = np.zeros((1, len(q) + at.RATES))
     states = np.concatenate([q, v])[None]
-    motion = motion_of(flags, 1).address
-    observe(motion, par, np.zeros(at.TABLES), states, contacts[None], np.array([t]), out)
+    motion = problem.motion(problem.effects, 1).address
+    observe(motion, par, problem.tables, states, contacts[None], np.array([t]), out)
     return out[0, : len(q)], out[0, len(q) :]
 
 
@@ -232,7 +268,10 @@ def scale_of(reference):
 
 def check_rates(effects, mech, rates, v):
     """Gaps, forces and powers of the kernel against the dense model's."""
-    for name, flag, joint in (("o12", "crank_rod", at.O12), ("o23", "rod_slider", at.O23)):
+    for name, flag, joint in (
+        ("o12", "crank_rod", at.JOINTS[0]),
+        ("o23", "rod_slider", at.JOINTS[1]),
+    ):
         if flag in effects:
             seen = mech.seen[name]
             np.testing.assert_allclose(rates[joint.gap], seen["gap"], rtol=0, atol=1e-16)
@@ -332,7 +371,7 @@ def test_constraint_violation_is_the_largest_constraint():
         q = random_state(mech, rng, par)[0] + 1e-6 * rng.normal(size=9)
         rows = np.delete(mech.constraints(q, q[PHI] / SPEED), 4)
         rows[3] *= ROD["length"]
-        got = bg.constraint_violation(
-            "crank_rod" in names, "rod_slider" in names, par, q[KERNEL_ORDER][:, None]
-        )
+        linkage = linkage_of(scene_of(frozenset(names | {"baumgarte"})))
+        q, still = q[KERNEL_ORDER][:, None], np.zeros((9, 1))
+        got = violation(linkage, q, still, np.array([q[-1, 0] / SPEED]))
         np.testing.assert_allclose(got, [np.abs(rows).max()], rtol=1e-9)
