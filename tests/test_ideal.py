@@ -86,17 +86,24 @@ def test_reactions_equal_the_textbook():
         assert relative_to_peak(held.holds[name], force) < 1e-10, name
 
 
-@pytest.mark.parametrize("effects", [set(), FULL, {"gravity"}, {"guide", "load"}], ids=sorted)
+@pytest.mark.parametrize(
+    "effects",
+    [
+        set(), FULL, {"gravity"}, {"guide", "load"}, {"guide", "load", "gravity", "offset"},
+        {"offset", "clockwise"},
+    ],
+    ids=sorted,
+)  # fmt: skip
 def test_reactions_equal_the_multipliers_of_the_dense_model(effects):
     """All bodies with mass, gravity, load and guide friction."""
     angles = ANGLES[:240:7]
     held, of = response(effects, angles)
     mech = dense_model(effects, None, np.ones(2 * at.MAX_JOINTS))
     expected = []
-    for phi in angles:
-        q = assembled(mech, phi, ZERO, ZERO)
-        v = admissible(mech, q, np.zeros(9), phi / SPEED)
-        a = mech.accelerations(q, v, phi / SPEED)
+    for time in angles / SPEED:
+        q = assembled(mech, mech.speed * time, ZERO, ZERO)
+        v = admissible(mech, q, np.zeros(9), time)
+        a = mech.accelerations(q, v, time)
         bearing_x, bearing_y, guide, _, drive, px, py, rx, ry = mech.seen["multipliers"]
         motion = [row[k] for row in (q, v, a) for k in (X3, X2, Y2, THETA2)]
         forces = [px, py, rx, ry, bearing_x, bearing_y, guide, drive]
@@ -205,6 +212,39 @@ def test_series_of_a_scene_without_clearance_keep_the_energy_balance():
     assert np.abs(series["energy_residual"]).max() < 1e-6 * np.abs(series["driving_work"]).max()
     speed = np.gradient(series["slider_position"], times, edge_order=2)
     assert np.abs(speed - series["slider_velocity"]).max() < 1e-3 * np.abs(speed).max()
+
+
+@pytest.mark.parametrize("changes", [{}, {"joints.crank_rod.clearance": 3e-4}])
+def test_a_clockwise_slider_crank_is_the_mirror_image(changes):
+    """Of one with its offset on the other side; without gravity."""
+    both = (BARE if not changes else {"joints.rod_slider": {"kind": "ideal"}}) | changes
+    one, other = (
+        simulate(scene_with(both | {"drive.speed": speed, "mechanism.offset": offset}, 1, 1e-9))
+        for speed, offset in ((520.0, 0.01), (-520.0, -0.01))
+    )
+    for name, sign in (
+        ("crank_angle", -1), ("slider_position", 1), ("rod_x", 1), ("rod_y", -1), ("rod_angle", -1),
+        ("eccentricity_y", -1), ("crank_moment", -1), ("driving_work", 1),
+    ):  # fmt: skip
+        expected, got = one[name].to_numpy(), sign * other[name].to_numpy()
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6 * size, err_msg=name)
+    # at rod and crank in line the slider is at its ends
+    reach = np.sqrt((0.12 + 0.05) ** 2 - 0.01**2)
+    assert one["slider_position"].max() == pytest.approx(reach, rel=1e-2 if changes else 1e-4)
+
+
+@pytest.mark.parametrize("speed", [520.0, -520.0])
+def test_a_load_of_two_turns_repeats_after_them(speed):
+    load = [[0.0, 0.0], [3.0, 100.0], [8.0, -100.0], [12.0, 20.0]]
+    changes = {"drive.turns": 2, "drive.speed": speed, "effects.slider_load": load}
+    response = simulate(scene_with(BARE | changes | {"numerics.interpolation": "linear"}, 2))
+    angle = response["crank_angle"].to_numpy()
+    assert angle[-1] == pytest.approx(np.copysign(4 * at.TURN, speed))
+    expected = np.interp(angle, *np.array(load).T, period=2 * at.TURN)
+    assert np.abs(response["slider_load"].to_numpy() - expected).max() < 1.0
+    assert np.abs(response["energy_residual"].to_numpy()).max() < 1e-3
+    assert np.abs(response["load_work"].to_numpy()).max() > 1.0
 
 
 @pytest.mark.parametrize("drive", ["prescribed", "torque"])

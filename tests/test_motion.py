@@ -38,6 +38,9 @@ RUBBING = {
     "static_coefficient": BRISTLES["static"],
     "inverse_speed": 1 / BRISTLES["speed"],
 }
+OFFSET = 0.017
+LOADS = [[0.0, -30.0], [math.pi, 20.0], [3 * math.pi, -5.0]]
+"""N by the crank angle over two turns, straight between: rows at borders of the kernel's cells."""
 DEFLECTIONS = np.array([4e-6, -2e-6])  # of the bristles in both joints, m
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
@@ -66,6 +69,11 @@ MOTIONS = [
     ("none", {"torque", "ledger", "series"}),
     ("none", FULL | {"torque"}),
 ]
+FURTHER = [
+    ("two", FULL - {"load"} | {"latched", "coulomb", "offset", "clockwise", "two turns"}),
+    ("O12", FULL - {"load"} | {"fixed", "offset", "torque", "two turns"}),
+]
+"""An offset guide, a drive that turns clockwise, a load that repeats after two turns."""
 
 
 def clip(x):
@@ -107,6 +115,14 @@ def scene_of(effects):
     }  # fmt: skip
     if "torque" in effects:
         changes["drive"] = {"kind": "torque", "torque": 2.5, "initial_speed": SPEED}
+    if "clockwise" in effects:
+        changes["drive"]["speed"] = -SPEED
+    if "offset" in effects:
+        changes["mechanism.offset"] = OFFSET
+    if "two turns" in effects:
+        changes["drive"]["turns"] = 2
+        changes["effects"]["slider_load"] = LOADS
+        changes["numerics.interpolation"] = "linear"
     if "load" in effects:
         changes["effects"]["slider_load"] = -35.0
     if "guide" in effects:
@@ -202,10 +218,11 @@ def dense_model(effects, par, contacts, feedback=False):
         CRANK,
         ROD,
         SLIDER_MASS,
-        speed=None if on("torque") else SPEED,
+        speed=None if on("torque") else SPEED * (-1 if on("clockwise") else 1),
         torque=2.5,
         gravity=9.81 if on("gravity") else 0.0,
         load=-35.0 if on("load") else 0.0,
+        offset=OFFSET if on("offset") else 0.0,
         guide=(lambda v: GUIDE[0] * clip(v / GUIDE[1])) if on("guide") else None,
         alpha=250.0 if feedback else 0.0,
         beta=240.0 if feedback else 0.0,
@@ -213,18 +230,19 @@ def dense_model(effects, par, contacts, feedback=False):
     )
 
 
-def random_state(mech, rng, par):
+def random_state(mech, rng, par, turns=1):
     """A state that meets the constraints, journals up to 1.3 clearances off centre; and its time."""
     eccentric = []
     for joint in (mech.o12, mech.o23):
         reach = 0.0 if joint is None else joint.clearance * rng.uniform(0.7, 1.3)
         angle = rng.uniform(0, at.TURN)
         eccentric.append(reach * np.array([np.cos(angle), np.sin(angle)]))
-    phi = rng.uniform(0, at.TURN)
+    speed = SPEED if mech.speed is None else mech.speed
+    phi = math.copysign(rng.uniform(0, at.TURN * turns), speed)
     q = assembled(mech, phi, *eccentric)
     wanted = rng.normal(size=9) * np.array([5, 5, SPEED, 8, 8, 90, 10, 0, 0])
-    wanted[PHI] = SPEED * rng.uniform(0.5, 1.5)
-    t = phi / SPEED
+    wanted[PHI] = speed * rng.uniform(0.5, 1.5)
+    t = phi / speed
     return q, admissible(mech, q, wanted, t), t
 
 
@@ -259,7 +277,11 @@ def cases(rng, effects, count=25):
         contacts[1, :2] = rng.uniform(0.3, 3.0, 2)
         contacts = contacts.ravel()
         mech = dense_model(effects, par, contacts)
-        yield par, contacts, mech, *random_state(mech, rng, par)
+        state = random_state(mech, rng, par, turns=2 if "two turns" in effects else 1)
+        if "two turns" in effects:
+            angles, loads = np.transpose([*LOADS, [2 * at.TURN, LOADS[0][1]]])
+            mech.load = np.interp(state[0][PHI] % (2 * at.TURN), angles, loads)
+        yield par, contacts, mech, *state
 
 
 def scale_of(reference):
@@ -294,7 +316,7 @@ def check_rates(effects, mech, rates, v):
 
 
 @pytest.mark.parametrize(
-    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+    ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
 def test_minimal_accelerations_equal_the_dense_model(topology, effects):
     effects = effects | TOPOLOGIES[topology]
@@ -318,7 +340,7 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
 
 
 @pytest.mark.parametrize(
-    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+    ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
 def test_power_balance_closes_at_every_instant(topology, effects):
     """Kinetic, potential and stored energy change by what the ledger says, state by state."""
@@ -331,7 +353,9 @@ def test_power_balance_closes_at_every_instant(topology, effects):
         kinetic = (mech.masses() * v) @ a
         weight = mech.gravity * (mech.masses() * v)[[1, 4]].sum()
         stored = sum(mech.seen[j]["elastic_power"] for j in ("o12", "o23") if j in mech.seen)
-        supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * ("load" in effects)
+        supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * bool(
+            {"load", "two turns"} & effects
+        )
         terms = np.array([kinetic, weight, stored, supplied, rates[at.DISSIPATION]])
         rest = kinetic + weight + stored - supplied + rates[at.DISSIPATION]
         assert abs(rest) < 1e-10 * np.abs(terms).max() + 1e-9
@@ -342,7 +366,11 @@ def test_power_balance_closes_at_every_instant(topology, effects):
     [
         pytest.param(*case, marks=[] if k % 3 == 2 else pytest.mark.full)
         for k, case in enumerate(
-            [*(one for one in MOTIONS if "lugre" not in one[1]), ("none", FULL)]
+            [
+                *(one for one in MOTIONS if "lugre" not in one[1]),
+                ("none", FULL),
+                ("two", {"fixed", "coulomb", "offset", "clockwise"}),
+            ]
         )
     ],
     ids=lambda x: x if isinstance(x, str) else "",

@@ -129,7 +129,10 @@ def simulate(
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
-            scene.effects.slider_load, data["crank_angle"], 1, scene.numerics.interpolation
+            scene.effects.slider_load,
+            data["crank_angle"],
+            _turns(scene),
+            scene.numerics.interpolation,
         )
     return dataset.response_dataset(
         times,

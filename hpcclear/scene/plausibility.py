@@ -54,7 +54,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
 def _drive(scene: SceneTables) -> Iterator[str]:
     drive = scene.drive
     key = speed_entry(drive)
-    speed = float(getattr(drive, key))
+    speed = abs(float(getattr(drive, key)))
     turns = speed / (2.0 * math.pi)
     mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:

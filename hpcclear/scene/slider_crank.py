@@ -51,6 +51,7 @@ _TABLES = {
     "mechanism.crank": "mechanism.bodies.crank",
     "mechanism.rod": "mechanism.bodies.rod",
     "mechanism.slider": "mechanism.bodies.slider",
+    "mechanism.offset": "mechanism.ground.points.guide.y",
     "drive": "mechanism.drives.drive",
     "effects.guide_friction": "mechanism.joints.guide.friction",
     "effects.slider_load": "mechanism.loads.load.size",
@@ -86,8 +87,12 @@ def linkage_of(scene: Any) -> Planar:
     friction = None
     if rubs is not None:
         friction = Rubbing.model_construct(coefficient=rubs.coefficient, ramp_speed=rubs.ramp_speed)
+    ground, line = Ground(), "ground.o"
+    if mechanism.offset is not None:
+        beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
+        ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
     guide = PlanarSlide.model_construct(
-        name="guide", kind="slide", point="slider.pin", line="ground.o", friction=friction
+        name="guide", kind="slide", point="slider.pin", line=line, friction=friction
     )
     frame = PlanarRevolute.model_construct(
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o"
@@ -101,7 +106,7 @@ def linkage_of(scene: Any) -> Planar:
         )
     return Planar.model_construct(
         bodies=(*bodies, slider),
-        ground=Ground(),
+        ground=ground,
         joints=(frame, guide, *(_joint(scene, name) for name in JOINTS)),
         drives=(_drive(scene.drive),),
         loads=loads,

@@ -13,7 +13,7 @@ from hpcclear.base.outcome import RESPONSES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
+from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.numerics import Numerics, Output
@@ -112,6 +112,18 @@ class SceneTables(Table):
                     "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
                     key=f"effects.{entry}",
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _curves_repeat(self) -> Self:
+        if self.template is not None:  # a linkage has looked at its own
+            curves = {
+                "drive.torque": getattr(self.drive, "torque", None),
+                "effects.slider_load": self.effects.slider_load,
+            }
+            for key, curve in curves.items():
+                if isinstance(curve, tuple):
+                    check_period(curve, self.drive.turns, key)
         return self
 
     @model_validator(mode="after")
