@@ -29,8 +29,8 @@ def laws() -> int:
         for name, law in known_laws(kind).items():
             origin = registry.origin(name) if name in offered else ""
             console().print(table(name, list(_rows(law, origin))))
-    for place, registry in _OTHERS.items():
-        _list(place, getattr(plugins, registry))
+    for place, kind in _OTHERS.items():
+        _list(place, getattr(plugins, kind))
     return Exit.DONE
 
 
