@@ -8,9 +8,10 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import numbers
-from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
+from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, dundurs, reduced_compliance
 from hpcclear.dynamics.views import Parameters
 from hpcclear.scene import Scene
+from hpcclear.scene.mechanism import length_path
 
 Get = Callable[[str], Array]
 
@@ -22,21 +23,25 @@ the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c
 """
 
 
-def joint_numbers(get: Get, key: str, materials: str) -> dict[str, Array]:
+def joint_numbers(get: Get, joint: Any, key: str, materials: str) -> dict[str, Array]:
     """Numbers of a joint's samples by the names of `declared.JOINT`, (m,), from the tables at these paths."""
     clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
-    h_bearing, h_journal = (
-        reduced_compliance(
-            get(f"{materials}.{part}.youngs_modulus"), get(f"{materials}.{part}.poisson_ratio")
-        )
-        for part in ("bearing", "journal")
+    moduli, ratios = (
+        [get(f"{materials}.{part}.{entry}") for part in ("bearing", "journal")]
+        for entry in ("youngs_modulus", "poisson_ratio")
     )
+    h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
+    alpha, beta = dundurs(moduli, ratios)
+    path = length_path(joint)
     return {
         "stiffness": contact_stiffness(h_bearing, h_journal, bearing, clearance),
         "compliance": h_bearing + h_journal,
         "bearing_radius": bearing,
         "journal_radius": bearing - clearance,
         "clearance": clearance,
+        "length": np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}"),
+        "dundurs_alpha": alpha,
+        "dundurs_beta": beta,
     }
 
 
@@ -54,7 +59,7 @@ def fill(scene: Scene, get: Get, key: str, materials: str, force: Array, p: Arra
 
     `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
     """
-    joint = joint_numbers(get, key, materials)
+    joint = joint_numbers(get, scene.clearance_joint(key.rpartition(".")[2]), key, materials)
     p[:, at.CLEARANCE] = joint["clearance"]
     p[:, at.BEARING_RADIUS] = joint["bearing_radius"]
     p[:, at.JOURNAL_RADIUS] = joint["journal_radius"]

@@ -1,5 +1,6 @@
 """Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
 
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
 from hpcclear.scene.loading import scene_of_text
+from hpcclear.scene.mechanism import length_path
 
 MISSED = 0.01
 """Of a peak force: what the largest stored force may lack of it and still be the same peak."""
@@ -175,7 +177,8 @@ def _projected_areas(response: xr.Dataset) -> dict[str, float]:
     areas = {}
     for joint in scene.clearance_joints():
         one = scene.clearance_joint(joint)
-        part = one.film or one.wear
-        if part is not None:
-            areas[joint] = 2.0 * one.bearing_radius * part.length
+        path = length_path(one)
+        if path is not None:
+            length: float = attrgetter(path)(one)
+            areas[joint] = 2.0 * one.bearing_radius * length
     return areas
