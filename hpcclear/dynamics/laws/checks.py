@@ -177,8 +177,8 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
             found = made(found, unit) if found == 0 else made(found, "")
         return found.to(unit or "dimensionless")
 
-    for one in law.worked_out():
-        given |= run("once", one, "")
+    for made_once in law.worked_out():
+        given |= run("once", made_once, "")
     wanted = {"force": "N", "elastic": "N", "ratio": "", "deflection": "m/s"}
     for title, function in law.functions().items():
         run(title, function, wanted.get(title, ""))
