@@ -143,20 +143,16 @@ def _speeds(scene: Scene) -> list[tuple[str, str]]:
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
     """How a linkage was put together, a row a body; refuses one that does not close."""
-    if not scene.is_planar:
-        return []
-    from hpcclear.dynamics.planar.problem import linkage_of, put_together, tables_of
+    from hpcclear.dynamics.planar.problem import linkage_of, put_together
     from hpcclear.dynamics.planar.tables import mechanism_of
 
     linkage_of(scene)
-    lines = put_together(mechanism_of(tables_of(scene))).report()
+    lines = put_together(mechanism_of(scene.linkage)).report()
     return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
 
 def _locked(scene: Scene) -> list[str]:
     """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
-    if not scene.is_planar:
-        return []
     from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
 
     told = refused_of(scene)

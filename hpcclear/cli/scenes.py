@@ -96,13 +96,10 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
 def _draw(scene: "Scene", sketch: Path) -> None:
     """Draw the mechanism to a file and print where it is."""
+    from hpcclear.dynamics.planar.problem import poses_at_start
     from hpcclear.report import save, sketch_figure
 
-    poses = None
-    if scene.is_planar:
-        from hpcclear.dynamics.planar.problem import poses_at_start
-
-        poses = poses_at_start(scene)
+    poses = poses_at_start(scene, 0.0 if scene.template is None else scene.template.DRAWN_AT)
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 

@@ -78,8 +78,8 @@ class Effects(Table):
     """Friction in the clearance joints; "none" or left out is off."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """m/s2, towards -y; 0 is off."""
-    slider_load: Annotated[Curve, CurveOf("N")] | None = None
-    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or
+    slider_load: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over the turns of a revolution; "none" or
     left out is off."""
     guide_friction: GuideFriction | None = None
     """Friction of the slider in its guide; "none" or left out is off."""

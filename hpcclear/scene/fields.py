@@ -87,7 +87,7 @@ class Converted:
 @dataclass(frozen=True)
 class Quantity(Converted):
     """A finite float in an SI unit, given as a number or as a string with a unit; open or closed
-    bounds."""
+    bounds, `nonzero` for numbers of either sign."""
 
     unit: str = ""
     above: float | None = None
@@ -95,6 +95,7 @@ class Quantity(Converted):
     least: float | None = None
     most: float | None = None
     why: str = ""
+    nonzero: bool = False
 
     def convert(self, value: Any) -> float:
         """The value in SI; raises PydanticCustomError."""
@@ -130,7 +131,8 @@ class Quantity(Converted):
         upper = math.inf if self.below is None else self.below
         least = -LARGEST if self.least is None else self.least
         most = LARGEST if self.most is None else self.most
-        return (value > lower) & (value < upper) & (value >= least) & (value <= most)
+        within = (value > lower) & (value < upper) & (value >= least) & (value <= most)
+        return within & (value != 0.0) if self.nonzero else within
 
     def bounds(self) -> str:
         """The bounds in words."""
@@ -144,6 +146,7 @@ class Quantity(Converted):
             )
             if bound is not None
         ]
+        parts += ["other than 0"] * self.nonzero
         return " and ".join(parts) + (f" {self.unit}" if self.unit else "")
 
     def _remedy(self) -> str:
@@ -163,6 +166,8 @@ class Quantity(Converted):
         ):
             if bound is not None:
                 number[name] = bound
+        if self.nonzero:
+            number["not"] = {"const": 0}
         if not self.unit:
             share = {"type": "string", "pattern": r"%\s*$", "description": "a number with %"}
             return {"anyOf": [number, share]}
@@ -228,7 +233,7 @@ class CurveOf(Converted):
         """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
         if not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
-        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...] over one turn"
+        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...]"
         if not 2 <= len(value) <= LONGEST_CURVE:
             raise invalid(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
         if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
@@ -253,7 +258,7 @@ class CurveOf(Converted):
         }
 
 
-_LONGER = "For more turns write a linkage with `turns` of its drive, as init --four-stroke does"
+_LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a four-stroke engine"
 
 
 def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:

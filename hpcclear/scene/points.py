@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import entries
+from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
 
@@ -82,7 +83,7 @@ def check_points(
                 if usual not in scene.numeric_paths():
                     _refuse(column == 0.0, column, name, reason, label)
     pairs = []
-    if not scene.is_planar:
+    if isinstance(scene.mechanism, Mechanism):
         reason = "the rod no longer than the crank"
         pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
     for joint in scene.clearance_joints():

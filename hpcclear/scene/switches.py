@@ -160,7 +160,8 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
-        yield from _mean("slider load", "effects.slider_load", effects.slider_load, 1)
+        turns = turns_of(scene.linkage)
+        yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
     if effects.guide_friction is not None:
         yield Switch("guide friction", {"effects.guide_friction": None})
     if isinstance(mechanism, Planar):
@@ -205,7 +206,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
-        turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+        turns = turns_of(scene.linkage)
         yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
