@@ -210,3 +210,32 @@ def test_a_line_in_the_mechanism(tmp_path):
     result = run(scene)
     assert result.out.status == 0
     assert float(result.out.objective) == pytest.approx(expected, rel=2e-6)
+
+
+def test_a_response_has_pressure_and_angle(tmp_path):
+    """Of the peak force of each joint, as the plane problem has them; both stand in the table of loads."""
+    from hpcclear import simulate
+    from hpcclear.report import bearings
+
+    made = content(geometry="line")
+    made["joints"]["rod_slider"] = {"kind": "ideal"}
+    made["numerics"] |= {"transient_revolutions": 0, "averaged_revolutions": 1}
+    scene = loaded(tmp_path, made)
+    found = simulate(scene)
+    one = scene.joints.crank_rod
+    h = sum((1 - m.poisson_ratio**2) / m.youngs_modulus for m in (one.bearing, one.journal))
+    alpha, beta = dundurs(
+        *([getattr(m, name) for m in (one.bearing, one.journal)] for name in ("youngs_modulus", "poisson_ratio"))
+    )  # fmt: skip
+    load = float(found["peak_contact_force"][0]) * h / (0.02 * one.clearance)
+    depth = brentq(
+        lambda d: plane_contact.solve(d, alpha, beta, 1024)[0] - load, 1e-3, 3.0, rtol=1e-6
+    )
+    _, peak, angle = plane_contact.solve(depth, alpha, beta, 1024)
+    pressure = peak * one.clearance / one.bearing_radius / h
+    assert float(found["peak_contact_pressure"][0]) == pytest.approx(pressure, rel=0.01)
+    assert float(found["contact_half_angle"][0]) == pytest.approx(angle, abs=0.02)
+    assert np.isnan(found["peak_contact_pressure"][1])
+    (row,) = bearings.bearings(found)
+    titles = [title for title, _ in bearings.pressures([row])]
+    assert titles == ["mean pressure", "half angle of contact", "peak pressure"]

@@ -15,6 +15,9 @@ from hpcclear.scene.mechanism import length_path
 
 Get = Callable[[str], Array]
 
+WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle"}
+"""Variables of a response, and what a `laws.declared.Geometry` calls them."""
+
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
 
@@ -90,6 +93,28 @@ def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
     """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
     law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
     found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
+    return found
+
+
+def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
+    """Largest pressure, Pa, and half angle of contact, rad, (joints,) each, at normal forces (joints,) of the scene's joints.
+
+    Empty where the geometry of contact has no pressure.
+    """
+    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
+    if law is None or law.geometry is None or law.geometry.pressure is None:
+        return {}
+    found = {name: np.full(len(forces), np.nan) for name in WIDEST}
+    for k, label in enumerate(scene.joint_labels):
+        if label not in scene.clearance_joints() or not forces[k] > 0.0:
+            continue
+        joint, key = scene.clearance_joint(label), scene.joint_key(label)
+        given = joint_numbers(get, joint, key, scene.materials_key(label))
+        own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
+        force = forces[k : k + 1]
+        state = {**own, "force": force, "depth": numbers.depth_at(law, force, own)}
+        for name, attribute in WIDEST.items():
+            found[name][k] = numbers.evaluate(getattr(law.geometry, attribute), state)[0]
     return found
 
 

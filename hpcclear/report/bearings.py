@@ -1,5 +1,6 @@
 """Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
 
+from collections.abc import Callable, Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -44,6 +45,10 @@ class Bearing(NamedTuple):
     """Time mean of the contact force, N."""
     pressure: float
     """Mean force over the projected area 2 R_B L, Pa; the scene gives L for a film or for wear."""
+    peak_pressure: float
+    """Largest contact pressure at the peak force, Pa; the geometry of contact has it for lines and liners."""
+    half_angle: float
+    """Half of the angle over which the surfaces touch there, rad."""
     contact: float
     """Share of the time in contact."""
     gap: float
@@ -85,6 +90,8 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
                 float(angles[at] % (2.0 * np.pi)) if len(force) else np.nan,
                 mean,
                 mean / areas.get(joint, np.nan),
+                _known(response, "peak_contact_pressure", k),
+                _known(response, "contact_half_angle", k),
                 float(weight @ touching) if len(force) else np.nan,
                 float(response["mean_gap"][k]),
             )
@@ -140,6 +147,24 @@ def share(contact: float) -> str:
     return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"
 
 
+def pressures(found: Sequence[Bearing]) -> list[tuple[str, Callable[[Bearing], str]]]:
+    """Return headings and cells of further columns of the bearings' table, of what some bearing has."""
+    columns: list[tuple[str, str, Callable[[Bearing], str]]] = [
+        ("mean pressure", "pressure", lambda one: labels.quantity(one.pressure, "Pa", 3)),
+        ("half angle of contact", "half_angle", lambda one: _in_degrees(one.half_angle)),
+        ("peak pressure", "peak_pressure", lambda one: labels.quantity(one.peak_pressure, "Pa", 3)),
+    ]  # fmt: skip
+    return [
+        (title, shown)
+        for title, entry, shown in columns
+        if any(np.isfinite(getattr(one, entry)) for one in found)
+    ]
+
+
+def _in_degrees(angle: float) -> str:
+    return f"{np.degrees(angle):.0f} deg" if np.isfinite(angle) else "–"
+
+
 def degrees(one: Bearing) -> str:
     """Return the crank angle of the peak in words, a dash where no stored instant has it."""
     known = np.isfinite(one.angle) and not one.between_instants and one.peak > 0.0
@@ -157,6 +182,11 @@ def averaged(response: xr.Dataset) -> Booleans:
     first = int(response.attrs.get("transient_turns", 0))
     inside: Booleans = turned - turned[:1] > first - 1e-6
     return inside
+
+
+def _known(response: xr.Dataset, name: str, k: int) -> float:
+    """A number of joint k; NaN where the response has none."""
+    return float(response[name][k]) if name in response else np.nan
 
 
 def _weights(time: Array) -> Array:
