@@ -46,7 +46,7 @@ _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 # Building
 
 
-NOT_CHECKED = "not checked: no replicas were simulated (numerics.uncertainty)"
+NOT_CHECKED = "not checked: no replicas were simulated (numerics.target_error)"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 

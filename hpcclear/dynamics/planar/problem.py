@@ -16,7 +16,6 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TableDrive, TorqueDrive, split
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
@@ -221,9 +220,7 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
 
 def _rounds(scene: Scene) -> int:
     """Revolutions that a linkage without clearance goes through."""
-    averaged = scene.numerics.averaged_revolutions
-    most: int = MOST_ROUNDS if averaged == "auto" else averaged  # type: ignore[assignment]
-    return scene.numerics.transient_revolutions + most
+    return scene.numerics.transient_revolutions + scene.numerics.averaged_revolutions
 
 
 def start_states_of(scene: Scene, par: Array, points: Points | None, walk: bool = True) -> Start:
