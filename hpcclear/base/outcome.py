@@ -68,8 +68,8 @@ _TEXT = {
         "raise the drive torque, the initial speed or the flywheel inertia",
     ),
     Status.AVERAGE_CAP: (
-        "the standard error of the objective was still above its target at the last revolution allowed",
-        "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
+        "an automatic average of an earlier version was still above its target at the last revolution allowed",
+        "set numerics.target_error; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
         "the constraints of joints without clearance depend on one another at a change point (the rod is hardly longer than "
@@ -159,7 +159,7 @@ OUTCOME = np.dtype(
         (
             "objective_uncertainty",
             np.float64,
-        ),  # m, scatter over kicked copies; NaN unless asked for
+        ),  # m, its half-width: over kicked copies, or of the steady mean; NaN where nothing checked it
         ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
         (
             "peak_contact_force",

@@ -360,7 +360,7 @@ def _half_widths(samples: xr.Dataset) -> str:
     good = (samples["status"] == Status.OK).to_numpy()
     shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
     if not np.isfinite(shares).any():
-        return f"{labels.NOT_CHECKED} (numerics.uncertainty = true gives every sample one)"
+        return f"{labels.NOT_CHECKED} (numerics.target_error gives every sample one)"
     return f"median {np.nanmedian(shares):.1e}, largest {np.nanmax(shares):.1e} of f"
 
 

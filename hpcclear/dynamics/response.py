@@ -13,7 +13,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS, alone, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import alone, outcome_records, responses_told
 from hpcclear.dynamics.joint_laws import widest_contact
 from hpcclear.dynamics.parameters import Numbers, parameters
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
@@ -118,7 +118,7 @@ def simulate(
     if still:
         times, data, record = _closed_form(scene)
     else:
-        kicks = () if copy or steady is not None else _kicks(scene, checked)
+        kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
@@ -148,13 +148,6 @@ def simulate(
         labels,
         _dimensions(scene),
     )
-
-
-def _kicks(scene: Scene, checked: bool) -> tuple[int, ...]:
-    """Perturbations of the replicas beside a response."""
-    if scene.numerics.uncertainty:
-        return KICKS  # as for any sample
-    return alone(scene.numerics.rtol) if checked else ()
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:

@@ -8,7 +8,7 @@ import functools
 import os
 import platform
 import re
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from importlib import metadata
 from pathlib import Path
 
@@ -46,7 +46,7 @@ _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 # Building
 
 
-NOT_CHECKED = "not checked: no replicas were simulated (numerics.uncertainty)"
+NOT_CHECKED = "not checked: no replicas were simulated (numerics.target_error)"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 
@@ -425,6 +425,15 @@ def files_in(directory: Path) -> list[Path]:
         reason = "there is no result file in it"
         raise InputError("directory", str(directory), reason, "Name the directory a run wrote to")
     return found
+
+
+def each_in(directory: Path) -> Iterator[tuple[Path, xr.Dataset | InputError]]:
+    """Read `files_in` a directory, one after the other: what each holds, or why it cannot be read; errors as there."""
+    for path in files_in(directory):
+        try:
+            yield path, read(path)
+        except InputError as error:
+            yield path, error
 
 
 def _path(path: str | os.PathLike[str]) -> Path:

@@ -65,7 +65,7 @@ def outcome(*per_sample: str) -> Columns:
         "objective": number(per_sample, "objective", f"objective f, {MEAN_GAP.words}", required=True),
         "objective_spread": number(per_sample, "objective",
         "standard deviation of f between averaged revolutions", required=True),
-        "objective_uncertainty": number(per_sample, "objective", "how far f may be off, by stricter and kicked copies"),
+        "objective_uncertainty": number(per_sample, "objective", "half-width of f, by replicas or of its steady mean"),
         "objective_limit": number(per_sample, "objective", "95 % half-width of the limits of f as a steady mean"),
         "regime": flag(per_sample, "kind of motion"),
         "period": number(per_sample, "1", "revolutions after which the motion repeats itself"),

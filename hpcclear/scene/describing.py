@@ -59,8 +59,6 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         yield "energy balance of each sample"
     if scene.responses_asked():
         yield "mean contact forces, crank moment and slider acceleration of each sample"
-    if scene.numerics.uncertainty:
-        yield "uncertainty of each sample"
 
 
 def warnings(scene: SceneTables) -> Iterator[str]:

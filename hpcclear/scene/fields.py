@@ -177,19 +177,14 @@ class Quantity(Converted):
 
 @dataclass(frozen=True)
 class Count(Converted):
-    """A whole number within closed bounds, or one word in its place."""
+    """A whole number within closed bounds."""
 
     least: int = 0
     most: int = LARGEST_COUNT
-    word: str | None = None
 
-    def convert(self, value: Any) -> int | str:
+    def convert(self, value: Any) -> int:
         """The value; raises PydanticCustomError."""
-        if self.word is not None and value == self.word:
-            return self.word
-        remedy = f"Write a whole number from {self.least} to {self.most}" + (
-            f', or "{self.word}"' if self.word else ""
-        )
+        remedy = f"Write a whole number from {self.least} to {self.most}"
         if isinstance(value, float) and value.is_integer():
             value = int(value)
         if isinstance(value, bool) or not isinstance(value, int):
@@ -201,8 +196,7 @@ class Count(Converted):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        number = {"type": "integer", "minimum": self.least, "maximum": self.most}
-        return number if self.word is None else {"anyOf": [number, {"const": self.word}]}
+        return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
 Curve = float | tuple[tuple[float, float], ...]

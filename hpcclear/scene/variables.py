@@ -303,6 +303,14 @@ class RandomInput(NamedInput):
         if self.worn:
             return
         law = self.law  # of a plug-in found now, while it is known where its file is
+        if isinstance(law, quantiles.Uniform | quantiles.Normal):
+            low, high = law.span
+            cut = isinstance(law, quantiles.Normal) and law.reach < _LEAST_SHARE * law.deviation
+            if cut or not low < high:
+                reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
+                raise invalid(
+                    reason, "Widen it", "range" if self.range is not None else "half_width"
+                )
         if (
             isinstance(law, quantiles.Cut)
             and self.range is not None

@@ -16,7 +16,6 @@ from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import refused
@@ -232,9 +231,7 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
 
 def rounds_of(scene: Scene) -> int:
     """Revolutions that a linkage without clearance goes through."""
-    averaged = scene.numerics.averaged_revolutions
-    most: int = MOST_ROUNDS if averaged == "auto" else averaged  # type: ignore[assignment]
-    return scene.numerics.transient_revolutions + most
+    return scene.numerics.transient_revolutions + scene.numerics.averaged_revolutions
 
 
 def moves_start(path: str) -> bool:

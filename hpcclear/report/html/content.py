@@ -51,11 +51,9 @@ def read(directory: str | Path) -> Content:
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
     troubles = []
-    for path in dataset.files_in(place):
-        try:
-            one = dataset.read(path)
-        except InputError as error:
-            troubles.append(f"{path.relative_to(place)} was left out: {error.reason}.")
+    for path, one in dataset.each_in(place):
+        if isinstance(one, InputError):
+            troubles.append(f"{path.relative_to(place)} was left out: {one.reason}.")
             continue
         kind = str(one.attrs["hpcclear_kind"])
         if kind == "response":

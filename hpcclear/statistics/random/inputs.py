@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.random.distributions import Distribution
+from hpcclear.base.quantiles import Quantiles
+from hpcclear.statistics.random.rules import draw
 
 
 @dataclass(frozen=True)
@@ -14,10 +15,10 @@ class RandomVariable:
     """An input that scatters, independently of the others."""
 
     name: str
-    distribution: Distribution
+    law: Quantiles
     """Of the value, or of the offset from the design."""
     about_design: bool = False
-    """Whether the distribution is an offset added to the design variable of this name."""
+    """Whether it is an offset added to the design variable of this name."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Wiring:
         for name, one in self.random.items():
             if one.about_design != (name in self.column):
                 reason = "not a design variable" if one.about_design else "also a design variable"
-                raise InputError(name, one.distribution, reason, "set about_design to match")
+                raise InputError(name, one.law, reason, "set about_design to match")
 
     def _grouped(self) -> tuple[Group, ...]:
         """Inputs joined while they share a random source; those without any are taken together."""
@@ -111,13 +112,11 @@ class Wiring:
 
     def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Independent draws of every random input, ``(1, samples)`` each."""
-        return {
-            name: one.distribution.draw(samples, rng)[None] for name, one in self.random.items()
-        }
+        return {name: draw(one.law, samples, rng)[None] for name, one in self.random.items()}
 
     def corners(self, group: Group) -> dict[str, np.ndarray]:
         """The corners of a group's box of random inputs, as draws: an array of shape (corners,) for each input."""
-        ends = [np.array([self.random[name].distribution.support]) for name in group.sources]
+        ends = [np.array([self.random[name].law.span]) for name in group.sources]
         return dict(zip(group.sources, tensor(ends), strict=True))
 
     def places(

@@ -22,6 +22,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
+from hpcclear.statistics.random.rules import kernel_integral
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
@@ -250,10 +251,10 @@ class RobustObjective:
                 one = wiring.random[name]
                 if one.about_design:
                     about = about - design[wiring.column[name]]
-                single *= one.distribution.kernel_integral(about, length)
+                single *= kernel_integral(one.law, about, length)
                 apart = np.exp(-0.25 * ((about[:, None] - about) / length) ** 2)
                 middle = 0.5 * (about[:, None] + about)
-                double *= apart * one.distribution.kernel_integral(middle, length / sqrt(2))
+                double *= apart * kernel_integral(one.law, middle, length / sqrt(2))
             else:
                 at = wiring.fixed[name] if name in wiring.fixed else design[wiring.column[name]]
                 row = np.exp(-0.5 * ((at - about) / length) ** 2)
