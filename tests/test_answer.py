@@ -14,7 +14,8 @@ from own_engine import engine
 from hpcclear.base.objectives import OBJECTIVES
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.figures import style
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset

@@ -11,7 +11,8 @@ from scipy import stats
 from scipy.stats import qmc
 
 from hpcclear.base.errors import InputError
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene

@@ -16,7 +16,8 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.html import picture, sections
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report

@@ -10,6 +10,7 @@ from rich.table import Table
 from hpcclear.accuracy import spending
 from hpcclear.accuracy.integration import MARGIN
 from hpcclear.cli.printing import console, table
+from hpcclear.report import targets
 from hpcclear.report.figures.accuracy import AIM
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
@@ -18,6 +19,9 @@ TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     """Print every panel as a table, the cheapest settings, and where the files are."""
     out = console()
+    for text in targets.sentences(found):
+        out.print(text)
+    out.print()
     out.print(_spending(found))
     out.print(table("Cheapest way to a standard error of f, steady mean", _cheapest(found)))
     out.print(_integration(found))

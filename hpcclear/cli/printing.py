@@ -17,7 +17,8 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
