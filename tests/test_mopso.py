@@ -474,7 +474,7 @@ def test_wrong_shapes_told_are_refused():
             swarm.tell(swarm.ask(), values, np.zeros(100))
     with pytest.raises(InputError, match="constraints"):
         swarm.tell(swarm.ask(), np.zeros((100, 2)), np.zeros(99))
-    with pytest.raises(InputError, match="not those asked for"):
+    with pytest.raises(InputError, match="not the requested designs"):
         swarm.tell(swarm.ask()[::-1], np.zeros((100, 2)), np.zeros(100))
     assert swarm.iteration == 0
     swarm.tell(swarm.ask(), np.zeros((100, 2)), np.zeros(100))

@@ -87,8 +87,8 @@ def asked_width() -> int | None:
     asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
     if asked not in ("", *map(str, WIDTHS)):
         raise InputError(
-            "HPCCLEAR_VECTOR_BITS", asked, "is not a width of vectors",
-            "Set it to 256 or 512, or not at all: then the faster one is found",
+            "HPCCLEAR_VECTOR_BITS", asked, "is not a vector width",
+            "Set it to 256 or 512, or leave it unset: the faster one is then measured and used",
         )  # fmt: skip
     return int(asked) if asked else None
 

@@ -30,7 +30,7 @@ def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
         return points
     if not points:
         raise InputError(
-            "points", {}, "there is nothing to vary", "Give at least one name and its values"
+            "points", {}, "no entry is varied", "Give at least one name and its values"
         )
     columns = {
         str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()

@@ -172,11 +172,11 @@ def _refuse_nought(scene: Scene, whole: Seen) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
         raise InputError(
-            "study.objective", scene.objective.name, "is nought whatever is off",
+            "study.objective", scene.objective.name, "is zero in every variant",
             'Choose another one, such as "peak-crank-moment"',
         )  # fmt: skip
     if not known.size:
         raise InputError(
-            "effects", len(whole.objective), "every simulation of the whole scene failed",
-            "See hpcclear simulate for why",
+            "effects", len(whole.objective), "every simulation of the complete scene failed",
+            "Run hpcclear simulate to see the reason",
         )  # fmt: skip

@@ -196,8 +196,11 @@ def doubts(content: xr.Dataset) -> list[str]:
     drift = content["drift"].to_numpy()
     moving = int((drift > content.attrs["tolerance"]).sum())
     if moving:
-        text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
-        texts.append(f"{text}; raise numerics.transient_revolutions")
+        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
+        texts.append(
+            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
+            "raise numerics.transient_revolutions"
+        )
     if "sharpest" in content:
         narrow = int((content["sharpest"] > 1.0).sum())
         if narrow:

@@ -42,7 +42,7 @@ EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
 """Of an explicit step, and of an implicit one on average."""
 
 IMPLICIT = 2.5
-"""What an evaluation counts as where a sample took implicit steps, which solve for what they evaluate, eight samples abreast:
+"""Cost weight of an evaluation in implicit steps, eight samples per batch:
 by processor times 3.6 for a film, 2.1 for bristles, 2.2 in the median of 28 variants of random scenes (0.5 to 8)."""
 
 Simulate = Callable[[Scene, Points], Records]
@@ -144,8 +144,8 @@ class Trial:
                 self.kept[one.name] = error.reason
         if not self.switches:
             raise InputError(
-                "effects", None, "the scene has no effect that could be left out",
-                "See hpcclear check for what is on",
+                "effects", None, "the scene has no effect that could be disabled",
+                "Run hpcclear check to see the effects",
             )  # fmt: skip
         self._variants: dict[Variant, Off | None] = {}
         self._bare = scene.with_({"study": None})  # quick to change
@@ -203,7 +203,7 @@ class Trial:
         """
         if not 0.0 < wanted.tolerance < 1.0:
             raise InputError(
-                "--tolerance", wanted.tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
+                "--tolerance", wanted.tolerance, "is not a relative change above 0 and below 1", "Write 1%, or 0.01"
             )  # fmt: skip
         most = max(wanted.samples // self.drawn.size, 4)
         return Plan(

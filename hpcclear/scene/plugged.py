@@ -114,7 +114,7 @@ def check_trust(content: Mapping[str, Any], name: str) -> None:
     listed = ", ".join(f"{one}.py (SHA-256 {digest(text)[:12]})" for one, text in texts.items())
     raise UntrustedSource(
         "plugins.files", name,
-        f"its scene carries Python source, which is run only where --trust allows it: {listed}",
-        "Read it first; in Python use `with hpcclear.plugins.trusting()`. In a scene file of your own leave the table out: "
-        "files are read beside it",
+        f"its scene contains Python source, which runs only with --trust: {listed}",
+        "Read it first; in Python use `with hpcclear.plugins.trusting()`. In your own scene file leave the table out: "
+        "the files beside it are read",
     )  # fmt: skip

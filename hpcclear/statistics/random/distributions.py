@@ -111,8 +111,8 @@ class TruncatedNormal:
             raise InputError(
                 "lower, upper",
                 (self.lower, self.upper),
-                "hold less than 1e-9 of the normal distribution",
-                "choose limits nearer to its mean",
+                "contain less than 1e-9 of the normal distribution",
+                "choose bounds nearer to its mean",
             )
 
     @property
@@ -266,7 +266,7 @@ def piece_rule(
         If the distribution is known by its quantiles alone.
     """
     if isinstance(distribution, Tabled):
-        raise InputError("distribution", distribution, "has no density here", 'use "monte-carlo"')
+        raise InputError("distribution", distribution, "has no known density", 'use "monte-carlo"')
     low, high = distribution.support
     if isinstance(distribution, Samples):
         rules = [distribution.piece(count, *ends) for ends in zip(lower, upper, strict=True)]
@@ -389,5 +389,8 @@ def _check_limits(lower: float, upper: float) -> None:
 def _check_normal(mean: float, deviation: float) -> None:
     if not (isfinite(mean) and isfinite(deviation) and deviation > 0):
         raise InputError(
-            "mean, deviation", (mean, deviation), "no normal distribution", "give a deviation > 0"
+            "mean, deviation",
+            (mean, deviation),
+            "no normal distribution",
+            "give a standard deviation > 0",
         )

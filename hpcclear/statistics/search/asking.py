@@ -156,7 +156,7 @@ class _Met:
         """The best that was met."""
         values, objectives = self.archive.values.reshape(-1, self.objectives), self.objectives
         if size < objectives:
-            raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
+            raise InputError("size", size, f"a front of {objectives} objectives", "Request more.")
         kept = (best_subset if self.infeasible else cut)(values, size)
         if len(kept):
             kept = kept[np.lexsort(values[kept].T[::-1])]
@@ -177,7 +177,7 @@ class _Met:
         if not len(self.archive):
             return f"no feasible point in {self.evaluations} evaluations; least violation {self.least:g}"
         if np.isnan(gain):
-            text = "cannot tell whether settled: nothing feasible before the last iterations"
+            text = "convergence not known: no feasible design before the last iterations"
         else:
             word = "settled" if gain < SETTLED else "still improving, give it more iterations"
             text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
@@ -199,13 +199,13 @@ def _asked(search: Search, name: str, bounds: Array) -> Array:
     except Exception as error:
         raise raised(KEY, name, "failed in ask", error) from error
     if designs.ndim != 2 or designs.shape[1] != len(bounds):
-        reason = f"asks for an array of shape {designs.shape}, not (n, {len(bounds)})"
+        reason = f"returned an array of shape {designs.shape}, not (n, {len(bounds)})"
         raise InputError(KEY, name, reason, remedy)
     good = (designs >= bounds[:, 0]) & (designs <= bounds[:, 1])  # False for NaN
     if not good.all():
         row, column = np.argwhere(~good)[0]
         low, high = bounds[column]
-        reason = f"asks for {designs[row, column]:.9g} in variable {column + 1}, outside [{low:.9g}, {high:.9g}]"
+        reason = f"requested {designs[row, column]:.9g} in variable {column + 1}, outside [{low:.9g}, {high:.9g}]"
         raise InputError(KEY, name, reason, remedy)
     return designs
 

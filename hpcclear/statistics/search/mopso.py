@@ -5,7 +5,7 @@ to 0.1, r1 and r2 one random number each per particle. What the paper leaves ope
 setting for all problems:
 
 - **Archive**: the feasible non-dominated points met, thinned where crowded (`pareto.Archive`).
-- **Leaders** (P_g): tournaments of `tournament` archive members; the loneliest one wins.
+- **Leaders** (P_g): tournaments of `tournament` archive members; the least crowded member wins.
 - **Personal best** (P): the newest point, unless the old one dominates or equals it.
 - **Bounds**: speeds clipped at `speed_limit` of each range; a particle that leaves is put on the
   bound and that component of its velocity is reversed.
@@ -121,8 +121,8 @@ class ParticleSwarm:
             raise InputError(
                 "iterations",
                 self.iterations,
-                "the swarm has had all its iterations",
-                "Start another one with start=front.points.",
+                "the swarm has done all its iterations",
+                "Start another swarm with start=front.points.",
             )
         values, total = self._checked(designs, objectives, constraints)
         self._constrained |= bool((np.isfinite(values).all(axis=1) & (total > 0.0)).any())
@@ -155,7 +155,10 @@ class ParticleSwarm:
         particles, known = self._personal_values.shape
         if not np.array_equal(designs, self.ask()):
             raise InputError(
-                "designs", np.shape(designs), "not those asked for", "Give them as ask() did."
+                "designs",
+                np.shape(designs),
+                "not the requested designs",
+                "Give them as ask() returned them.",
             )
         if values.shape != (particles, known or np.shape(values)[-1]) or values.size == 0:
             remedy = f"Give ({particles}, {known or 'm'}) objectives."

@@ -127,7 +127,7 @@ def analyse_sobol(
             "values",
             n_dropped,
             "a simulation failed in nearly every row",
-            "look at their status, mend them, or narrow the bounds",
+            "look at their status, correct the cause, or narrow the bounds",
         )
     first, total = _indices(y)
     n_rows = y.shape[1]

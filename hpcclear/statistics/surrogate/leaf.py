@@ -182,6 +182,6 @@ def inside(
             float(points[row, column]),
             f"outside the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]; "
             "it does not extrapolate",
-            "ask inside the domain, or fit the surrogate on a wider one",
+            "evaluate inside the domain, or fit the surrogate on a wider one",
         )
     return points

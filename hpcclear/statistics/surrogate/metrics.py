@@ -99,7 +99,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
             "test points",
             true.size,
             f"accuracy needs at least two finite test values, {n_dropped} failed",
-            "take more test points or mend the failing simulations",
+            "use more test points or correct the failing simulations",
         )
     error, mean = true - predicted, float(true.mean())
     scale = float(np.abs(true).max())
@@ -165,6 +165,6 @@ def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
             "predictions",
             int(np.count_nonzero(~np.isfinite(b))),
             "some predictions are not finite",
-            "a surrogate must answer at every test point: check the points it was asked for",
+            "a surrogate must return a value at every test point: check these points",
         )
     return a, b
