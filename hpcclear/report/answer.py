@@ -3,6 +3,7 @@
 The command prints them at its end, and they head the page.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -138,7 +139,8 @@ def constraints(best: xr.Dataset) -> Iterator[str]:
     if "constraints" in best and str(best["constraints"].item()):
         for text in str(best["constraints"].item()).split("; "):
             head, _, verdict = text.rpartition(": ")
-            yield f"{head}: {VERDICTS.get(verdict, verdict)}" if head else text
+            shown = re.sub(r" (\S+) at most", r" = \1, at most", labels.statistic(head))
+            yield f"{shown}: {VERDICTS.get(verdict, verdict)}" if head else text
 
 
 def is_plain(one: xr.Dataset) -> bool:
@@ -285,10 +287,7 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
         )
         for kind, (value, error) in indices.items()
     }
-    own = (
-        "first-order Sobol indices, the share of the variance of f over the study's ranges that a variable makes by itself "
-        "(± 95 % half-width)"
-    )
+    own = "first-order Sobol indices, the share of the variance of f that a variable explains alone (± 95 % half-width)"
     if texts["total"] and "first" in texts:
         yield Line("sensitivity", f"{own}: {texts['first']}")
     if texts["total"]:

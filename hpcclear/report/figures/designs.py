@@ -99,7 +99,7 @@ def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     words = labels.statistic(words)
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
-    share = words.startswith("share ")
+    share = words.startswith("probability ")
     if len(words) > 2 * NARROW:
         words = f"{words[: 2 * NARROW - 6].rstrip()} …"
     label = unit.label(words) if of_f or share else f"{words} (SI)"

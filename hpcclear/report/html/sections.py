@@ -112,7 +112,7 @@ def readings(content: Content) -> list[object] | None:
         "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
         "ln(mean / printed mean)."
     )
-    return [words, Table(header, rows, "Readings of the paper")]
+    return [words, Table(header, rows, "Effect of ambiguities in the paper")]
 
 
 def claims(content: Content) -> list[object] | None:
@@ -122,7 +122,7 @@ def claims(content: Content) -> list[object] | None:
         return None
     verdicts = [str(verdict) for verdict in found["verdict"].to_numpy()]
     counts = [verdicts.count(verdict) for verdict in _MARKS]
-    words = (
+    held = (
         f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, {counts[1]} do not, and "
         f"{counts[2]} are undecided."
     )
@@ -135,7 +135,7 @@ def claims(content: Content) -> list[object] | None:
         badge = {"words": f"{mark} {words}", "kind": kind}
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
     header = ["claim", "verdict", "the numbers that decide"]
-    return [words, Table(header, rows, "Claims of the paper, tested on this data")]
+    return [held, Table(header, rows, "Claims of the paper, tested on this data")]
 
 
 def trust(content: Content) -> list[object] | None:
