@@ -94,7 +94,7 @@ def asked_width() -> int | None:
 
 
 def features(folder: Path) -> str | None:
-    """The processor's features as Numba is to be told them; None where there is nothing to choose.
+    """The processor's features as they are passed to Numba; None where there is nothing to choose.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ def advice(found: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def resolution(found: xr.Dataset, quantity: str = "objective") -> str:
-    """What the reference of one quantity can tell apart, in words."""
+    """What the reference of one quantity can distinguish, in words."""
     own = float(found["reference_error"].sel(quantity=quantity))
     least = float(found["error"].sel(quantity=quantity).min())
     if own * MARGIN <= least:

@@ -86,7 +86,7 @@ def _failed(content: xr.Dataset) -> str:
 
 
 def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> Table:
-    """A row a variant: what is off, changes with limits, time, verdict."""
+    """A row a variant: what is off, changes with confidence intervals, time, verdict."""
     what = f"Changes in % with effects disabled, against all enabled; tolerance {tolerance}"
     made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("off", overflow="fold")

@@ -77,7 +77,7 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     Raises
     ------
     InputError
-        If a name is unknown, a design makes no mechanism, or the scene asks for what the kernel cannot do.
+        If a name is unknown, a design makes no mechanism, or the scene requests what the kernel cannot do.
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)

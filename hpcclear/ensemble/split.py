@@ -1,8 +1,7 @@
 """A design in parts that know nothing of each other, one a job of an array, and the parts put together again.
 
-A part is a stretch of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the bytes
-that one run would have written.
-"""
+A part is an interval of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the
+bytes that one run would have written."""
 
 import re
 import time

@@ -36,7 +36,7 @@ VICINITY = 0.01
 
 DEARER = 5
 """Steps, or revolutions to a target error, that a variant may take, times the most that the whole scene took: what is so much
-dearer without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
+more expensive without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
 
 EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
 """Of an explicit step, and of an implicit one on average."""
@@ -99,7 +99,7 @@ class Drawn:
 
 
 class Wanted(NamedTuple):
-    """What a certificate has to hold to."""
+    """What an effect screening has to hold to."""
 
     tolerance: float
     """Relative change that is allowed."""
@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the certificate.
+        """What is asked of the effect screening.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class Trial:
         return Points(points.names, points.values, tuple(made.paths(row) for row in points.paths))
 
     def simulated(self, off: Variant) -> Scene:
-        """What is simulated of a variant: its scene, with limits to its cost once the whole scene's is known."""
+        """What is simulated of a variant: its scene, with bounds on its cost once the whole scene's is known."""
         scene = self.variant(off).scene
         if not off or self._evaluations == 0:
             return scene
@@ -239,7 +239,7 @@ class Trial:
             self._turns = {"numerics.target_revolutions": limit}
 
     def seen(self, asked: Asked, records: Records) -> Seen:
-        """What the certificate is told of records."""
+        """What the effect screening uses of records."""
         if not asked.off and self._evaluations == 0:
             self._limit(records)
         scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
@@ -262,7 +262,7 @@ class Trial:
         return [payload_of(self.variant(one.off).scene, self.points(one)) for one in asked]
 
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
-        """Follow the certificate to its end; raises what `simulate` does."""
+        """Follow the effect screening to its end; raises what `simulate` does."""
 
         def told(wanted: Sequence[Asked]) -> list[Seen]:
             return [

@@ -66,7 +66,7 @@ class PluginName(Converted):
 
 @contextlib.contextmanager
 def as_invalid(key: str = "") -> Iterator[None]:
-    """Where a validator asks for a plug-in: what is wrong with that as an error of the entry."""
+    """Where a validator requests a plug-in: what is wrong with that as an error of the entry."""
     try:
         yield
     except InputError as error:

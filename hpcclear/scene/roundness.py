@@ -33,7 +33,7 @@ class Waves(Table):
     sine_8: Wave = 0.0
 
     def given(self) -> int:
-        """The number of the last wave that is not nought."""
+        """The number of the last wave that is not zero."""
         found = [
             n for n in range(1, MOST_WAVES + 1)
             if getattr(self, f"cosine_{n}") or getattr(self, f"sine_{n}")

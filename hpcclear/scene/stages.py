@@ -256,7 +256,7 @@ class Verification(Table):
 
     @property
     def draws(self) -> int | None:
-        """Independent draws of a design; None for scrambled Sobol sequences."""
+        """Independent draws of a design; None for randomised Sobol sequences."""
         return (
             None
             if self.method in (None, "qmc") and self.samples is None

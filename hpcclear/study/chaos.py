@@ -24,7 +24,8 @@ SAME = 1e-4
 
 
 def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
-    """Deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where all failed.
+    """Standard deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where
+    all failed.
 
     Raises
     ------
@@ -48,7 +49,8 @@ def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
 
 
 def split(pairs: np.ndarray) -> tuple[float, float, float]:
-    """Deviation within pairs, its share of the variance, share of pairs that differ, from values (n, 2), NaN where failed."""
+    """Standard deviation within pairs, its share of the variance, share of pairs that differ, from values (n, 2), NaN where
+    failed."""
     good = pairs[np.isfinite(pairs).all(axis=1)]
     if len(good) < 4:
         return np.nan, np.nan, np.nan

@@ -190,7 +190,8 @@ def surrogate_figure(found: xr.Dataset) -> "Figure":
 
 @style.drawn
 def random_inputs_figure(found: xr.Dataset) -> "Figure":
-    """Error of mean and deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's bias."""
+    """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
+    bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
     for row, moment in enumerate(found["moment"].to_numpy()):
         here = found.sel(moment=moment)

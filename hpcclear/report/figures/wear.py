@@ -62,7 +62,7 @@ def fan_figure(wear: xr.Dataset) -> "Figure":
 
 @style.drawn
 def survival_figure(wear: xr.Dataset) -> "Figure":
-    """Share of lives that are not over against revolutions, with 95 % limits.
+    """Share of lives that are not over against revolutions, with 95 % confidence intervals.
 
     Of a dataset of kind ``wear``.
 

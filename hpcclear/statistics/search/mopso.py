@@ -43,7 +43,7 @@ BROKEN_ANEW = 0.3
 
 
 class ParticleSwarm:
-    """A particle swarm that asks for points to evaluate and is told their objectives.
+    """A particle swarm that requests points to evaluate and receives their objectives.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class ParticleSwarm:
 
     @property
     def done(self) -> bool:
-        """Whether all iterations have been told."""
+        """Whether all iterations are done."""
         return self.iteration >= self.iterations
 
     def ask(self) -> Array:
@@ -101,12 +101,12 @@ class ParticleSwarm:
         return self._points(self._positions)
 
     def tell(self, designs: ArrayLike, objectives: ArrayLike, constraints: ArrayLike) -> None:
-        """Take the objectives of the designs asked for and move the swarm on.
+        """Take the objectives of the designs requested and move the swarm on.
 
         Parameters
         ----------
         designs : array_like, shape (n, d)
-            All that were asked for, in their order.
+            All that were requested, in their order.
         objectives : array_like, shape (n, m)
             Minimised; a row with a number that is not finite is infeasible.
         constraints : array_like, shape (n,)

@@ -71,7 +71,7 @@ Search = Generator[Array, Array, SurfaceSearch]
 def fit_until_accepted(
     evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]], searches: Sequence[Search]
 ) -> list[SurfaceSearch]:
-    """Carry out searches side by side: what all of them ask for is evaluated at once, round by round.
+    """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The paper's twelve claims on our own data: each holds, does not hold, or cannot be told.
+"""The paper's twelve claims on our own data: each holds, does not hold, or undecided.
 
 A difference counts when it is larger than `SURE` standard errors. A claim of several parts holds
-when each part does, and does not hold when one part is refuted; otherwise it cannot be told.
+when each part does, and does not hold when one part is refuted; otherwise it is undecided.
 """
 
 import itertools
@@ -237,8 +237,8 @@ class ResponseEvidence:
 
 
 def _reach(values: Array) -> float:
-    """Half-width of the limits of a mean over copies and their stretches, (copies, stretches): Student's t of the copies
-    where they disagree, of the stretches where motion is regular and copies are one."""
+    """Half-width of the limits of a mean over copies and their intervals, (copies, intervals): Student's t of the copies
+    where they disagree, of the intervals where motion is regular and copies are one."""
     reaches = [
         student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))
         for x in (values.mean(axis=1), values.mean(axis=0))
