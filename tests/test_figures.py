@@ -52,7 +52,7 @@ PLAIN = {
 
 
 def _loaded() -> xr.Dataset:
-    """Every entry of the energy ledger is there."""
+    """Every entry of the energy balance is there."""
     made = data.response()
     for name in ("load_work", "potential_energy"):
         made[name] = made[name].copy(data=made["kinetic_energy"].to_numpy())

@@ -94,12 +94,12 @@ BROKEN = {
     "a drive that stands": (
         lambda: replace(BASE, drives=(ConstantSpeed("motor", "crank", 0.0),)),
         "drives.motor.speed",
-        "nothing would turn",
+        "there would be no motion",
     ),
     "a torque at rest": (
         lambda: replace(BASE, drives=(TorqueDrive("motor", "crank", 1.0, 0.0),)),
         "drives.motor.initial_speed",
-        "nothing would turn",
+        "there would be no motion",
     ),
     "no mass": (with_body("coupler", mass=0.0), "bodies.coupler.mass", "has a mass"),
     "no inertia": (with_body("rocker", inertia=0.0), "bodies.rocker.inertia", "has an inertia"),

@@ -140,7 +140,7 @@ def test_tables_are_read_into_data_and_assembled():
         ("joints.o2.journal", "crank.c", "joints.o2.journal", "no point"),
         ("drives", {}, "drives", "nothing drives"),
         ("drives.motor.body", "piston", "drives.motor.body", "no such body"),
-        ("drives.motor.speed", 0, "drives.motor.speed", "nothing would turn"),
+        ("drives.motor.speed", 0, "drives.motor.speed", "there would be no motion"),
         ("loads.weight.place", "coupler", "loads.weight.place", "no point"),
         ("loads.band.kind", "rubber", "loads.band.kind", "spring"),
         ("bodies.extra", {"mass": 1.0}, "bodies.extra.inertia", "inertia"),

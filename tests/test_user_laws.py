@@ -182,7 +182,7 @@ def force(depth, stiffness):
     return stiffness * depth**1.5 * math.erf(1.0)
 Bad = ContactLaw(words="", force=force)
 """,
-        "which the lanes do not have",
+        "which the kernel does not provide",
     ),
     "what nobody gives": (
         """

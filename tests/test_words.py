@@ -24,6 +24,8 @@ FILES = (
     "docs/performance.md",
     "docs/questions.md",
     "docs/reading-the-accuracy-figure.md",
+    "docs/checks.md",
+    "docs/theory.md",
     "docs/tutorial.md",
     "docs/validation.md",
     "docs/how-to/accuracy.md",

@@ -246,7 +246,7 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
     if study is None or not study.worn:
         return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
     if error is not None:
-        reason = "lives of worn joints are followed at the settings of the file"
+        reason = "service lives are simulated at the settings of the file"
         remedy = "Leave it out, and set wear.tolerance and wear.copies"
         raise InputError("--error", error, reason, remedy)
     return ()

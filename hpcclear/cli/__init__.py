@@ -70,7 +70,7 @@ def _check_words(words: Sequence[str]) -> None:
     """Raise UsageError where a word is no text: it would have to stand in result files, which hold text only."""
     for word in words:
         if not word.isascii() and word != word.encode("utf-8", "replace").decode():
-            raise click.UsageError(f"{word!r} is no text in UTF-8. Choose another name")
+            raise click.UsageError(f"{word!r} is not UTF-8 text. Choose another name")
 
 
 def _refused(error: click.ClickException) -> int:

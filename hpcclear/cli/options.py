@@ -40,7 +40,7 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
     if path is not None and path.suffix.lower() not in ENDINGS:
         other = path.with_suffix(".nc")
         raise click.BadParameter(
-            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}; "
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Write {str(other)!r}; "
             f"in Python xarray.open_dataset({str(other)!r}).to_dataframe() makes a table of it"
         )
     return path
@@ -173,7 +173,7 @@ def place_of(output: Path) -> Path:
 def check_free(path: Path) -> None:
     """Raise InputError if something is there: what a user wrote is not written over."""
     if path.exists():
-        raise InputError("file", str(path), "is there already", "Choose another name")
+        raise InputError("file", str(path), "exists already", "Choose another name")
 
 
 def is_root() -> bool:

@@ -17,7 +17,8 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
@@ -250,6 +251,11 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
+def counted(ranks: int) -> str:
+    """A number of ranks in words."""
+    return f"{ranks} rank{'' if ranks == 1 else 's'}"
+
+
 def _all(count: int, each: float) -> str:
     """Number of samples and their time on one core; `each`: s."""
     return f"{count} samples, {duration(count * each)} of one core"
@@ -305,7 +311,7 @@ def describe_study(place: Path) -> None:
     spent = np.sum(
         [timing[name].sum("stage") for name in ("busy", "idle", "compile", "write")], axis=0
     )
-    lines.append(("run time", f"{duration(float(spent.max()))} on {timing.sizes['rank']} ranks"))
+    lines.append(("run time", f"{duration(float(spent.max()))} on {counted(timing.sizes['rank'])}"))
     out.print(table("Result", lines))
     out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
 
@@ -338,15 +344,15 @@ def describe_samples(found: "Finished") -> None:
     rows.append(
         (
             "no lift-off",
-            f"{latched} samples in which a joint stayed in contact for a whole revolution",
+            f"{latched} samples, a joint in contact for a whole revolution",
         )
     )
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
-        throughput = f"{len(f) / busy.sum():.0f} samples a second and core"
+        throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
         if evaluations:  # without play there is nothing to integrate
-            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation"
+            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
         rows.append(("throughput", throughput))
     out.print(table("Samples", rows + _load(found)))
     for what, path in (("samples", found.output), ("timing", found.timing)):
@@ -355,7 +361,7 @@ def describe_samples(found: "Finished") -> None:
 
 
 def _half_widths(samples: xr.Dataset) -> str:
-    """Median and largest half-width of f over f, or that there is none."""
+    """Median and largest half-width of f over f, or "not checked"."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
     good = (samples["status"] == Status.OK).to_numpy()
     shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
@@ -374,11 +380,11 @@ def describe_map(found: "Finished") -> None:
         if count and regime is not Regime.UNJUDGED:
             rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    told = [f"{n} of {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
-    rows.append(("periods", ", ".join(told) or "none found"))
+    told = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    rows.append(("period, revolutions", ", ".join(told) or "none found"))
     growth = content["kick_growth"].to_numpy()[good]
     if len(growth):
-        text = f"{growth.min():.3g} to {growth.max():.3g} a revolution"
+        text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
         rows.append(("largest Lyapunov exponent", text))
     out.print(table("Map", rows + _load(found)))
     out.print(f"map      {found.output}")

@@ -141,7 +141,7 @@ def validity(response: xr.Dataset) -> str:
 def share(contact: float) -> str:
     """Return a share of the time in words; a share that is not 0 or 1 is never rounded to it."""
     if not np.isfinite(contact):
-        return "nan"
+        return "–"
     if contact in (0.0, 1.0):
         return f"{contact:.0%}"
     return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"

@@ -173,7 +173,7 @@ def variable_name(name: str, kind: str = "samples") -> str:
         reason = "a name consists of letters, digits and underscores, a letter first"
         raise InputError("study.variables", name, reason, "Choose another name")
     if plain in KINDS[kind].data or plain in KINDS[kind].coords:
-        reason = "a result is called so"
+        reason = "a result has this name"
         raise InputError("study.variables", name, reason, "Choose another name")
     return plain
 
@@ -439,7 +439,9 @@ def each_in(directory: Path) -> Iterator[tuple[Path, xr.Dataset | InputError]]:
 def _path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if "\0" in text:
-        raise InputError("file", text, "a path holds no NUL character", "Choose another name")
+        raise InputError(
+            "file", text, "a path cannot contain a NUL character", "Choose another name"
+        )
     return Path(text)
 
 

@@ -273,7 +273,7 @@ class Lock:
     def _refusal(self, holder: Holder | None) -> InputError:
         who = f"{holder} holds it" if holder is not None else "another run is taking it"
         remedy = (
-            f"Wait for that run or stop it. If it is gone for certain, remove {self.path} "
+            f"Wait for that run or stop it. If no run is active any more, remove {self.path} "
             "and run the command again"
         )
         return InputError("output", str(self.path.parent), f"{who}", remedy)

@@ -19,7 +19,7 @@ class Contact(LawTable):
     geometry: str | None = None
     """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner" or "power"."""
     minimum_impact_speed: Speed = 1e-3
-    """Floor of the latched impact speed, m/s."""
+    """Lower bound of the impact velocity in the damping, m/s."""
     force: str | None = None
     """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
     units: dict[str, str] | None = None

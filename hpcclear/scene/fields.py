@@ -37,7 +37,7 @@ def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> Pyd
 def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
     """An error for validators unless just one of the two is given; `key` is that of `value`."""
     if (value is None) == (other is None):
-        raise invalid("is given twice, or not at all", remedy, key=key, value=value)
+        raise invalid("is given twice or not at all", remedy, key=key, value=value)
 
 
 def check_table(data: Any) -> None:
@@ -122,7 +122,7 @@ class Quantity(Converted):
         if not math.isfinite(number):
             raise invalid("the number must be finite", self._remedy())
         if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
-            raise invalid("the number is of no physical size", self._remedy())
+            raise invalid("the number is outside the physical range", self._remedy())
         return number
 
     def holds(self, value: Any) -> Any:
@@ -200,8 +200,8 @@ class Count(Converted):
 
 
 Curve = float | tuple[tuple[float, float], ...]
-"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn,
-a monotone cubic between: no higher than the higher of two rows, no lower than the lower."""
+"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn. Between two rows lies a monotone
+cubic."""
 
 
 _ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -299,8 +299,8 @@ class MotionTable(Converted):
         gained = pairs[-1][1] - pairs[0][1]
         if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
             raise invalid(
-                f"the last angle is {gained:.6g} rad from the first, and the motion repeats there",
-                "Let it end where it began, or a turn further on or back",
+                f"the last angle is {gained:.6g} rad from the first, but the motion repeats there",
+                "End it where it began, or a full turn further on or back",
             )
         return pairs
 

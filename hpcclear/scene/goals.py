@@ -1,4 +1,4 @@
-"""What a case asks of a design: statistics of f over its random inputs, or a formula, made small or kept below a limit."""
+"""Objectives and constraints of a case: statistics of f over its random inputs, or formulas, minimised or bounded."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -40,7 +40,9 @@ class Goal(Table):
                     str(error), "Write, say, m2 + m3", "formula", self.formula[:80]
                 ) from None
         if self.statistic == "exceedance" and self.limit is None:
-            raise invalid("what is exceeded is not said", "Add limit, a value of f", "limit", None)
+            raise invalid(
+                "the threshold is missing", "Add limit, the threshold of f", "limit", None
+            )
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)

@@ -1,6 +1,6 @@
 """Tables of the scene that name a law: what entries they have, the law says.
 
-Laws are found by name at the door of their plug-ins; no floor above is imported here.
+Laws are found by name in the registry of plug-ins; no higher layer is imported here.
 """
 
 import contextlib
@@ -250,7 +250,7 @@ class LawTable(Table):
         return dict(self.__pydantic_extra__ or {})
 
     def value(self, name: str) -> Any:
-        """That of one parameter; None of one that the law has not."""
+        """Return the value of one parameter; None if the law does not have it."""
         return self.values().get(name)
 
     @classmethod

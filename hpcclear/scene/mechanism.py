@@ -66,7 +66,7 @@ class Mechanism(Table):
     def _assembles(self) -> "Mechanism":
         if self.crank.bending is not None:
             raise invalid(
-                "the drive turns the crank, which clamps it, and modes are those of pinned ends",
+                "the drive clamps the crank, but the modes are those of pinned ends",
                 "Leave it out, or let the rod bend",
                 key="crank.bending",
                 value=None,
@@ -76,7 +76,7 @@ class Mechanism(Table):
             beside = f" and the offset ({offset:g} m)" if offset else ""
             raise invalid(
                 f"the rod must be longer than the crank ({self.crank.length:g} m){beside}, "
-                "or the crank cannot turn round",
+                "or the crank cannot rotate",
                 "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
                 key="rod.length",
                 value=self.rod.length,
@@ -153,7 +153,7 @@ def length_path(joint: Any) -> str | None:
 
 
 def check_journal(joint: Any) -> None:
-    """An error for validators unless a journal is left in a joint with clearance, and its film and waves fit the play."""
+    """Refuse a joint whose clearance leaves no journal, or whose film or waves exceed the clearance."""
     clearance, radius = joint.clearance, joint.bearing_radius
     if clearance >= radius:
         raise invalid(
@@ -199,7 +199,7 @@ class ClearanceJoint(Table):
 
 
 class IdealJoint(Table):
-    """A pin without play."""
+    """A pin without clearance."""
 
     kind: Literal["ideal"]
 
@@ -222,7 +222,7 @@ Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
 class Joints(Table):
-    """The two joints that may have play; the crank-frame joint is ideal."""
+    """The two joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
     """O12."""

@@ -33,7 +33,7 @@ class Points:
             or len(self.paths) != len(self.names)
         ):
             raise InputError(
-                "points", values.shape, "one column a name is needed", "Give an (n, d) array"
+                "points", values.shape, "one column per name is needed", "Give an (n, d) array"
             )
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
@@ -130,4 +130,4 @@ def _refuse(
     if bad.any():
         row = int(np.argmax(bad))
         key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or mend that row")
+        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")

@@ -90,7 +90,12 @@ def latin_hypercube(
     study = scene.required_study
     count = study.samples if samples is None else samples
     if count < 1:
-        raise InputError("samples", count, "a design needs at least one point", "Ask for 1 or more")
+        raise InputError(
+            "samples",
+            count,
+            "a design of experiments needs at least one point",
+            "Request 1 or more",
+        )
     region = box(scene, names, widen)
     rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
@@ -116,7 +121,7 @@ def _chances(
     first, count = span
     if stratified:
         if first:
-            raise InputError("first", first, "a Latin hypercube has no parts", "Begin at 0")
+            raise InputError("first", first, "a Latin hypercube cannot be divided", "Begin at 0")
         rng = generator(seed, f"stratified {purpose}")
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
     if scrambling is None:
@@ -177,7 +182,7 @@ def monte_carlo(
     count = study.samples if samples is None else samples
     if count < 1 or first < 0:
         reason = "at least one sample, from index 0 on, is needed"
-        raise InputError("samples", count, reason, "Ask for 1 or more")
+        raise InputError("samples", count, reason, "Request 1 or more")
     inputs = {row.name: row for row in study.random}
     chosen = _known("random", inputs if random is None else random, inputs)
     fixed = (
@@ -270,7 +275,7 @@ def _uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Arra
 
 
 SOBOL_BITS = 30
-"""Digits of a point of a Sobol sequence; a sequence has as many points as they can tell apart."""
+"""Digits of a point of a Sobol sequence; a sequence has as many points as they can represent."""
 
 
 def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
@@ -304,7 +309,7 @@ _PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
 
 
 class MonteCarloPoints:
-    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
+    """The study's Monte Carlo points by index, generated on request and not stored.
 
     Parameters
     ----------

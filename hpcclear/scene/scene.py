@@ -61,7 +61,7 @@ class Scene(SceneTables):
             key = f"study.random.{row.name}"
             if self.wear is None:
                 raise invalid(
-                    "the scene does not say what lives to follow",
+                    "the scene has no [wear] table",
                     "Add [wear], as in jobs/worn_study.toml", key, "wear",
                 )  # fmt: skip
             for path in row.paths:

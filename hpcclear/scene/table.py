@@ -92,7 +92,7 @@ def csv_lines(path: Path, what: str = "table of points") -> list[tuple[int, list
     lines = [(line, cells) for line, cells in lines if any(cells)]  # not of blanks alone
     if len(lines) < 2:
         remedy = "Write a row of names, then a row for each point or value"
-        raise InputError(what, str(path), "holds no points", remedy)
+        raise InputError(what, str(path), "contains no points", remedy)
     return lines
 
 
@@ -101,7 +101,7 @@ def _short_lines(stream: TextIO, path: Path) -> Iterator[str]:
     while line := stream.readline(LONGEST_LINE + 1):
         if len(line) > LONGEST_LINE:
             reason = f"a line has more than {LONGEST_LINE} characters"
-            raise InputError("table of points", str(path), reason, "Write a line for each point")
+            raise InputError("table of points", str(path), reason, "Write one line per point")
         yield line
 
 
@@ -124,7 +124,7 @@ class _Column:
         for path in self.paths:
             if not quantities()[path].holds(value):
                 reason = f"must be {quantities()[path].bounds()}"
-                raise InputError(where, cell, reason, "Mend the value or the unit of its column")
+                raise InputError(where, cell, reason, "Correct the value or the unit of its column")
         return value
 
 

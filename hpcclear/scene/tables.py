@@ -57,7 +57,7 @@ class SceneTables(Table):
     @classmethod
     def _version_is_a_number(cls, value: Any) -> Any:
         if isinstance(value, bool):  # equal to 1 in Python
-            raise invalid("true or false is no version", "Write format_version = 1")
+            raise invalid("true or false is not a version", "Write format_version = 1")
         return value
 
     @model_validator(mode="before")
@@ -147,7 +147,7 @@ class SceneTables(Table):
             )
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
-                "friction acts in joints with clearance, and all joints are ideal",
+                "friction acts in joints with clearance, but all joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
                 key="effects.friction.law",
                 value=self.effects.friction.law,
@@ -164,7 +164,7 @@ class SceneTables(Table):
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
             raise invalid(
-                f"joint {oiled[0]} carries oil, and a film is that of round surfaces",
+                f"joint {oiled[0]} has an oil film, which needs round surfaces",
                 'Set it to "uniform", or remove the film',
                 key="wear.profile",
                 value=self.wear.profile,
@@ -178,7 +178,7 @@ class SceneTables(Table):
         for joint in chosen:
             if joint not in clearance:
                 raise invalid(
-                    f"{joint} is no joint with clearance of this scene",
+                    f"{joint} is not a joint with clearance of this scene",
                     nearest(joint, clearance),
                     key=key,
                 )
@@ -193,7 +193,7 @@ class SceneTables(Table):
             )
         if chosen and self.numerics.target_error is not None:
             raise invalid(
-                "limits of a steady mean are known for the gaps of all joints only",
+                "the confidence interval of a steady mean exists for the gaps of all joints only",
                 "Leave out the joints, or numerics.target_error",
                 key=key,
             )

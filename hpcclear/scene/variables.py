@@ -217,21 +217,23 @@ class RandomInput(NamedInput):
     (`about_design = false`)."""
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
-        "file": ("files are read where a scene is loaded, and this came another way",
+        "file": ("files are read only where a scene is loaded from a file",
                  "Give values = [...]"),
-        "column": ("says which column of a file is meant, and there is none", "Add file = ..."),
+        "column": ("names a column, but there is no file", "Add file = ..."),
     }  # fmt: skip
 
     distribution: str
-    """Its law; "samples" are measured values, "wear" takes the clearances of the lives of `[wear]`. Besides those of this list
-    any continuous one of scipy.stats, "scipy:weibull_min" say, that of an installed package, or "module:Name" of a file."""
+    """The distribution. "samples" are measured values; "wear" uses the clearances of the service lives of `[wear]`. Further
+    ones: any continuous one of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a
+    file."""
     range: Range | None = None
-    """Bounds of a "uniform" or "beta" distribution; where others are cut off. SI."""
+    """Bounds of a "uniform" or "beta" distribution; truncation of others. SI."""
     mean: float | None = None
-    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; left out, the distribution lies about the value of the
-    design. Of "lognormal" its mean, before it is cut off."""
+    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the
+    design. Of "lognormal" its mean, before truncation."""
     half_width: float | None = None
-    """Of "uniform", "truncated-normal" and "beta", SI; of "wear", how far new clearances lie about the scene's, uniform."""
+    """Of "uniform", "truncated-normal" and "beta", SI; of "wear", that of the uniform distribution of new clearances about
+    the scene's."""
     deviation: float | None = None
     """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
     shapes: tuple[float, float] | None = None
@@ -299,7 +301,9 @@ class RandomInput(NamedInput):
 
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
-            raise invalid("a lognormal has a mean above 0", "Mend it, or use another", "mean")
+            raise invalid(
+                "a lognormal has a mean above 0", "Correct it, or use another distribution", "mean"
+            )
         if self.worn:
             return
         law = self.law  # of a plug-in found now, while it is known where its file is
@@ -319,8 +323,8 @@ class RandomInput(NamedInput):
             below, above = law.chances
             if above - below < _LEAST_SHARE:
                 raise invalid(
-                    f"holds less than {_LEAST_SHARE:g} of the distribution",
-                    "Choose limits where its values are",
+                    f"contains less than {_LEAST_SHARE:g} of the distribution",
+                    "Choose bounds around its values",
                     "range",
                 )
 
@@ -333,7 +337,7 @@ class RandomInput(NamedInput):
 
     @property
     def worn(self) -> bool:
-        """Whether lives of worn joints have to be followed before its values are known."""
+        """Whether its values are known only after a wear simulation."""
         return self.distribution == "wear"
 
     @cached_property
@@ -343,7 +347,7 @@ class RandomInput(NamedInput):
         Raises
         ------
         InputError
-            Only lives of worn joints can tell.
+            Only a wear simulation gives its values.
         """
         form = form_of(self.distribution, self.parameters or {})
         return form.law(self.model_dump(exclude_none=True))

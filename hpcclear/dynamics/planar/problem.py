@@ -68,8 +68,8 @@ def _check_followed(scene: Scene, follow: str) -> None:
     if name == "slider-acceleration-deviation" and (point or not follow):
         raise InputError(
             "study.objective", name,
-            "a point is followed here" if point else "no body slides along a line of the ground here",
-            'Take "point-acceleration-deviation"' if point else 'Take another one, say "peak-contact-force"',
+            "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
+            'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
     if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
         raise InputError(
@@ -138,7 +138,7 @@ def check_columns(scene: Scene, points: Points | None) -> None:
                 continue  # noughts of a round surface may be varied
             if path not in known and _in_tables(scene, path) and scene.number(path) == 0.0:
                 raise InputError(
-                    name, 0.0, f"drives {path}, which is nought in this scene: nothing is there to be varied",
+                    name, 0.0, f"drives {path}, which is zero in this scene and cannot be varied",
                     "Give it a small value in the scene, or make it a variable of the study",
                 )  # fmt: skip
 

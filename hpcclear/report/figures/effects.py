@@ -92,7 +92,7 @@ def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
 
 
 def told_apart(content: xr.Dataset) -> list[str]:
-    """Pairs whose change of f is surely not the sum of the two, a sentence each."""
+    """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
     off = content["off"].to_numpy()
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
     found = []
@@ -116,7 +116,7 @@ def told_apart(content: xr.Dataset) -> list[str]:
 def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Figure":
     """A bar an effect: change of f with its limits on a logarithmic scale, and beside it the time that it takes.
 
-    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is told by evaluations.
+    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
     """
     off = effects["off"].to_numpy()
     seconds = seconds_of(timing)

@@ -133,7 +133,8 @@ def objective(content: xr.Dataset) -> str:
 
 def statistic(words: str) -> str:
     """A statistic of f as files name it, in the words that are printed."""
-    return re.sub(r"^deviation of f", "standard deviation of f", words)
+    words = re.sub(r"^deviation of f", "standard deviation of f", words)
+    return re.sub(r"^share with f above", "probability of f above", words)
 
 
 def design_variables(content: xr.Dataset) -> list[xr.DataArray]:

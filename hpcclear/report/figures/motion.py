@@ -15,7 +15,7 @@ TURN = 2.0 * np.pi
 def check_some(responses: Collection[object], remedy: str) -> None:
     """InputError unless there is a response to draw."""
     if not responses:
-        raise InputError("responses", 0, "there is nothing to draw", remedy)
+        raise InputError("responses", 0, "there is no response to draw", remedy)
 
 
 def phase(response: xr.Dataset) -> Array:

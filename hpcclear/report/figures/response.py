@@ -123,7 +123,7 @@ def spectrum_figure(
 
 @style.drawn
 def energy_figure(response: xr.Dataset) -> "Figure":
-    """Energy ledger: what drive and loads put in and what is lost since the start, what is stored, what is left unexplained.
+    """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual.
 
     Of a dataset of kind ``response``.
     """

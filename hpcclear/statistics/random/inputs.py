@@ -74,7 +74,7 @@ class Wiring:
             raise InputError("design_names", design_names, "empty", "name the design variables")
         used = {source for name in self.names for source in self._sources(name)}
         for name in used - self.column.keys() - self.random.keys() - self.fixed.keys():
-            raise InputError(name, None, "the surrogate needs it and nothing gives it", "fix it")
+            raise InputError(name, None, "the surrogate needs it, but it has no value", "fix it")
         for name in [*self.column, *self.random, *self.derived]:
             if name not in used and name not in self.names:
                 raise InputError(name, None, "the surrogate does not depend on it", "leave it out")

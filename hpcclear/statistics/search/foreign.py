@@ -84,7 +84,7 @@ class Pymoo:
         return np.clip(lower + unit * width, *self._bounds.T)
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
-        """Objectives (n, m) and violations (n,) of what was asked for, or of the first of it."""
+        """Objectives (n, m) and violations (n,) of what was requested, or of the first of it."""
         from pymoo.problems.static import StaticProblem
 
         asked, finite = self._asked[: len(designs)], np.isfinite(objectives)
@@ -98,7 +98,7 @@ class Pymoo:
 
 
 def is_algorithm(source: Any) -> bool:
-    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they are asked."""
+    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they return designs."""
     return all(hasattr(source, name) for name in ("setup", "ask", "tell"))
 
 

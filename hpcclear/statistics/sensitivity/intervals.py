@@ -189,8 +189,8 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
         raise InputError(
             "values",
             int(failed.sum()),
-            "so many simulations failed that no surface can be fitted",
-            "look at their status, mend them, or take more points",
+            "too many simulations failed to fit a surface",
+            "look at their status, correct the cause, or use more points",
         )
     return SensitivityHistory(
         intervals=design.intervals,
@@ -238,6 +238,6 @@ def _check_design(clearances: Array, settings: IntervalSettings, needed: int) ->
         raise InputError(
             "n_points",
             settings.n_points,
-            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
+            f"a surface that needs {needed} points leaves none to estimate the scatter",
             f"take at least {needed + 1}, better {2 * needed}",
         )

@@ -119,14 +119,14 @@ def check_bounds(bounds: ArrayLike) -> Array:
     """
     limits = np.asarray(bounds, float)
     if limits.ndim != 2 or limits.shape[1] != 2 or len(limits) == 0:
-        raise InputError("bounds", limits.shape, "not a table of limits", "pass shape (d, 2)")
+        raise InputError("bounds", limits.shape, "not a table of bounds", "pass shape (d, 2)")
     wrong = ~(np.isfinite(limits).all(axis=1) & (limits[:, 0] < limits[:, 1]))
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
             f"bounds[{row}]",
             limits[row].tolist(),
-            "limits must be finite and the lower one below the upper one",
+            "bounds must be finite, the lower one below the upper one",
             "swap or widen them",
         )
     return limits

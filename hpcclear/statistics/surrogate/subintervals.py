@@ -119,7 +119,7 @@ def _first_boxes(
     """The grid of subintervals to begin with, each without points."""
     if bounds.ndim != 2 or bounds.shape[1] != 2 or not (bounds[:, 0] < bounds[:, 1]).all():
         raise InputError(
-            "bounds", bounds.tolist(), "not (d, 2) with lower < upper", "mend the bounds"
+            "bounds", bounds.tolist(), "not (d, 2) with lower < upper", "correct the bounds"
         )
     dims = len(bounds)
     pieces = (1,) * dims if cuts is None else tuple(cuts)
