@@ -193,6 +193,8 @@ VERIFICATION: Columns = {
     "deviation_tolerance": number(("design",), "1", "the same of the deviation"),
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "how it stands to the constraints of its case"),
+    "constraint_excess": number(("design",), "1",
+        "by how much its estimates break the worst of them, over the threshold; at most 0 where they break none"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations whose penetration left the range of Hertz theory"),
