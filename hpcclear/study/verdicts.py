@@ -122,7 +122,7 @@ HITS = 16
 
 
 def usual(goal: Constraint) -> float:
-    """Simulations that decide a constraint of a design that is not too near its threshold; 0 for those that are no probability."""
+    """Simulations that decide a constraint of a design that is not too near its threshold; 0 of what is no probability."""
     return HITS / goal.most if goal.statistic == "exceedance" and goal.most > 0.0 else 0.0
 
 
@@ -131,7 +131,8 @@ def costs(study: Study, unit: str) -> Iterator[str]:
     settings = study.verification
     for case in study.cases:
         for goal in case.kept:
-            if not 0.0 < (rate := usual(goal)):
+            rate = usual(goal)
+            if rate == 0.0:
                 continue
             given = settings.draws or settings.most_samples
             least = without_any(goal.most, settings.confidence)
