@@ -208,6 +208,10 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
             rows.append(
                 (f"{row.name} random", text + ("" if row.absolute else " about the design"))
             )
+    if any(case.kept for case in study.cases):
+        from hpcclear.study import verdicts
+
+        rows += [("constraint", text) for text in verdicts.costs(study, scene.objective.unit)]
     for row in study.worn:
         from hpcclear.study import lives
 

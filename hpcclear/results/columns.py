@@ -195,6 +195,8 @@ VERIFICATION: Columns = {
     "deviation_tolerance": number(("design",), "1", "the same of the standard deviation"),
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "verdicts on the constraints of its case"),
+    "constraint_excess": number(("design",), "1",
+        "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation"),
     "samples": count(("design",), "number of simulations"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations with indentation outside the range of Hertz contact"),
