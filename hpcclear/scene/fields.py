@@ -18,6 +18,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from hpcclear.base.errors import nearest as nearest
 from hpcclear.scene.units import UnitError, to_si
+from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
@@ -66,7 +67,8 @@ class Table(BaseModel):
         known = tuple(cls.model_fields)
         for key in data:
             if key not in known:
-                reason, remedy = cls.elsewhere.get(key, ("is not a known key", nearest(key, known)))
+                unknown = "is not a known key", hint(key) + nearest(key, known)
+                reason, remedy = cls.elsewhere.get(key, unknown)
                 raise invalid(reason, remedy, key=key)
         return data
 
@@ -207,6 +209,10 @@ cubic."""
 _ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
 
 
+OF_FILE = {"type": "object", "title": "FileCurve"}
+"""JSON schema of a curve from a file; the schema of a scene puts that of its table in its place."""
+
+
 def _table_of_pairs(least: int) -> dict[str, Any]:
     """JSON schema of a table of at least so many pairs."""
     pair = {"type": "array", "items": _ENTRY, "minItems": 2, "maxItems": 2}
@@ -225,6 +231,11 @@ class CurveOf(Converted):
 
     def convert(self, value: Any) -> Curve:
         """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
+        if isinstance(value, Mapping) and "file" in value:
+            raise invalid(
+                "files are read where a scene is loaded, and this came another way",
+                "Load a scene with it, or give pairs [[angle, value], ...]",
+            )
         if not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
         remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...]"
@@ -247,7 +258,7 @@ class CurveOf(Converted):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {
-            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2)],
+            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2), OF_FILE],
             "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
         }
 
@@ -308,7 +319,7 @@ class MotionTable(Converted):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {
-            **_table_of_pairs(LEAST_ROWS),
+            "anyOf": [_table_of_pairs(LEAST_ROWS), OF_FILE],
             "description": "[[time in s, angle in rad], ...], until the motion repeats",
         }
 

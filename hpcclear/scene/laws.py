@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
+from hpcclear.scene.wanted import hint
 
 _HOME = "hpcclear.dynamics.laws"
 
@@ -206,7 +207,9 @@ class LawTable(Table):
             if key in others:
                 whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
                 raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
-            raise invalid("is not a known key", nearest(key, (*cls._own(), *entries)), key)
+            raise invalid(
+                "is not a known key", hint(key) + nearest(key, (*cls._own(), *entries)), key
+            )
 
     @classmethod
     def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:

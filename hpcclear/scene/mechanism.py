@@ -19,6 +19,7 @@ from hpcclear.scene.fields import (
     invalid,
 )
 from hpcclear.scene.film import Film, check_film
+from hpcclear.scene.fits import with_clearance
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
@@ -176,6 +177,10 @@ class ClearanceJoint(Table):
     """R_B, m; it stays as it is when the clearance varies."""
     length: PositiveLength | None = None
     """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
+    fit: str | None = None
+    """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
+    diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
+    """In place of `clearance`: twice that, the difference of both diameters, m."""
     bearing: Material
     journal: Material
     start_eccentricity: tuple[Length, Length] = (0.0, 0.0)
@@ -191,6 +196,8 @@ class ClearanceJoint(Table):
     def journal_radius(self) -> float:
         """R_J = R_B - c, m."""
         return self.bearing_radius - self.clearance
+
+    _in_radii = model_validator(mode="before")(with_clearance)
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":

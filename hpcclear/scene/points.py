@@ -24,6 +24,8 @@ class Points:
     """Shape (n, d): read-only, in the SI unit of each column."""
     paths: tuple[tuple[str, ...], ...]
     """Scene entries that each column drives."""
+    labels: tuple[str, ...] = ()
+    """Names of the rows, length n, where they have some."""
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64)
@@ -58,7 +60,8 @@ class Points:
     def take(self, rows: slice | ArrayLike) -> "Points":
         """Some of the points: a slice, indices or a mask."""
         chosen = rows if isinstance(rows, slice) else np.asarray(rows)
-        return Points(self.names, self.values[chosen], self.paths)
+        labels = tuple(np.array(self.labels, object)[chosen]) if self.labels else ()
+        return Points(self.names, self.values[chosen], self.paths, labels)
 
 
 def check_points(

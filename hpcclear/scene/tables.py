@@ -15,6 +15,7 @@ from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
+from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
@@ -67,6 +68,7 @@ class SceneTables(Table):
         mechanism = data.get("mechanism") if isinstance(data, Mapping) else None
         if not isinstance(mechanism, Mapping):
             return data
+        data = with_shares(with_fits_of_joints(data))
         kind = mechanism.get("kind", "slider-crank")
         for table in ("drive", "joints"):
             if kind == "planar" and table in data:

@@ -12,6 +12,7 @@ from hpcclear.base import quantiles
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
 from hpcclear.scene.distributions import OF_LIMITS, converted, form_of, is_ours
 from hpcclear.scene.fields import LONGEST_CURVE, Quantity, Table, invalid, nearest
+from hpcclear.scene.fits import Tolerance
 from hpcclear.scene.paths import described, quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
@@ -232,8 +233,8 @@ class RandomInput(NamedInput):
     """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the
     design. Of "lognormal" its mean, before truncation."""
     half_width: float | None = None
-    """Of "uniform", "truncated-normal" and "beta", SI; of "wear", that of the uniform distribution of new clearances about
-    the scene's."""
+    """Of "uniform", "truncated-normal" and "beta", SI, or a share such as "3 %" of the number it is about, where the study
+    does not vary that; of "wear", that of the uniform distribution of new clearances about the scene's."""
     deviation: float | None = None
     """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
     shapes: tuple[float, float] | None = None
@@ -247,13 +248,19 @@ class RandomInput(NamedInput):
     values: tuple[float, ...] | None = None
     """Of "samples": measured values, each with equal chance, SI; in their place `file`, a CSV table beside the scene file, and
     `column`, as its first row has it."""
+    fit: str | None = None
+    """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
+    bore: Tolerance | None = None
+    """Of "fit": how the bore is made; left out, normal within the limits of the fit, with cp = 1."""
+    pin: Tolerance | None = None
+    """Of "fit": how the pin is made; left out, normal within the limits of the fit, with cp = 1."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
     parameters: dict[str, float] | None = None
     """Of distributions from elsewhere, which may stand beside the other entries, too: shapes, loc and scale of one of scipy's;
     whatever a plug-in takes. Texts are converted to the unit of the input."""
     about_design: bool | None = None
-    """Of all but "uniform", "normal", "truncated-normal", "beta" and "wear": whether what scatters is the
+    """Of all but "uniform", "normal", "truncated-normal", "beta", "fit" and "wear": whether what scatters is the
     difference from the design's value."""
 
     @classmethod
@@ -303,6 +310,10 @@ class RandomInput(NamedInput):
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
             raise invalid(
                 "a lognormal has a mean above 0", "Correct it, or use another distribution", "mean"
+            )
+        if self.distribution == "fit" and any(not p.endswith(".clearance") for p in self.paths):
+            raise invalid(
+                "a fit gives clearances of joints only", "Correct its path", "distribution"
             )
         if self.worn:
             return
@@ -356,6 +367,7 @@ class RandomInput(NamedInput):
     def shape_words(self) -> str:
         """The distribution with its parameters, in words."""
         given = ", ".join(f"{key} = {value:g}" for key, value in (self.parameters or {}).items())
+        given = self.fit or given
         return f"{self.distribution}({given})" if given else self.distribution
 
     @property
