@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
 
 def _check_kind(
-    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool
-) -> None:
+    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool,
+    thresholds: tuple[str, ...],
+) -> None:  # fmt: skip
     """Raise InputError where options name two kinds of sampling at once."""
     if part is not None and (statistics or fresh):
         reason = "parts of samples are merged, under the names they were given"
@@ -36,6 +37,9 @@ def _check_kind(
     if statistics and points is not None:
         reason = "--statistics makes the study's Monte Carlo points on demand"
         raise InputError("--points", str(points), reason, "Drop one of the two")
+    if thresholds and statistics:
+        reason = "--statistics keeps a histogram and no samples"
+        raise InputError("--beyond", ", ".join(thresholds), reason, "Drop one of the two")
     if raw is not None and not statistics:
         reason = "without --statistics the samples are what is written"
         raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
@@ -59,11 +63,19 @@ def _check_kind(
     metavar="K/N",
     help="Simulate part K of N, for a job array. Each part has its own file; merge joins them.",
 )
+@click.option(
+    "--beyond",
+    "thresholds",
+    multiple=True,
+    metavar="[RESULT=]VALUE",
+    help='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
+)
 @with_how
 def sample(
     written: Written,
     output: Path,
     points: Path | None,
+    thresholds: tuple[str, ...],
     statistics: bool,
     raw: Path | None,
     part: str | None,
@@ -75,14 +87,16 @@ def sample(
     """
 
     def program(ranks: "Ranks") -> None:
-        _check_kind(points, statistics, raw, part, how.fresh)
+        _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
+        from hpcclear.report.spread import beyond, units_of
 
         chosen = None if part is None else Part.parse(part)
         scene, place = written.scene(), place_of(output)
+        limits = [beyond(units_of(scene.objective), words) for words in thresholds]
         if statistics:
             kept = None if raw is None else place_of(raw)
             describe_statistics(
@@ -92,7 +106,7 @@ def sample(
             found = run_sample(
                 scene, place, ranks, table=points, part=chosen, options=how.options()
             )
-            describe_samples(found)
+            describe_samples(found, limits)
 
     return on_ranks(program, how.time_limit)
 

@@ -1,11 +1,16 @@
-"""Commands that take results elsewhere: `export`."""
+"""Commands that take results elsewhere: `export`; and beside measurements: `compare`."""
 
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from hpcclear.cli.options import PATH, directory_option, of_one_process, place_of, say, show
 from hpcclear.ranks.stopping import Exit
+
+if TYPE_CHECKING:
+    from hpcclear.report.compare import Quantity
 
 FILE = click.argument("file", type=PATH)
 UNITS = click.option(
@@ -40,4 +45,79 @@ def export(file: Path, output: Path, units: tuple[str, ...]) -> int:
     return Exit.DONE
 
 
-COMMANDS = (export,)
+@click.command(short_help="Compare a response with measurements.")
+@FILE
+@click.argument("measured", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Draw both to this file (png, svg, pdf).")
+@click.option(
+    "--align",
+    type=click.Choice(["auto", "angle", "correlation", "none"]),
+    default="auto",
+    show_default=True,
+    help="Alignment in phase. By default by angle if the table has one, else by the largest correlation.",
+)
+@click.option(
+    "--name",
+    "names",
+    multiple=True,
+    metavar="COLUMN=QUANTITY",
+    help="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
+)
+@of_one_process
+def compare(
+    file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]
+) -> int:
+    """Compare a response with measured series (CSV) and print error norms in the units of the measurement.
+
+    The first column is time or crank_angle, the others are quantities as exported tables name them, such as
+    "contact_force crank_rod [kN]". The averaged revolutions are compared, continued periodically.
+
+    Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
+    """
+    from hpcclear.cli.printing import console, table
+    from hpcclear.report.compare import compare as compared
+    from hpcclear.results import dataset
+
+    pairs = (one.rpartition("=")[::2] for one in names)
+    chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
+    found = compared(dataset.read(file, "response"), measured, align, chosen)
+    out = console()
+    angular = found.axis == "angle"
+    moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
+    rows = [
+        ("measured points", str(len(found.x))),
+        ("aligned", f"{found.aligned}, shifted by {moved}"),
+        ("simulated revolutions", f"{found.revolutions} averaged ones, continued periodically"),
+    ]
+    out.print(table("Comparison", rows))
+    for one in found.quantities:
+        out.print(table(one.name, _norms(one)))
+    if output is not None:
+        from hpcclear.report import overlay_figure, save
+
+        show(f"figure   {save(overlay_figure(found), place_of(output))}")
+    return Exit.DONE
+
+
+def _norms(one: "Quantity") -> list[tuple[str, str]]:
+    """Error norms of a quantity in the unit of its measurement."""
+    from hpcclear.report.figures.compared import scale
+
+    unit, norms = scale(one.shown, one.unit), one.norms
+
+    def shown(name: str) -> str:
+        return f"{norms[name] * unit.factor:+.4g} {unit.unit}"
+
+    return [
+        (
+            "RMS error",
+            f"{shown('rms').lstrip('+')}, {norms['relative_rms']:.3g} of the measured RMS",
+        ),
+        ("largest error", shown("largest").lstrip("+")),
+        ("error of the mean", shown("mean")),
+        ("error of the peak", shown("peak")),
+        ("correlation coefficient", f"{norms['correlation']:.4f}"),
+    ]
+
+
+COMMANDS = (export, compare)

@@ -3,6 +3,7 @@
 Figures need matplotlib (the extra ``analysis``), which is imported when the first one is drawn.
 """
 
+from hpcclear.report.figures.compared import overlay_figure
 from hpcclear.report.figures.designs import comparison_figure, front_figure
 from hpcclear.report.figures.effects import effects_figure
 from hpcclear.report.figures.portraits import (
@@ -41,6 +42,7 @@ __all__ = [
     "force_polar_figure",
     "front_figure",
     "orbit_figure",
+    "overlay_figure",
     "parity_figure",
     "penetration_figure",
     "phase_figure",

@@ -63,7 +63,7 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
     Returns
     -------
     pandas.DataFrame
-        Headings are names with their units, ``peak_contact_force crank_rod (N)``; labels of joints, bodies and points
+        Headings are names with their units, ``peak_contact_force crank_rod [N]``; labels of joints, bodies and points
         follow the name. Codes are words (``status``). Failed numbers are NaN. ``attrs`` holds single values of the result by
         the same kind of heading, ``units`` and ``long_names`` by heading, ``left_out`` (variables with too many
         columns), ``scene`` and ``scene_hash``.
@@ -127,7 +127,7 @@ class _Table:
         )
         for place in product(*(range(variable.sizes[dim]) for dim in across)):
             label = " ".join(_label(self.content, d, k) for d, k in zip(across, place, strict=True))
-            heading = " ".join(part for part in (name, label, unit and f"({unit})") if part)
+            heading = " ".join(part for part in (name, label, unit and f"[{unit}]") if part)
             one = ordered.isel(dict(zip(across, place, strict=True)))
             self.units[heading], self.words[heading] = (
                 unit,
@@ -246,5 +246,5 @@ def _words(variable: xr.DataArray) -> np.ndarray:
 
 def identifier(heading: str) -> str:
     """A heading as a name of MATLAB: letters, digits and underscores, at most 63; its unit is left out."""
-    name = re.sub(r"\W+", "_", heading.rpartition(" (")[0] if heading.endswith(")") else heading)
+    name = re.sub(r"\W+", "_", heading.partition(" [")[0])
     return name.strip("_")[:63]

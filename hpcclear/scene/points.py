@@ -23,6 +23,8 @@ class Points:
     """Shape (n, d): read-only, in the SI unit of each column."""
     paths: tuple[tuple[str, ...], ...]
     """Scene entries that each column drives."""
+    sampling: str = ""
+    """How a study drew them (`Study.method`); empty for designs that somebody chose, which are no random sample."""
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64)
@@ -57,7 +59,7 @@ class Points:
     def take(self, rows: slice | ArrayLike) -> "Points":
         """Some of the points: a slice, indices or a mask."""
         chosen = rows if isinstance(rows, slice) else np.asarray(rows)
-        return Points(self.names, self.values[chosen], self.paths)
+        return Points(self.names, self.values[chosen], self.paths, self.sampling)
 
 
 def check_points(

@@ -117,6 +117,7 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("summary", "Summary", "summary.html", sections.summary),
         ("designs", f"Optimised designs{beside}", "designs.html", sections.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
+        ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
         ("loads", "Loads of the bearings", "parts.html", loads.loads),
         ("motion", "Animation", "motion.html", lambda one: one.responses or None),
         ("accuracy", "Cost of accuracy", "parts.html", costs.accuracy),
