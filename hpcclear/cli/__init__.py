@@ -43,6 +43,7 @@ _ON_RANKS = (
     scenes.check,
     ensembles.sample,
     ensembles.map_command,
+    ensembles.bifurcation,
     ensembles.wear,
     ensembles.effects,
     studies.run,

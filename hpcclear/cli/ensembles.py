@@ -164,6 +164,77 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     return on_ranks(program, how.time_limit)
 
 
+@click.command(short_help="Observe each revolution over a range of one parameter.")
+@with_scene
+@output_option("NetCDF file to write.")
+@click.option(
+    "--x",
+    "x",
+    required=True,
+    metavar="PATH=LO:HI:N",
+    help="Parameter: scene entry, bounds, number of values.",
+)
+@click.option(
+    "--observe",
+    "name",
+    default="objective",
+    show_default=True,
+    metavar="SERIES",
+    help='Series of a response, such as "contact_force o2", at the section; with max, min or mean before it, of a revolution.',
+)
+@click.option(
+    "--section",
+    default="0 deg",
+    show_default=True,
+    metavar="ANGLE",
+    help="Crank angle at which the series is taken, in rad or with a unit.",
+)
+@click.option(
+    "--transient",
+    type=click.IntRange(min=0),
+    default=60,
+    show_default=True,
+    help="Revolutions before the first one that is observed.",
+)
+@click.option(
+    "--revolutions",
+    type=click.IntRange(min=1),
+    default=60,
+    show_default=True,
+    help="Revolutions that are observed.",
+)
+@with_how
+def bifurcation(
+    written: Written,
+    output: Path,
+    x: str,
+    name: str,
+    section: str,
+    transient: int,
+    revolutions: int,
+    how: How,
+) -> int:
+    """Observe one value of each revolution over a range of an entry of the scene, for a bifurcation figure.
+
+    Where the motion repeats every n revolutions, a value has n dots. Draw it with hpcclear plot.
+
+    Example: mpiexec -n 2 hpcclear bifurcation jobs/hunt_crossley.toml --x drive.speed="500 rpm:6000 rpm:12" -o results/b.nc
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_bifurcation
+        from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
+        from hpcclear.ensemble.maps import number_of
+
+        angle = number_of("--section", section, "rad")
+        seen = Observation(name, angle, transient, revolutions)
+        describe_bifurcation(
+            run_bifurcation(written.scene(), x, place_of(output), ranks, seen, how.options())
+        )
+
+    return on_ranks(program, how.time_limit)
+
+
 @click.command(short_help="Simulate wear over the service life.")
 @with_scene
 @output_option("NetCDF file to write.")

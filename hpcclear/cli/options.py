@@ -77,6 +77,7 @@ class Amount(click.FloatRange):
         return number
 
 
+TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
 LIMIT = click.option(
     "--time-limit",

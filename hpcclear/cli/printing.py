@@ -389,3 +389,19 @@ def describe_map(found: "Finished") -> None:
         rows.append(("largest Lyapunov exponent", text))
     out.print(table("Map", rows + _load(found)))
     out.print(f"map      {found.output}")
+
+
+def describe_bifurcation(found: "Finished") -> None:
+    """Print what was observed, its range, failures and load."""
+    out, seen = console(), found.content["observed"]
+    failed = int(seen.isnull().all("crossing").sum())
+    rows = [
+        ("values", f"{seen.sizes['value'] - failed} of {seen.sizes['value']} without failure"),
+        ("observed", f"{seen.attrs['long_name']}, {seen.sizes['crossing']} revolutions each"),
+    ]
+    if failed < seen.sizes["value"]:
+        unit = str(seen.attrs["units"])
+        low, high = (quantity(float(end), unit) for end in (seen.min(), seen.max()))
+        rows.append(("range", f"{low} to {high}"))
+    out.print(table("Bifurcation", rows + _load(found)))
+    out.print(f"written  {found.output}")

@@ -6,6 +6,7 @@ Figures need matplotlib (the extra ``analysis``), which is imported when the fir
 from hpcclear.report.figures.compared import overlay_figure
 from hpcclear.report.figures.designs import comparison_figure, front_figure
 from hpcclear.report.figures.effects import effects_figure
+from hpcclear.report.figures.maps import bifurcation_figure, map_figure
 from hpcclear.report.figures.portraits import (
     force_polar_figure,
     orbit_figure,
@@ -13,7 +14,6 @@ from hpcclear.report.figures.portraits import (
     poincare_figure,
 )
 from hpcclear.report.figures.response import (
-    bifurcation_figure,
     energy_figure,
     penetration_figure,
     response_figure,
@@ -41,6 +41,7 @@ __all__ = [
     "fit_figure",
     "force_polar_figure",
     "front_figure",
+    "map_figure",
     "orbit_figure",
     "overlay_figure",
     "parity_figure",

@@ -223,7 +223,7 @@ def _series(
 ) -> tuple[str, xr.DataArray]:
     """Name and series (t,) of the quantity that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
-    found = dict(_all(response))
+    found = motion.series(response)
     match = {_plain(name): name for name in found}.get(_plain(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
@@ -232,24 +232,6 @@ def _series(
             "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
         )
     return match, found[match]
-
-
-def _all(response: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
-    """Every series (t,) of a response by its name; of joints, bodies and points by that and their label."""
-    found = []
-    for name, variable in response.data_vars.items():
-        others = [dim for dim in variable.dims if dim != "time"]
-        if "time" not in variable.dims or len(others) > 1:
-            continue
-        if not others:
-            found.append((str(name), variable))
-            continue
-        labels = [str(label) for label in response[others[0]].to_numpy()]
-        found += [
-            (f"{name} {label}", variable.isel({others[0]: k})) for k, label in enumerate(labels)
-        ]
-        found += [(str(name), variable.isel({others[0]: 0}))] if len(labels) == 1 else []
-    return found
 
 
 def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:

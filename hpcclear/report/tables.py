@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ROWS: dict[str, tuple[str, ...]] = {
     "response": ("time",),
     "samples": ("sample",),
+    "bifurcation": ("value", "crossing"),
     "sensitivity": ("surface", "interval", "clearance", "parameter"),
     "kriging": ("model", "point"),
     "front": ("case", "run", "solution"),
