@@ -8,6 +8,7 @@ import click
 
 from hpcclear.cli.options import (
     PATH,
+    TRUST,
     Written,
     check_free,
     flag,
@@ -25,8 +26,6 @@ from hpcclear.ranks.stopping import Exit
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
-
-TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 
 
 @click.command(short_help="Write a starter scene.")
@@ -143,11 +142,14 @@ def simulate(written: Written, output: Path) -> int:
 
 
 @click.command(short_help="Write figures and an HTML page.")
-@click.argument("directory", type=PATH)
+@click.argument("places", type=PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
+@click.option(
+    "-o", "--output", type=PATH, help="Page to write. Default: report.html beside the results."
+)
 @TRUST
 @of_one_process
-def report(directory: Path, trust: bool) -> int:
-    """Write figures and a self-contained HTML page from a directory of results.
+def report(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
+    """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
     Example: hpcclear report results/quickstart
     """
@@ -155,7 +157,7 @@ def report(directory: Path, trust: bool) -> int:
     from hpcclear.report.html.page import write_report
 
     with trusting(trust):
-        show(f"report  {write_report(directory)}")
+        show(f"report  {write_report(*places, output=output and place_of(output))}")
     return Exit.DONE
 
 

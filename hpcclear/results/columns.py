@@ -84,6 +84,12 @@ SAMPLES: Columns = {
     "sliding_waves": number(("sample", "wave"), "J", "sliding work of a revolution times waves of the contact's angle"),
 }
 
+BIFURCATION: Columns = {
+    "value": count(("value",), "number of the value"),
+    "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
+    "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
+}
+
 SENSITIVITY: Columns = {
     "surface": text(("surface",), "inputs of the response surface"),
     "interval": number(("interval",), "1", "interval, fraction of the range"),

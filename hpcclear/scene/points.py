@@ -26,6 +26,8 @@ class Points:
     """Scene entries that each column drives."""
     labels: tuple[str, ...] = ()
     """Names of the rows, length n, where they have some."""
+    sampling: str = ""
+    """How a study drew them (`Study.method`); empty for designs that somebody chose, which are no random sample."""
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64)
@@ -61,7 +63,7 @@ class Points:
         """Some of the points: a slice, indices or a mask."""
         chosen = rows if isinstance(rows, slice) else np.asarray(rows)
         labels = tuple(np.array(self.labels, object)[chosen]) if self.labels else ()
-        return Points(self.names, self.values[chosen], self.paths, labels)
+        return Points(self.names, self.values[chosen], self.paths, labels, self.sampling)
 
 
 def check_points(

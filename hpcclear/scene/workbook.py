@@ -26,7 +26,7 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tupl
     except ImportError:
         raise InputError(
             what, str(path), "reading an Excel workbook takes the package openpyxl",
-            "pip install 'hpcclear[excel]', or save it as CSV",
+            "pip install 'hpcclear[tables]', or save it as CSV",
         ) from None  # fmt: skip
     if len(data) > LARGEST:
         raise InputError(what, str(path), f"is larger than {LARGEST} bytes", "Save it as CSV")

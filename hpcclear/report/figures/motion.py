@@ -110,6 +110,24 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     return found
 
 
+def series(response: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Every series (t,) by its name; of joints, bodies and points by that and their label, which a single one may lack."""
+    found: dict[str, xr.DataArray] = {}
+    for key, variable in response.data_vars.items():
+        name, others = str(key), [dim for dim in variable.dims if dim != "time"]
+        if "time" not in variable.dims or len(others) > 1:
+            continue
+        if not others:
+            found[name] = variable
+            continue
+        labels = [str(label) for label in response[others[0]].to_numpy()]
+        for k, label in enumerate(labels):
+            found[f"{name} {label}"] = variable.isel({others[0]: k})
+        if len(labels) == 1:
+            found[name] = variable.isel({others[0]: 0})
+    return found
+
+
 def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
     the axis on which it moves further."""
