@@ -123,9 +123,9 @@ class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
 
     algorithm: Annotated[str, PluginName(SEARCHES)] | None = None
-    """Default "swarm"; or "pymoo:NSGA2" and others of pymoo, which `pip install 'hpcclear[pymoo]'` brings, with their own
-    settings; or "module:Name" of a Python file beside the scene, or the name that an installed package offers. Each has as many
-    evaluations: `particles` designs at a time, `iterations` times."""
+    """Default "swarm"; or "pymoo:NSGA2" and others of pymoo, which the extra `pymoo` brings (`pip install pymoo`), with
+    their own settings; or "module:Name" of a Python file beside the scene, or the name that an installed package offers.
+    Each has as many evaluations: `particles` designs at a time, `iterations` times."""
     particles: Annotated[int, Count(2, 10**6)] = 100
     """Designs that are moved at a time."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
