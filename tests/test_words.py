@@ -18,6 +18,7 @@ FILES = (
     "CONTRIBUTING.md",
     "docs/adding-an-effect.md",
     "docs/architecture.md",
+    "docs/citing.md",
     "docs/extending.md",
     "docs/glossary.md",
     "docs/index.md",

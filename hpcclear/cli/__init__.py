@@ -21,7 +21,7 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import ensembles, laws, results, scenes, studies
+from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
@@ -33,6 +33,7 @@ _ROOT_ALONE = (
     scenes.report,
     scenes.reproduce,
     scenes.crate,
+    cite.cite,
     scenes.schema,
     laws.laws,
     *results.COMMANDS,

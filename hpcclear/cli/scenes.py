@@ -34,11 +34,12 @@ if TYPE_CHECKING:
     "--four-stroke",
     "A gas force against two turns of the crank, in an engine written as a linkage.",
 )
+@flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
-def init(file: Path, four_stroke: bool) -> int:
+def init(file: Path, four_stroke: bool, jobs: bool) -> int:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
-    An existing file is never overwritten.
+    With --jobs, write the scenes and scripts that the documentation names, as a directory. Nothing is overwritten.
 
     Example: hpcclear init engine.toml --four-stroke
     """
@@ -47,12 +48,33 @@ def init(file: Path, four_stroke: bool) -> int:
     from hpcclear.results import files
 
     check_free(file)
+    if jobs:
+        _copy_jobs(file)
+        return Exit.DONE
     files.probe(place_of(file))
     name = "four_stroke.toml" if four_stroke else "starter.toml"
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
     return Exit.DONE
+
+
+def _copy_jobs(place: Path) -> None:
+    """Write the example scenes and the scripts that need no clone to a new directory."""
+    from importlib import resources
+
+    from hpcclear.results import files
+
+    with resources.as_file(resources.files(__package__).joinpath("jobs")) as source:
+        kinds = ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+        found = sorted(path for kind in kinds for path in source.glob(kind))
+        for path in found:
+            target = place / path.relative_to(source)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            files.write_bytes(target, path.read_bytes())
+    show(
+        f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
+    )
 
 
 @click.command(short_help="Validate an input file and estimate run time.")

@@ -1,10 +1,9 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
-import os
-
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
@@ -244,7 +243,7 @@ def _bytes_an_instant(part: dict[str, Array]) -> float:
 
 def _refuse_what_does_not_fit(size: float, count: int) -> None:
     """Raise InputError where time series of so many bytes would take more than `MOST` of the machine's memory."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = host.memory()
     if size > MOST * memory:
         raise InputError(
             "output.instants_per_revolution",
