@@ -14,7 +14,8 @@ from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import KICKS, alone, outcome_records, responses_told
-from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.parameters import Numbers, parameters
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
@@ -134,9 +135,10 @@ def simulate(
             _turns(scene),
             scene.numerics.interpolation,
         )
+    told = {name: dataset.at_joints(record[name], labels)[0] for name in names}
     return dataset.response_dataset(
         times,
-        {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
+        {**data, **told, **widest_contact(scene, Numbers(scene, None), told["peak_contact_force"])},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}

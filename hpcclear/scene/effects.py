@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
-from hpcclear.scene.laws import LawTable, quantity_of
+from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
 
 
 class Contact(LawTable):
@@ -16,12 +16,25 @@ class Contact(LawTable):
     formula: ClassVar[str] = "force"
     law: str
     """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
+    geometry: str | None = None
+    """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner" or "power"."""
     minimum_impact_speed: Speed = 1e-3
     """Floor of the latched impact speed, m/s."""
     force: str | None = None
     """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
     units: dict[str, str] | None = None
     """The law "expression": units of its parameters, which are further entries of this table."""
+
+    @field_validator("geometry")
+    @classmethod
+    def _sphere_is_the_default(cls, name: str | None) -> str | None:
+        return None if name == SPHERE else name
+
+    @property
+    def has_length(self) -> bool:
+        """Whether the length of each bearing is needed."""
+        shapes = getattr(self.declared, "geometry", None)
+        return shapes is not None and bool(shapes.has_length)
 
     @property
     def latched(self) -> bool:

@@ -144,6 +144,14 @@ class Material(Table):
     """Poisson's ratio."""
 
 
+def length_path(joint: Any) -> str | None:
+    """Where a joint with clearance has the length of its bearing: its own entry, or that of its film or wear."""
+    if joint.length is not None:
+        return "length"
+    parts = ("film", "wear")
+    return next((f"{part}.length" for part in parts if getattr(joint, part) is not None), None)
+
+
 def check_journal(joint: Any) -> None:
     """An error for validators unless a journal is left in a joint with clearance, and its film and waves fit the play."""
     clearance, radius = joint.clearance, joint.bearing_radius
@@ -166,6 +174,8 @@ class ClearanceJoint(Table):
     """Radial clearance c = R_B - R_J, m."""
     bearing_radius: PositiveLength
     """R_B, m; it stays as it is when the clearance varies."""
+    length: PositiveLength | None = None
+    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
     bearing: Material
     journal: Material
     start_eccentricity: tuple[Length, Length] = (0.0, 0.0)

@@ -135,6 +135,8 @@ class PlanarClearance(Table):
     """R_B - R_J, m."""
     bearing_radius: PositiveLength
     """R_B, m."""
+    length: PositiveLength | None = None
+    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
     materials: Materials
     start_eccentricity: Place = NOWHERE
     """Journal centre minus bearing centre at the start, m."""

@@ -145,7 +145,13 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
             "law": table.declared.without_loss,
             "minimum_impact_speed": table.minimum_impact_speed,
         }
-        yield Switch("contact damping", {"effects.contact": elastic}, {floor: floor})
+        kept = [floor]
+        if table.geometry is not None:
+            names = [one.name for one in table.declared.geometry.parameters]
+            elastic |= {"geometry": table.geometry} | {name: table.value(name) for name in names}
+            kept += [f"effects.contact.{name}" for name in names]
+        moved = {path: path for path in kept}
+        yield Switch("contact damping", {"effects.contact": elastic}, moved)
 
 
 def _outside(scene: Scene) -> Iterator[Switch]:

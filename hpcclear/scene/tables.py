@@ -15,7 +15,7 @@ from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
-from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance
@@ -129,6 +129,14 @@ class SceneTables(Table):
     @model_validator(mode="after")
     def _effects_fit_joints(self) -> Self:
         clearance = self.clearance_joints()
+        contact = self.effects.contact
+        if contact is not None and contact.has_length:
+            for name in clearance:
+                if length_path(self.clearance_joint(name)) is None:
+                    raise invalid(
+                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
+                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                    )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
                 "a clearance joint needs a contact law",
