@@ -113,8 +113,8 @@ def test_a_user_s_law_gives_what_an_independent_solver_gives(case, tmp_path):
 @pytest.mark.parametrize("case", CASES)
 def test_a_user_s_law_is_vectorised(case, tmp_path):
     contact, friction, *_ = CASES[case]
-    effects = problem_of(load_scene(file_with(tmp_path, contact, friction))).effects
-    found = executed_arithmetic(force_evaluation(effects, 16))
+    problem = problem_of(load_scene(file_with(tmp_path, contact, friction)))
+    found = executed_arithmetic(force_evaluation(problem, 16))
     assert found.packed.total() >= 100
     assert found.packed_share >= 0.9
 

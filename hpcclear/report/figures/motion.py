@@ -19,9 +19,12 @@ def check_some(responses: Collection[object], remedy: str) -> None:
 
 
 def phase(response: xr.Dataset) -> Array:
-    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle."""
-    name = "drive_phase" if "drive_phase" in response else "crank_angle"
-    return response[name].to_numpy()
+    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
+    way it turns."""
+    if "drive_phase" in response:
+        return response["drive_phase"].to_numpy()
+    angle = response["crank_angle"].to_numpy()
+    return -angle if angle[-1] < angle[0] else angle
 
 
 def turns(response: xr.Dataset) -> Array:
