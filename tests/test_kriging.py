@@ -255,8 +255,6 @@ def test_does_not_extrapolate(model):
         assert caught.value.value == value or np.isnan(value)
     corners = np.array([BOUNDS[:, 0], np.nextafter(BOUNDS[:, 1], np.inf)])  # round-off is forgiven
     assert np.isfinite(model.predict(corners)).all()
-    with pytest.raises(InputError, match="shape"):
-        model.predict(inside)
 
 
 def test_constant_function():
@@ -309,12 +307,6 @@ def test_failed_samples_are_dropped_and_counted(model):
         (lambda p, v, b: (p[:0], v[:0], b), "too few valid samples"),
         (lambda p, v, b: (np.where(p > 2.99, np.nan, p), v, b), "outside"),
         (lambda p, v, b: (p * 1.1, v, b), "outside"),
-        (lambda p, v, b: (p, np.where(np.arange(60) == 5, np.inf, v), b), "infinite"),
-        (lambda p, v, b: (p, v[:-1], b), "one per point"),
-        (lambda p, v, b: (p, v, b[:, ::-1]), "crossed"),
-        (lambda p, v, b: (p, v, b[:2]), "wrong shape"),
-        (lambda p, v, b: (p[:, 0], v, b), "not a table"),
-        (lambda p, v, b: (p[:, :0], v, b[:0]), "not a table"),
     ],
 )
 def test_bad_training_data_are_refused(model, change, reason):
@@ -351,18 +343,6 @@ def test_leave_one_out_is_what_fits_without_a_point_predict(either):
     cross = model._covariance(unit[[gone]], unit[left])[0]
     expected = model.mean + model.scale * cross @ alpha
     assert model.leave_one_out()[gone] == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_kernel_that_is_not_known_is_refused(model):
-    with pytest.raises(InputError, match=r"matern-5/2") as caught:
-        refit(model, kernel="matern-3/2")
-    assert caught.value.key == "kernel"
-
-
-def test_names_must_fit(model):
-    for names in (("a", "b"), ("a", "a", "b")):
-        with pytest.raises(InputError, match="distinct name"):
-            refit(model, names=names)
 
 
 # Subintervals
@@ -479,15 +459,3 @@ def test_pieces_are_deterministic_and_survive_failures():
     assert sum(leaf.dropped for leaf in first.leaves) > 0
     with pytest.raises(InputError, match="too few valid samples"):
         fit_kinked(lambda p: np.full(len(p), np.nan))
-
-
-@pytest.mark.parametrize(("changes", "key"), [({"cuts": (0, 1)}, "cuts"), ({"cuts": (2,)}, "cuts")])
-def test_bad_cuts_are_refused(changes, key):
-    with pytest.raises(InputError) as caught:
-        fit_kinked(kinked, **changes)
-    assert caught.value.key == key
-
-
-def test_evaluate_must_answer_every_point():
-    with pytest.raises(InputError, match="one value per point"):
-        fit_kinked(lambda p: p)
