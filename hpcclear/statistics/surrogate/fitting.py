@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
-from hpcclear.statistics.surrogate.kriging import FIELDS, Kriging
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
 from hpcclear.statistics.surrogate.likelihood import maximise
 
@@ -25,7 +25,6 @@ class KrigingMethod:
 
     restarts: int = 3
     kernel: Kernel = SQUARED_EXPONENTIAL
-    fields = FIELDS
 
     @property
     def label(self) -> str:

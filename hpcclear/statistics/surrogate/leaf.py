@@ -70,12 +70,8 @@ class Leaf(Protocol):
     def moments(self, points: Array) -> Array | None:
         """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2); None: those of `predict`."""
 
-    @property
-    def fields(self) -> Fields:
-        """What `to_arrays` gives."""
-
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Return the model as plain arrays, without pickle; their shapes are those of `fields`."""
+        """Return the model as plain arrays of numbers and text, of any shapes, without pickle."""
 
 
 class Method(Protocol):
@@ -84,10 +80,6 @@ class Method(Protocol):
     @property
     def label(self) -> str:
         """What it is called; empty for Kriging with the squared exponential."""
-
-    @property
-    def fields(self) -> Fields:
-        """What `Leaf.to_arrays` gives."""
 
     def fit(
         self,
