@@ -368,29 +368,6 @@ def test_support_must_stay_inside_the_domain():
     with pytest.raises(InputError, match="does not extrapolate") as caught:
         wide(place)
     assert caught.value.key == "C"
-    with pytest.raises(InputError, match="shape"):
-        objective(place[0])
-
-
-@pytest.mark.parametrize(
-    ("names", "inputs", "options", "key"),
-    [
-        ((), UNIFORM[:1], {"fixed": {"m": 1.5, "u": 0.0, "I": 3e-4}}, "design_names"),
-        (("m", "m", "u", "I"), UNIFORM, {}, "design_names, random_inputs"),
-        (DESIGN, UNIFORM + UNIFORM[:1], {}, "design_names, random_inputs"),
-        (DESIGN, UNIFORM[1:], {}, "C"),
-        ((*DESIGN, "q"), UNIFORM, {}, "q"),
-        (DESIGN, (*UNIFORM, RandomVariable("q", Uniform(0.5, 0.5))), {}, "q"),
-        (("m", "u"), UNIFORM, {"fixed": {"I": 3e-4}}, "I"),
-        ((*DESIGN, "C"), UNIFORM, {}, "C"),
-        (DESIGN, UNIFORM, {"fixed": {"m": 1.5}}, "m"),
-        (DESIGN, UNIFORM, {"derived": RATIO}, "r"),
-    ],
-)
-def test_names_that_do_not_fit_are_refused(names, inputs, options, key):
-    with pytest.raises(InputError) as caught:
-        RobustObjective(surrogate(), names, inputs, **options)
-    assert caught.value.key == key
 
 
 def test_an_input_over_many_length_scales_is_refused():

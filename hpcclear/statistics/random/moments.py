@@ -113,7 +113,7 @@ class RobustObjective:
     Raises
     ------
     InputError
-        Names that do not fit together, a random input too wide for the tolerance, derived random
+        A random input too wide for the tolerance, derived random
         inputs on a piecewise model, a kernel that is no product of the inputs; and on a call, a
         support that leaves the surrogate's domain.
     """
@@ -209,9 +209,6 @@ class RobustObjective:
         """Designs as floats, after checking that their random inputs stay inside the domain."""
         designs = np.ascontiguousarray(designs, dtype=np.float64)
         wiring, model = self._wiring, self.model
-        if designs.ndim != 2 or designs.shape[1] != len(wiring.column):
-            expected = f"(n, {len(wiring.column)})"
-            raise InputError("designs", designs.shape, "wrong shape", f"give shape {expected}")
         low, high = (np.empty((len(designs), len(model.names))) for _ in range(2))
         for group in wiring.groups:
             corners = wiring.places(group.dims, designs, wiring.corners(group))
