@@ -138,7 +138,7 @@ def test_check_prints_the_corners(tmp_path):
     assert "3 make a mechanism" in shown
 
 
-@pytest.mark.parametrize(("shortest", "word"), [(0.01, "close"), (0.088, "cannot turn")])
+@pytest.mark.parametrize(("shortest", "word"), [(0.01, "assembled"), (0.088, "cannot turn")])
 def test_short_couplers_at_which_a_linkage_does_not_close_or_locks_are_named(shortest, word):
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
     path = "mechanism.bodies.coupler.length"

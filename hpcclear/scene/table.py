@@ -97,7 +97,7 @@ def csv_lines(path: Path, what: str = "table of points") -> list[tuple[int, list
 
 
 def _short_lines(stream: TextIO, path: Path) -> Iterator[str]:
-    """The lines of a file, none of them long enough to fill the memory."""
+    """The lines of a file, each too short to fill the memory."""
     while line := stream.readline(LONGEST_LINE + 1):
         if len(line) > LONGEST_LINE:
             reason = f"a line has more than {LONGEST_LINE} characters"

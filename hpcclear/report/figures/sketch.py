@@ -32,7 +32,7 @@ Pair = tuple[float, float]
 def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose] | None = None) -> "Figure":
     """The mechanism at a crank angle of 50 degrees, a linkage at its start; and a key with every number's place.
 
-    Lengths are to scale; plays are not, they would be invisible. `poses`: of a linkage, where its bodies are
+    Lengths are to scale; clearances are not, since they would be invisible. `poses`: of a linkage, where its bodies are
     (`hpcclear.dynamics.planar.problem.poses_at_start`).
     """
     key = linkage_sketch.key(scene, poses) if poses is not None else _key(scene)
