@@ -84,8 +84,8 @@ def test_words_tables_and_units_of_the_objective() -> None:
     ("entries", "key", "reason"),
     [
         ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "not one of the known"),
-        ({"objectives": ["mean"]}, "objectives", "two things or more"),
-        ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "not said"),
+        ({"objectives": ["mean"]}, "objectives", "two objectives or more"),
+        ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),
         ({"objectives": ["mean", {"statistic": "quantile", "level": 1.5}]}, "objectives.1.level", "below 1"),
         ({"objectives": ["mean", {"statistic": "mean", "level": 0.5}]}, "objectives.1.level", "belongs to"),

@@ -114,7 +114,7 @@ def test_a_range_cuts_them_and_about_design_moves_them_along(scene_file):
         ('{distribution="mylaws:Faling", start=1, width=2}', r"mylaws\.py has no Faling.*'Falling'"),
         ('{distribution="mylaws:Falling", start=1}', "TypeError: .*missing.*'width'"),
         ('{distribution="mylaws:half"}', "has no ppf: a distribution needs ppf"),
-        ('{distribution="mylaws:Downward", start=1, width=2}', "no finite quantiles that rise"),
+        ('{distribution="mylaws:Downward", start=1, width=2}', "no finite, increasing quantiles"),
         ('{distribution="other:Falling"}', r"there is no other\.py beside the scene file"),
     ],
 )  # fmt: skip

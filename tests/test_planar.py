@@ -139,7 +139,7 @@ def test_tables_are_read_into_data_and_assembled():
         ("joints.o2.clearance", "30 mm", "joints.o2.clearance", "bearing radius"),
         ("joints.o2.journal", "crank.c", "joints.o2.journal", "no point"),
         ("drives", {}, "drives", "nothing drives"),
-        ("drives.motor.body", "piston", "drives.motor.body", "no such body"),
+        ("drives.motor.body", "piston", "drives.motor.body", "no such moving body"),
         ("drives.motor.speed", 0, "drives.motor.speed", "there would be no motion"),
         ("loads.weight.place", "coupler", "loads.weight.place", "no point"),
         ("loads.band.kind", "rubber", "loads.band.kind", "spring"),

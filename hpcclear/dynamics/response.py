@@ -249,8 +249,8 @@ def _refuse_what_does_not_fit(size: float, count: int) -> None:
             "output.instants_per_revolution",
             count,
             f"makes time series of {size / 1e9:.3g} GB or more; this machine has {memory / 1e9:.3g} GB of memory",
-            "write fewer instants a revolution (0 writes every accepted step), or simulate fewer revolutions; "
-            "hpcclear sample keeps no time series",
+            "Write fewer instants per revolution (0: every accepted step), or simulate fewer revolutions; "
+            "hpcclear sample stores no time series",
         )
 
 

@@ -81,7 +81,7 @@ def whole(output: Path) -> list[Part]:
     if not counts:
         reason = f"no part of it exists, such as {Part(1, 20).place(output).name}"
         raise InputError(
-            "output", str(output), reason, "Run hpcclear sample with --part 1/20 and on"
+            "output", str(output), reason, "Run hpcclear sample with --part 1/20, 2/20, ..."
         )
     if len(counts) > 1:
         reason = f"parts of different divisions exist, by {' and by '.join(map(str, counts))}"

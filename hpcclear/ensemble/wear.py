@@ -97,7 +97,7 @@ def _check_bounds(scene: Scene) -> None:
     if limit is not None and limit > DEEPEST * max(radii):
         raise InputError(
             "wear.limit.clearance", limit,
-            f"no clearance is followed beyond {DEEPEST:g} of its bearing's radius, {DEEPEST * max(radii):g} m",
+            f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, {DEEPEST * max(radii):g} m",
             "Lower it",
         )  # fmt: skip
 

@@ -230,8 +230,8 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
         raise InputError(
             variable,
             copies,
-            f"the launcher started {copies} processes, but each of them sees only itself: it does "
-            f"not belong to the MPI library in use ({describe_mpi()})",
+            f"the launcher started {copies} processes, but each sees only itself: the launcher "
+            f"does not belong to the MPI library in use ({describe_mpi()})",
             "Start with the mpiexec of that library, or set MPI4PY_LIBMPI to the launcher's; with "
             "srun, choose the right --mpi",
         )

@@ -162,7 +162,7 @@ def standing(text: str) -> str:
 
 
 def _ours(verified: xr.Dataset) -> xr.Dataset:
-    """Designs of the case in which most is random, the original among them, without those a publication prints."""
+    """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k in range(verified.sizes["design"]) if counts(verified.isel(design=k))]
     if "case" in verified:
         cases = [str(case) for case in verified["case"].to_numpy()]
@@ -379,7 +379,7 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
 
 
 def _surrogate_errors(best: xr.Dataset) -> list[float]:
-    """Relative errors of the surrogate's mean and deviation, as far as they are known."""
+    """Relative errors of the surrogate's mean and standard deviation, as far as they are known."""
     found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
     return [error for error in found if np.isfinite(error)]
 

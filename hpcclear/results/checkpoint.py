@@ -153,7 +153,7 @@ class Checkpoint:
     attributes : mapping, optional
         Global attributes of the part files (`hpcclear.results.dataset.provenance`).
     joints : sequence of str
-        Labels of the joints that records tell of.
+        Labels of the joints of the records.
     clock : callable
         Seconds since any instant.
 

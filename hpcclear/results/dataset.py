@@ -72,7 +72,7 @@ def dataset(
         The coordinates of the kind, all of them.
     data : mapping of str to array
         Variables of the kind, and design variables under their names or scene paths; for Kriging
-        models also their limits, NAME_lower and NAME_upper. Shapes as in the table.
+        models also their bounds, NAME_lower and NAME_upper. Shapes as in the table.
     attributes : mapping, optional
         Further global attributes, text or numbers; see `provenance`.
     units : mapping of str to str, optional

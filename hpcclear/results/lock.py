@@ -62,7 +62,7 @@ class Holder:
         return holder if isinstance(holder.pid, int) and holder.pid > 0 else None
 
     def is_over(self) -> bool:
-        """Whether the holder is known to be gone; False when that cannot be told."""
+        """Whether the holder is known to be gone; False when that is not known."""
         here = Holder.this_process()
         if self.host == here.host:
             return self.boot != here.boot or not _alive(self.pid, self.started)

@@ -125,7 +125,7 @@ def statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
 
 
 def goal(name: str) -> Columns:
-    """What a case makes small, where that is not mean and deviation: each design has that of its case."""
+    """Objectives of a case, other than mean and standard deviation; each design has those of its case."""
     of = f"{name} objective of the case"
     return {
         f"{name}_goal": text(("design",), f"{of}, in words"),

@@ -100,7 +100,7 @@ def is_ours(name: object) -> bool:
 
 
 def form_of(name: str, parameters: Mapping[str, float]) -> Form:
-    """What is known of a distribution; raises an error for validators where there is none of that name."""
+    """Return the requirements of a distribution; raise an error for validators if the name is not known."""
     if name in OURS:
         return OURS[name]
     module, _, own = name.partition(":")

@@ -85,7 +85,7 @@ class Effects(Table):
     """Friction of the slider in its guide; "none" or left out is off."""
 
     def law_unit(self, path: str) -> str | None:
-        """Return the unit of a parameter of the scene's own laws by its path; None of any other entry."""
+        """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""
         for table in (self.contact, self.friction):
             if table is not None and path.startswith(f"effects.{table.kind}."):
                 parameter = table.declared.parameter(path.rpartition(".")[2])

@@ -54,7 +54,7 @@ class Goal(Table):
         return 0.95 if self.level is None else self.level
 
     def same_as(self, other: "Goal") -> bool:
-        """Whether it is the same of every design, as far as spelling tells."""
+        """Whether it is the same for every design, as far as its spelling shows."""
         if self.formula is not None and other.formula is not None:
             return "".join(self.formula.split()) == "".join(other.formula.split())
         same = (self.statistic, self.limit) == (other.statistic, other.limit)
@@ -86,7 +86,7 @@ MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
 def in_si(case: Any, objective: object, key: str) -> Any:
-    """A case's row with words as goals, and `limit` and `most` in SI by the unit of the study's objective.
+    """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     Raises
     ------

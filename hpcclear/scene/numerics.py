@@ -23,9 +23,9 @@ class Numerics(Table):
         "auto", "tsitouras", "dormand-prince", "fehlberg", "prince-dormand", "switching", "radau"
     ] = "auto"
     """Integrator of responses and samples. The four named pairs are explicit, of order 5, 5, 4 and 8; the last is for
-    tolerances of 1e-9 and less. "switching" uses implicit steps where the motion is stiff, "radau" always. "auto" chooses
-    "switching" for steep friction ramps, strong damping, oil or bristles, "radau" for fast bending modes, and "tsitouras"
-    otherwise."""
+    tolerances of 1e-9 and less. With "switching" steps are implicit where the motion is stiff, with "radau" always. By
+    default ("auto") the method is "switching" for steep friction ramps, strong damping, oil or bristles, "radau" for fast
+    bending modes, and "tsitouras" otherwise."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None

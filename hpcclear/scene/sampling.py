@@ -135,7 +135,7 @@ def _chances(
 def _scrambled(
     seed: int, purpose: str, scrambling: int, dimensions: int, first: int, count: int
 ) -> Array:
-    """Points of a scrambling, (count, dimensions), read only: all designs of a study meet the same."""
+    """Points of a randomised sequence, (count, dimensions), read only: all designs of a study meet the same."""
     rng = generator(seed, f"sobol {purpose}", str(scrambling))
     points = sobol(dimensions, rng, first, count)
     points.flags.writeable = False
@@ -171,8 +171,8 @@ def monte_carlo(
     purpose, first
         Which stream, and where in it to begin.
     scrambling : int, optional
-        Samples of the scrambled Sobol sequence of that number, in place of independent ones: each
-        scrambling is one independent estimate. Begin and end at powers of two.
+        Number of a randomised Sobol sequence whose samples replace independent ones; each sequence
+        is one independent estimate. Begin and end at powers of two.
     stratified : bool
         A Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together the first
         alone keeps its strata.

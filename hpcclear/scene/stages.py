@@ -210,9 +210,9 @@ class Verification(Table):
     most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
     """Largest number of simulations of a design, for "qmc"."""
     contest: Annotated[int, Count(1, 2**10)] = 4
-    """Factor on the simulations that the accuracy requires, for "qmc". A design of the search may use it up while it may
-    still be optimal within the confidence interval, and differs from the lowest value by more than 0.4 of the target. 1: no
-    factor."""
+    """Factor on the simulations that the accuracy requires, for "qmc". Designs of the search may use
+    it while they may still be optimal within the confidence interval. Designs within 0.4 of the target of the lowest value do
+    not need it. 1: no factor."""
     samples: Annotated[int, Count(2, 10**9)] | None = None
     """Draws of a design, for "monte-carlo"; default 10 000."""
     designs: Annotated[int, Count(0, 10**5)] = 10

@@ -178,7 +178,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
 
 
 def _mean(name: str, key: str, curve: Curve | None, turns: int) -> Iterator[Switch]:
-    """Of a load that a table over so many turns tells: its mean in place of it."""
+    """Replace a load that is tabulated over so many turns by its mean."""
     if isinstance(curve, tuple):
         yield Switch(f"variation of {name}", {key: mean_of(curve, turns)})
 

@@ -266,7 +266,7 @@ def write(
         asked = f"{', '.join(others)} and {last}"
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
-            words = content[name].attrs["long_name"].replace("mean and deviation", asked)
+            words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"

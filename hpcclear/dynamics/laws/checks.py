@@ -64,7 +64,7 @@ def check_shape(law: Law) -> None:
         for name in law.arguments(function):
             if name not in given:
                 raise LawError(
-                    f"{title} uses {name!r}, which nobody gives",
+                    f"{title} uses {name!r}, which is not defined",
                     f"Declare it as a parameter, or in numbers. Known are {', '.join(sorted(given))}",
                 )
     if len(law.read) > LAW_NUMBERS:
@@ -76,7 +76,7 @@ def check_shape(law: Law) -> None:
         for name in {"rate", "impact_speed", "inverse_impact_speed"} & {
             *law.arguments(law.elastic)
         }:
-            raise LawError(f"elastic uses {name!r}, and stored energy goes by the depth alone")
+            raise LawError(f"elastic uses {name!r}, but stored energy depends on the depth alone")
     if isinstance(law, FrictionLaw) and law.bristled and law.largest is None:
         raise LawError("has bristles without a largest deflection", "Declare largest, m")
     text_of(law)

@@ -56,7 +56,7 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
             if node.id not in known:
                 others = ", ".join(sorted({*short, *JOINT}))
                 raise LawError(
-                    f"has {node.id!r}, which is no parameter",
+                    f"contains {node.id!r}, which is not a parameter",
                     f'Give it a unit, units = {{ {node.id} = "m" }}, and a value; known are {others}',
                 )
             node.id = known[node.id]

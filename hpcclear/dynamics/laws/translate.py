@@ -222,7 +222,7 @@ class _Writer:
 
     def number(self, value: Any) -> str:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-            raise LawError(f"{self.title} uses {value!r}, which is no number")
+            raise LawError(f"{self.title} uses {value!r}, which is not a number")
         if not math.isfinite(value):
             raise LawError(f"{self.title} has a number that is not finite")
         return repr(float(value)) if value >= 0 else f"({float(value)!r})"
@@ -243,7 +243,7 @@ class _Writer:
                 module = self.value(owner)
                 if isinstance(module, ModuleType) and hasattr(module, attribute):
                     return getattr(module, attribute)
-        raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which it does not know")
+        raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which is not defined")
 
     def power(self, base: ast.expr, power: ast.expr) -> str:
         inside = self.text(base)

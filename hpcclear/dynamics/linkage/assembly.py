@@ -252,8 +252,8 @@ def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> fl
     named = [owner for owner, part in zip(owners, share, strict=True) if part > 0.1 * share.max()]
     joint = next((owner for owner in reversed(named) if owner.startswith("joints")), named[-1])
     raise InputError(
-        joint, smallest, f"holds nothing at {time:.4g} s that the others do not hold already: a dead centre "
-        "that the drives cannot pass, or a joint too many",
+        joint, smallest, f"constrains nothing at {time:.4g} s that other joints do not constrain. It is a dead "
+        "centre that the drives cannot pass, or the joint is redundant",
         "Move the start angles away from it, change a length, or remove the redundant joint",
     )  # fmt: skip
 

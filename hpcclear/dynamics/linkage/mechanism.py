@@ -304,7 +304,7 @@ def _sizes(m: Mechanism) -> None:
     if free < 0:
         last = m.ideal[-1].name if m.ideal else m.drives[-1].name
         raise InputError(
-            f"joints.{last}", -free, "more is held than can move: ideal joints and drives take away "
+            f"joints.{last}", -free, "the mechanism is overconstrained: ideal joints and drives remove "
             f"{-free} too many degrees of freedom",
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip

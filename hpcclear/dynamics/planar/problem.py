@@ -97,7 +97,7 @@ def check_drives(mechanism: Mechanism) -> None:
         if drive.prescribed:
             raise InputError(
                 f"mechanism.drives.{drive.name}.period", False,
-                f"prescribes an angle by time, while {main.name!r}, whose speed is free, gives the period",
+                f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period",
                 "Set period = true here",
             )  # fmt: skip
 

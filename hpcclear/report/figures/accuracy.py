@@ -116,7 +116,7 @@ def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
 
 @style.drawn
 def averaging_figure(found: xr.Dataset) -> "Figure":
-    """Error of the objective against revolutions averaged, for several transients, and the floor that is left."""
+    """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], found["averaging_error"]
     for k, transient in enumerate(found["transient"].to_numpy()):
@@ -235,7 +235,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
 
 @style.drawn
 def parallel_figure(found: xr.Dataset) -> "Figure":
-    """Speed-up and efficiency on the ranks at hand, and the core-seconds lost."""
+    """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
     number = found["ranks"].to_numpy()
     strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()

@@ -126,7 +126,7 @@ def _verified(
     *,
     all_designs: bool,
 ) -> None:
-    """True values of the designs of a case, ours or all, each joined to the surrogate's, of mean and standard deviation."""
+    """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
     count = verification.sizes["design"]
     cases = (
         [str(c) for c in verification["case"].to_numpy()]

@@ -41,7 +41,7 @@ def saving(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> floa
 
 
 def shown(value: float, limit: float) -> str:
-    """A relative change with its limits in per cent, as many digits as the limits are worth."""
+    """Return a relative change with its half-width in per cent, with as many digits as the half-width allows."""
     if not np.isfinite(value):
         return "-"
     value, limit = 100.0 * value, 100.0 * limit
@@ -114,7 +114,7 @@ def told_apart(content: xr.Dataset) -> list[str]:
 
 @style.drawn
 def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Figure":
-    """A bar an effect: change of f with its limits on a logarithmic scale, and beside it the time that it takes.
+    """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
 
     Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
     """

@@ -151,7 +151,7 @@ def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 def clearances(response: xr.Dataset) -> Array:
     """Radial clearance of each joint, m, shape (joints,); NaN where there is none, or where it was never reached.
 
-    Penetration is |e| - c, so contact tells the clearance.
+    Penetration is |e| - c, so the clearance follows from contact.
     """
     reach = eccentricity(response)
     depth = response["penetration"].to_numpy()
@@ -164,7 +164,7 @@ def clearances(response: xr.Dataset) -> Array:
 
 
 def contact(response: xr.Dataset, joint: str) -> str:
-    """Return how long a joint is in contact, in words: a share of the time, never rounded to all or none of it."""
+    """Return how long a joint is in contact, in words: a share of the time, never rounded to 0 or 1."""
     touching = response["penetration"].sel(joint=joint).to_numpy() > 0.0
     if touching.all() or not touching.any():
         return f"in {'contact' if touching.all() else 'flight'} at all instants stored"

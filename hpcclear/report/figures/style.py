@@ -195,7 +195,7 @@ def save(figure: "Figure", path: str | Path) -> Path:
     Raises
     ------
     InputError
-        The suffix is none of these, or the place cannot be written to.
+        The suffix is another one, or the place cannot be written to.
     StorageError
         The disk is full or fails.
     """

@@ -1,4 +1,4 @@
-"""Figures of lives of worn joints (kind ``wear``)."""
+"""Figures of service lives with wear (kind ``wear``)."""
 
 from typing import TYPE_CHECKING
 

@@ -98,8 +98,8 @@ def reproduce(content: Content) -> list[object]:
         steps += ["The command that made these results:"]
         steps += [preformatted(str(found["command"].item()))]
     words = (
-        "The same scene, seed and versions on the same type of processor give the same numbers to the last bit, on "
-        "any number of ranks; `hpcclear reproduce` with this directory simulates some of them again and compares."
+        "The same scene, seed and versions on the same type of processor give bit-identical results, on "
+        "any number of ranks. `hpcclear reproduce` with this directory simulates some of them again and compares."
     )
     rows = [
         [label, content.attribute(name)]

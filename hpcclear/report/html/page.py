@@ -1,4 +1,4 @@
-"""One HTML file about a directory of results: works offline, asks nothing of the network, prints and tabs well."""
+"""One HTML file about a directory of results: works offline, loads nothing from the network, prints and tabs well."""
 
 import base64
 import functools
@@ -144,7 +144,7 @@ _FOLDED = ("paper", "time")
 
 
 def _paper(content: Content) -> list[object] | None:
-    """The paper's claims, its designs and how its text can be read; None of the study of another scene."""
+    """The paper's claims, its designs and how its text can be read; None for a study of another scene."""
     parts = [sections.claims(content), designs.of_a_paper(content), sections.readings(content)]
     return [one for part in parts for one in part or ()] or None
 

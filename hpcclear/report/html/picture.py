@@ -34,9 +34,9 @@ def picture(content: Content) -> dict[str, Any]:
 def front(content: Content) -> dict[str, Any]:
     """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them.
 
-    At first the axes are the two objectives of the case that the answer is about; where any case has others than mean and
-    deviation of f, the reader may choose, and points stand nowhere along what their case does not ask for.
-    """
+    At first the axes are the two objectives of the case that the answer is about; where a case has others than mean and
+    standard deviation of f, the reader may choose the axes. Points have no place along an axis that is no objective of their
+    case."""
     fronts, verified = content.get("front"), content.get("verification")
     points: list[dict[str, Any]] = []
     if fronts is not None:
@@ -62,7 +62,8 @@ def front(content: Content) -> dict[str, Any]:
 
 
 def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence[str]:
-    """The first two objectives of the case that the answer is about, else of the first case; mean and deviation by default."""
+    """The first two objectives of the case that the answer is about, else of the first case; mean and standard deviation by
+    default."""
     asked = leading_goals(verified) if verified is not None else []
     if not asked and fronts is not None and "searched" in fronts:
         asked = str(fronts["searched"][0].item()).split(", ")
@@ -71,7 +72,7 @@ def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence
 
 def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
     """Labels of all axes, the leading two first; then points know where they are along each as ``at``, along the first two as
-    ``x`` and ``y``, None where their case does not ask for it."""
+    ``x`` and ``y``, None where it is no objective of their case."""
     goals = [point.pop("goals") for point in points]
     units = {words: one[0] for own in goals for words, one in own.items()}
     names = list(dict.fromkeys([*(words for words in leading if words in units), *units]))

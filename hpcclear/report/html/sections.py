@@ -20,7 +20,7 @@ LISTED = 40  # samples listed by number before the rest is only counted
 
 
 def summary(content: Content) -> dict[str, object] | None:
-    """What was sampled and found, in plain words; None of what has sections of its own."""
+    """What was sampled and found, in plain words; None if other sections have it."""
     words = [*_lives_words(content), *_samples_words(content), *_effects_words(content)]
     if not words and not set(content.files) - {"timing"}:
         words = ["These are responses of single designs; nothing was sampled or optimised."]
