@@ -19,6 +19,7 @@ from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
+from hpcclear.report.figures import motion
 from hpcclear.scene.points import Points
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
@@ -229,6 +230,8 @@ def test_a_clockwise_slider_crank_is_the_mirror_image(changes):
         expected, got = one[name].to_numpy(), sign * other[name].to_numpy()
         size = np.abs(expected).max()
         np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6 * size, err_msg=name)
+    np.testing.assert_allclose(motion.turns(other), motion.turns(one), rtol=1e-12)
+    assert motion.crank_angle(other)[1] == -motion.crank_angle(one)[1] == -1
     # at rod and crank in line the slider is at its ends
     reach = np.sqrt((0.12 + 0.05) ** 2 - 0.01**2)
     assert one["slider_position"].max() == pytest.approx(reach, rel=1e-2 if changes else 1e-4)

@@ -191,7 +191,7 @@ OURS = {
         lambda peak_contact_force: peak_contact_force.max(),
     ),
     "peak-crank-moment": Objective(
-        "peak moment of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment
+        "peak torque of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment
     ),
     "slider-acceleration-deviation": Objective(
         "standard deviation in time of the slider acceleration", "m/s^2",

@@ -7,11 +7,17 @@ import click
 from hpcclear.cli.options import of_one_process, show
 from hpcclear.ranks.stopping import Exit
 
+_TITLES = {
+    "contact": "effects.contact.law (normal force)",
+    "geometry": "effects.contact.geometry (shapes that touch; left out, spheres)",
+    "friction": "effects.friction.law (friction)",
+}
+
 
 @click.command(short_help="List laws, objectives and other plug-ins, with their sources.")
 @of_one_process
 def laws() -> int:
-    """List what a scene may name: laws of contact and friction, objectives, distributions, surrogates and searches.
+    """List what a scene may name: laws of contact and friction, geometries, objectives, distributions, surrogates and searches.
 
     Laws with formula, parameters, units, bounds, range and source. Those of installed packages are among them.
     One of your own: docs/extending.md.
@@ -22,15 +28,15 @@ def laws() -> int:
     from hpcclear.cli.printing import console, table
     from hpcclear.scene.laws import known_laws
 
-    for registry in (plugins.CONTACT_LAWS, plugins.FRICTION_LAWS):
-        kind = registry.kind.partition(" ")[0]
-        show(f"effects.{kind}.law ({registry.kind})")
-        offered = registry.names()
+    registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
+    for kind, title in _TITLES.items():
+        show(title)
+        offered = () if kind == "geometry" else registries[kind].names()
         for name, law in known_laws(kind).items():
-            origin = registry.origin(name) if name in offered else ""
+            origin = registries[kind].origin(name) if name in offered else ""
             console().print(table(name, list(_rows(law, origin))))
-    for place, kind in _OTHERS.items():
-        _list(place, getattr(plugins, kind))
+    for place, others in _OTHERS.items():
+        _list(place, getattr(plugins, others))
     return Exit.DONE
 
 

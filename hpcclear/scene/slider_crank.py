@@ -121,7 +121,7 @@ def _joint(scene: Any, name: str) -> PlanarJoint:
     x, y = joint.start_eccentricity
     return PlanarClearance.model_construct(
         **places, kind="clearance", clearance=joint.clearance, bearing_radius=joint.bearing_radius,
-        materials=Materials.model_construct(bearing=joint.bearing, journal=joint.journal),
+        length=joint.length, materials=Materials.model_construct(bearing=joint.bearing, journal=joint.journal),
         start_eccentricity=Place.model_construct(x=x, y=y),
         wear=joint.wear, film=joint.film, out_of_round=joint.out_of_round,
     )  # fmt: skip

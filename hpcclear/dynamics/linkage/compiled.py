@@ -1,4 +1,4 @@
-"""A generated text as a module: a motion of all lanes that `rhs.motion_of` can compile and steppers call by its address.
+"""A generated text as a module: a motion of all lanes that `rhs.compiled_motion` can compile and steppers call by its address.
 
 The file stands beside Numba's cache, to be read; it is named by its content.
 """
