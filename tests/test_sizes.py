@@ -23,6 +23,7 @@ from hpcclear.dynamics.implicit.columns import leave
 from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.rows import Rows
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -143,6 +144,21 @@ def test_what_is_measured_goes_by_the_effects():
     assert (
         at.MEASURE_MASK < at.RATES
     )  # what the compiler then knows of the distance between two rows
+
+
+def test_rows_stand_one_behind_the_other_and_have_names():
+    """Nobody counts them: a row that is declared moves all behind it."""
+    values = {value for value in vars(at).values() if type(value) is int}
+    buffers = [one for one in vars(at).values() if isinstance(one, Rows)]
+    assert len(buffers) == 7
+    for rows in buffers:
+        firsts = [row.first for row in rows.declared]
+        assert firsts == [0, *np.cumsum([row.size for row in rows.declared])[:-1]]
+        assert rows.end == rows.declared[-1].first + rows.declared[-1].size
+        assert set(firsts) <= values
+        assert all(row.words for row in rows.declared)
+    asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
+    assert asked <= set(at.Effects._fields)
 
 
 def test_rules_are_numbers_of_one_kind():
