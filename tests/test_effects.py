@@ -214,12 +214,12 @@ CONTRADICTIONS = [
     (
         {"effects.friction": FRICTIONS["lugre"], "numerics.formulation": "baumgarte"},
         "effects.friction.law",
-        "no place for bristles",
+        "does not include bristles",
     ),
     (
         {"mechanism.rod.bending": BENDING, "numerics.formulation": "baumgarte"},
         "mechanism.rod.bending",
-        "no place for modes",
+        "does not include bending modes",
     ),
     ({"mechanism.crank.bending": BENDING}, "mechanism.crank.bending", "clamps it"),
     (

@@ -311,7 +311,7 @@ def test_a_sample_that_does_not_close_has_failed_and_the_others_go_on():
 
 def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():
     scene = rocker()
-    with pytest.raises(InputError, match="nought in this scene"):
+    with pytest.raises(InputError, match="zero in this scene"):
         evaluate(scene, {"mechanism.bodies.coupler.center.y": [1e-3]})
 
 
@@ -350,8 +350,8 @@ BROKEN = {
     "bodies.coupler.inertia=0": "inertia",
     "bodies.coupler.center=[0.1, 0.0]": "mass_center",
     "bodies.coupler.inertia_ratio=1": "Remove one",
-    "drives.motor.body=shaft": "no such body",
-    "drives.motor.speed=0": "nothing would turn",
+    "drives.motor.body=shaft": "no such moving body",
+    "drives.motor.speed=0": "there would be no motion",
     "drives.motor.turns=0": "from 1",
     "drives.motor.torque=3": "not a known key",
     "loads.pull.kind=magnet": "known values",
@@ -376,7 +376,7 @@ def test_broken_linkages_are_refused_by_name(change):
 def test_a_linkage_that_does_not_close_is_refused():
     key, words = refusal("bodies.coupler.length=2 m")
     assert key.startswith("mechanism.joints")
-    assert "does not close" in words
+    assert "cannot be assembled" in words
 
 
 def test_a_slider_crank_s_tables_do_not_fit_a_linkage():

@@ -63,7 +63,7 @@ KICK = 1e-10
 """Relative size of the kicks to the start of a sample's copies."""
 
 KICKS = (0, 1, -1)
-"""Signs of the kicks to a sample's copies, which run beside it when its uncertainty is asked for."""
+"""Signs of the kicks to copies of a response at a tight tolerance."""
 
 KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
 """Perturbations of the replicas of a single response, which take lanes that would stay empty. With the larger ones chaotic
@@ -107,7 +107,7 @@ class Evaluator:
         Samples in lockstep.
     kicks : sequence of int, optional
         Perturbations, in units of `KICK`, of replicas of tighter tolerance that run beside each sample and give its objective a
-        half-width; by default `KICKS` with ``numerics.uncertainty``, else none.
+        half-width, as `alone` gives those of a single response; none by default.
     objective : Objective
         Of which that half-width is.
     recorder : Lanes, optional
@@ -124,15 +124,13 @@ class Evaluator:
         scene: Scene,
         columns: Points,
         lanes: int = DEFAULT_LANES,
-        kicks: Sequence[int] | None = None,
+        kicks: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
         recorder: Lanes | None = None,
     ) -> None:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        if kicks is None:
-            kicks = KICKS if scene.numerics.uncertainty else ()
         self._kicks = tuple(kicks)
         self._copies = 1 + len(self._kicks)
         self._objective = objective
@@ -191,10 +189,7 @@ class Evaluator:
             group[copy] = record
             group["flags"][copy] |= _ARRIVED
             if (group["flags"] & _ARRIVED).all():
-                one = joined(sample, self._partial.pop(sample), self._objective)
-                if not self.scene.numerics.uncertainty:  # checked, but the same record otherwise
-                    one["rhs_evaluations"] = group["rhs_evaluations"][0]
-                done.append(one)
+                done.append(joined(sample, self._partial.pop(sample), self._objective))
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
@@ -234,7 +229,6 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     record = group[0].copy()
     record["sample"] = sample
     record["flags"] &= ~_ARRIVED
-    record["rhs_evaluations"] = group["rhs_evaluations"].sum()
     values = objective.of(group)
     # A copy that failed leaves the uncertainty unknown, and NaN says so.
     coverage = COVERAGE if len(group) == 1 + len(KICKS) else COVERAGE_ALONE

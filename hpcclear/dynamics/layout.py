@@ -309,11 +309,8 @@ TABLES = 4 * MAX_CURVES * CELLS  # at most
     M2_F,
     COUNT_F,
     ELAPSED,  # s, whole revolutions so far
-    LAST_F,  # the objective of the revolution before
-    LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
-    FIRST_F,
-) = range(10)
-LATCHED = 10  # of each joint
+) = range(7)
+LATCHED = 7  # of each joint
 AVERAGED = (
     LATCHED + MAX_JOINTS
 )  # integrals over the averaged revolutions, in the order of INTEGRATED

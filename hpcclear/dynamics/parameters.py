@@ -183,7 +183,7 @@ def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
     if first + rows > at.WAVE_ROWS:
         raise InputError(
             "wear.harmonics" if scene.wear is not None and scene.wear.waves else f"{scene.joint_key(joint)}.out_of_round",
-            rows // 2, f"all joints together have room for {at.WAVE_ROWS // 2} waves",
+            rows // 2, f"all joints together have more than {at.WAVE_ROWS // 2} waves",
             f"Take {at.WAVE_ROWS // 2 // (_place(scene, joint) + 1) // 2} around each surface at most",
         )  # fmt: skip
     return first, rows
@@ -228,7 +228,7 @@ def _with_finite_films(scene: Scene, get: Numbers, p: Array) -> Array:
         if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
             raise InputError(
                 f"{key}.film.model", "finite",
-                "the samples differ in length over diameter, and a film is solved for one alone",
+                "the samples differ in length over diameter, but the finite film is solved for one ratio",
                 'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
             )  # fmt: skip
         own[:] = correction(ratio)

@@ -28,9 +28,6 @@ from hpcclear.dynamics.views import Outcome, Parameters, Settings, Start
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import main_drive
 
-LEAST_AVERAGED = 10
-"""Revolutions before an automatic average may end: fewer say nothing about its standard error."""
-
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
 
@@ -75,10 +72,6 @@ class Problem:
     transient: int
     averaged: int
     max_steps: int
-    averaged_cap: int = 0
-    objective_tolerance: float = 0.0
-    """averaged_cap and objective_tolerance: the average goes on until the relative standard error of the objective is below
-    this, or to the cap; a tolerance of 0 averages over `averaged` revolutions."""
     implicit: str = "never"
     """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
     cycle: float = at.TURN
@@ -111,8 +104,6 @@ class Problem:
         s.angle_tolerance = max(self.rtol * 1e-3, 1e-13)
         s.impact_floor = self.impact_floor
         s.transient, s.averaged, s.max_steps = self.transient, self.averaged, self.max_steps
-        s.averaged_cap = max(self.averaged_cap, self.averaged)
-        s.objective_tolerance = self.objective_tolerance
         s.smallest_step = 1e-14
         s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
         s.beta = 0.04
@@ -245,8 +236,6 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         turns=getattr(drive, "turns", 1),
         interpolation=scene.numerics.interpolation,
     )
-    averaged: Any = scene.numerics.averaged_revolutions
-    auto = averaged == "auto"
     return Problem(
         linkage=linkage,
         effects=effects_of(scene, series=series, ledger=ledger),
@@ -256,9 +245,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         atol=planar.absolute_tolerances(scene),
         impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
         transient=scene.numerics.transient_revolutions,
-        averaged=LEAST_AVERAGED if auto else averaged,
-        averaged_cap=scene.numerics.max_averaged_revolutions if auto else averaged,
-        objective_tolerance=scene.numerics.objective_tolerance if auto else 0.0,
+        averaged=scene.numerics.averaged_revolutions,
         max_steps=scene.numerics.max_steps,
         implicit=implicit_method(scene),
         cycle=linkage.mechanism.period.advance,

@@ -1,10 +1,9 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
-import os
-
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
@@ -13,7 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS, alone, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import alone, outcome_records, responses_told
 from hpcclear.dynamics.joint_laws import widest_contact
 from hpcclear.dynamics.parameters import Numbers, parameters
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
@@ -118,7 +117,7 @@ def simulate(
     if still:
         times, data, record = _closed_form(scene)
     else:
-        kicks = () if copy or steady is not None else _kicks(scene, checked)
+        kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
@@ -148,13 +147,6 @@ def simulate(
         labels,
         _dimensions(scene),
     )
-
-
-def _kicks(scene: Scene, checked: bool) -> tuple[int, ...]:
-    """Perturbations of the replicas beside a response."""
-    if scene.numerics.uncertainty:
-        return KICKS  # as for any sample
-    return alone(scene.numerics.rtol) if checked else ()
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
@@ -251,14 +243,14 @@ def _bytes_an_instant(part: dict[str, Array]) -> float:
 
 def _refuse_what_does_not_fit(size: float, count: int) -> None:
     """Raise InputError where time series of so many bytes would take more than `MOST` of the machine's memory."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = host.memory()
     if size > MOST * memory:
         raise InputError(
             "output.instants_per_revolution",
             count,
             f"makes time series of {size / 1e9:.3g} GB or more; this machine has {memory / 1e9:.3g} GB of memory",
-            "write fewer instants a revolution (0 writes every accepted step), or simulate fewer revolutions; "
-            "hpcclear sample keeps no time series",
+            "Write fewer instants per revolution (0: every accepted step), or simulate fewer revolutions; "
+            "hpcclear sample stores no time series",
         )
 
 

@@ -181,8 +181,6 @@ class Settings(View):
     impact_floor = Column(settings.IMPACT_FLOOR)  # m/s
     transient = Column(settings.TRANSIENT)  # revolutions
     averaged = Column(settings.AVERAGED)
-    averaged_cap = Column(settings.AVERAGED_CAP)
-    objective_tolerance = Column(settings.OBJECTIVE_TOLERANCE)
     max_steps = Column(settings.MAX_STEPS)
     smallest_step = Column(settings.SMALLEST_STEP)
     exponent = Column(settings.EXPONENT)  # of the step-size control

@@ -70,7 +70,7 @@ def tried(scene: Scene, simulate: bool) -> Tried:
     good = np.array([row for row in range(len(points)) if row not in refused], int)
     if simulate and good.size:
         brief = {
-            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None, "uncertainty": False,
+            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None,
             "max_steps": min(STEPS, scene.numerics.max_steps),
         }  # fmt: skip
         short = scene.with_({f"numerics.{name}": value for name, value in brief.items()})

@@ -29,6 +29,8 @@ _SENSITIVE_WORDS = (
 )
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
+WARNED = tuple(flag for flag in REMARKS if flag is not Flag.STIFF)
+"""Flags that are warnings: all but notes."""
 
 
 class Bearing(NamedTuple):
@@ -115,9 +117,9 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     found = []
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
-        found.append(("Warning", _SENSITIVE_WORDS.format(half_width / abs(f))))
+        found.append(("Warning", sensitive_words(half_width / abs(f))))
     flags = int(response["flags"])
-    warnings = flag_remarks(flags & ~int(Flag.STIFF))
+    warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))
     return [
         *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
@@ -141,7 +143,7 @@ def validity(response: xr.Dataset) -> str:
 def share(contact: float) -> str:
     """Return a share of the time in words; a share that is not 0 or 1 is never rounded to it."""
     if not np.isfinite(contact):
-        return "nan"
+        return "–"
     if contact in (0.0, 1.0):
         return f"{contact:.0%}"
     return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"
@@ -169,6 +171,11 @@ def degrees(one: Bearing) -> str:
     """Return the crank angle of the peak in words, a dash where no stored instant has it."""
     known = np.isfinite(one.angle) and not one.between_instants and one.peak > 0.0
     return f"{np.degrees(one.angle):.0f} deg" if known else "–"
+
+
+def sensitive_words(relative: float) -> str:
+    """Return the warning of a half-width of f that is so large, relative to f."""
+    return _SENSITIVE_WORDS.format(relative)
 
 
 def flag_remarks(flags: int) -> list[str]:

@@ -58,9 +58,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if scene.numerics.energy:
         yield "energy balance of each sample"
     if scene.responses_asked():
-        yield "mean contact forces, crank moment and slider acceleration of each sample"
-    if scene.numerics.uncertainty:
-        yield "uncertainty of each sample"
+        yield "mean contact forces, torque of the drive and slider acceleration of each sample"
 
 
 def warnings(scene: SceneTables) -> Iterator[str]:
@@ -110,8 +108,8 @@ def unused(scene: SceneTables) -> Iterator[str]:
         return
     if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own
         yield (
-            "study.sensitivity is not used: no variables are named that would be fitted together, and those there are have no "
-            "usual groups; name them in study.sensitivity.groups, and in study.sensitivity.parameter what is held fixed"
+            "study.sensitivity is not used: no group of variables is named, and these variables have no usual groups. "
+            "Name them in study.sensitivity.groups, and the fixed one in study.sensitivity.parameter"
         )
 
 

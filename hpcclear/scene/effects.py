@@ -19,7 +19,7 @@ class Contact(LawTable):
     geometry: str | None = None
     """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner" or "power"."""
     minimum_impact_speed: Speed = 1e-3
-    """Floor of the latched impact speed, m/s."""
+    """Lower bound of the impact velocity in the damping, m/s."""
     force: str | None = None
     """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
     units: dict[str, str] | None = None
@@ -85,7 +85,7 @@ class Effects(Table):
     """Friction of the slider in its guide; "none" or left out is off."""
 
     def law_unit(self, path: str) -> str | None:
-        """Return the unit of a parameter of the scene's own laws by its path; None of any other entry."""
+        """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""
         for table in (self.contact, self.friction):
             if table is not None and path.startswith(f"effects.{table.kind}."):
                 parameter = table.declared.parameter(path.rpartition(".")[2])

@@ -1,6 +1,6 @@
 """Tables of the scene that name a law: what entries they have, the law says.
 
-Laws are found by name at the door of their plug-ins; no floor above is imported here.
+Laws are found by name in the registry of plug-ins; no higher layer is imported here.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
+from hpcclear.scene.wanted import hint
 
 _HOME = "hpcclear.dynamics.laws"
 
@@ -206,7 +207,9 @@ class LawTable(Table):
             if key in others:
                 whose = "" if law is None else f"the law {law.name!r} has no {others[key].title}"
                 raise invalid(whose, f"Remove it, or set effects.{cls.kind} as a whole table", key)
-            raise invalid("is not a known key", nearest(key, (*cls._own(), *entries)), key)
+            raise invalid(
+                "is not a known key", hint(key) + nearest(key, (*cls._own(), *entries)), key
+            )
 
     @classmethod
     def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
@@ -250,7 +253,7 @@ class LawTable(Table):
         return dict(self.__pydantic_extra__ or {})
 
     def value(self, name: str) -> Any:
-        """That of one parameter; None of one that the law has not."""
+        """Return the value of one parameter; None if the law does not have it."""
         return self.values().get(name)
 
     @classmethod

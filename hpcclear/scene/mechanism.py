@@ -19,6 +19,7 @@ from hpcclear.scene.fields import (
     invalid,
 )
 from hpcclear.scene.film import Film, check_film
+from hpcclear.scene.fits import with_clearance
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
@@ -66,7 +67,7 @@ class Mechanism(Table):
     def _assembles(self) -> "Mechanism":
         if self.crank.bending is not None:
             raise invalid(
-                "the drive turns the crank, which clamps it, and modes are those of pinned ends",
+                "the drive clamps the crank, but the modes are those of pinned ends",
                 "Leave it out, or let the rod bend",
                 key="crank.bending",
                 value=None,
@@ -76,7 +77,7 @@ class Mechanism(Table):
             beside = f" and the offset ({offset:g} m)" if offset else ""
             raise invalid(
                 f"the rod must be longer than the crank ({self.crank.length:g} m){beside}, "
-                "or the crank cannot turn round",
+                "or the crank cannot rotate",
                 "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
                 key="rod.length",
                 value=self.rod.length,
@@ -153,7 +154,7 @@ def length_path(joint: Any) -> str | None:
 
 
 def check_journal(joint: Any) -> None:
-    """An error for validators unless a journal is left in a joint with clearance, and its film and waves fit the play."""
+    """Refuse a joint whose clearance leaves no journal, or whose film or waves exceed the clearance."""
     clearance, radius = joint.clearance, joint.bearing_radius
     if clearance >= radius:
         raise invalid(
@@ -176,6 +177,10 @@ class ClearanceJoint(Table):
     """R_B, m; it stays as it is when the clearance varies."""
     length: PositiveLength | None = None
     """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
+    fit: str | None = None
+    """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
+    diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
+    """In place of `clearance`: twice that, the difference of both diameters, m."""
     bearing: Material
     journal: Material
     start_eccentricity: tuple[Length, Length] = (0.0, 0.0)
@@ -192,6 +197,8 @@ class ClearanceJoint(Table):
         """R_J = R_B - c, m."""
         return self.bearing_radius - self.clearance
 
+    _in_radii = model_validator(mode="before")(with_clearance)
+
     @model_validator(mode="after")
     def _journal_fits(self) -> "ClearanceJoint":
         check_journal(self)
@@ -199,7 +206,7 @@ class ClearanceJoint(Table):
 
 
 class IdealJoint(Table):
-    """A pin without play."""
+    """A pin without clearance."""
 
     kind: Literal["ideal"]
 
@@ -222,7 +229,7 @@ Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
 class Joints(Table):
-    """The two joints that may have play; the crank-frame joint is ideal."""
+    """The two joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
     """O12."""

@@ -15,6 +15,7 @@ from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
+from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
@@ -57,7 +58,7 @@ class SceneTables(Table):
     @classmethod
     def _version_is_a_number(cls, value: Any) -> Any:
         if isinstance(value, bool):  # equal to 1 in Python
-            raise invalid("true or false is no version", "Write format_version = 1")
+            raise invalid("true or false is not a version", "Write format_version = 1")
         return value
 
     @model_validator(mode="before")
@@ -67,6 +68,7 @@ class SceneTables(Table):
         mechanism = data.get("mechanism") if isinstance(data, Mapping) else None
         if not isinstance(mechanism, Mapping):
             return data
+        data = with_shares(with_fits_of_joints(data))
         kind = mechanism.get("kind", "slider-crank")
         for table in ("drive", "joints"):
             if kind == "planar" and table in data:
@@ -147,7 +149,7 @@ class SceneTables(Table):
             )
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
-                "friction acts in joints with clearance, and all joints are ideal",
+                "friction acts in joints with clearance, but all joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
                 key="effects.friction.law",
                 value=self.effects.friction.law,
@@ -164,7 +166,7 @@ class SceneTables(Table):
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
             raise invalid(
-                f"joint {oiled[0]} carries oil, and a film is that of round surfaces",
+                f"joint {oiled[0]} has an oil film, which needs round surfaces",
                 'Set it to "uniform", or remove the film',
                 key="wear.profile",
                 value=self.wear.profile,
@@ -178,7 +180,7 @@ class SceneTables(Table):
         for joint in chosen:
             if joint not in clearance:
                 raise invalid(
-                    f"{joint} is no joint with clearance of this scene",
+                    f"{joint} is not a joint with clearance of this scene",
                     nearest(joint, clearance),
                     key=key,
                 )
@@ -193,7 +195,7 @@ class SceneTables(Table):
             )
         if chosen and self.numerics.target_error is not None:
             raise invalid(
-                "limits of a steady mean are known for the gaps of all joints only",
+                "the confidence interval of a steady mean exists for the gaps of all joints only",
                 "Leave out the joints, or numerics.target_error",
                 key=key,
             )

@@ -108,10 +108,11 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
 
 
 def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
-    """The response after its transient."""
+    """The response after its transient, all of which is averaged."""
     turns = turns_of(scene.linkage)
     begin = 2.0 * np.pi * turns * scene.numerics.transient_revolutions
-    return response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    kept = response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    return kept.assign_attrs(transient_turns=0)
 
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:

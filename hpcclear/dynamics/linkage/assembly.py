@@ -160,8 +160,8 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
         nearest = min(nearest, (float(left[0]), int(worst[0])))
     raise InputError(
         loops.owners[nearest[1]], nearest[0],
-        "the mechanism does not close here: so far apart, in m or rad, were the two sides left",
-        "Check the lengths, or give start_angle of its bodies near the assembly that is meant",
+        "the mechanism cannot be assembled here: the value is the remaining distance of the two sides, in m or rad",
+        "Check the lengths, or give start_angle of its bodies near the intended assembly",
     )  # fmt: skip
 
 
@@ -252,9 +252,9 @@ def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> fl
     named = [owner for owner, part in zip(owners, share, strict=True) if part > 0.1 * share.max()]
     joint = next((owner for owner in reversed(named) if owner.startswith("joints")), named[-1])
     raise InputError(
-        joint, smallest, f"holds nothing at {time:.4g} s that the others do not hold already: a dead centre "
-        "that the drives cannot pass, or a joint too many",
-        "Move the start angles away from it, change a length, or remove the joint that is too many",
+        joint, smallest, f"constrains nothing at {time:.4g} s that other joints do not constrain. It is a dead "
+        "centre that the drives cannot pass, or the joint is redundant",
+        "Move the start angles away from it, change a length, or remove the redundant joint",
     )  # fmt: skip
 
 

@@ -81,8 +81,8 @@ class Linkage:
         if self._free > at.WAVES:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
-                f"need {self._free - at.OWN} parameters, and there is room for {at.WAVES - at.OWN}",
-                "Take fewer bodies or points",
+                f"need {self._free - at.OWN} parameters, more than {at.WAVES - at.OWN}",
+                "Use fewer bodies or points",
             )  # fmt: skip
 
     def _text(self, on: On) -> Motion:

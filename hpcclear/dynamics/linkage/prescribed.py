@@ -76,8 +76,8 @@ def prescribed_motion(
     """
     if mechanism.clearances or freedom(mechanism):
         raise InputError(
-            "drives", freedom(mechanism), "something is left free: the drives do not prescribe the motion",
-            "Prescribe the angle of one body a degree of freedom, and give no joint clearance",
+            "drives", freedom(mechanism), "the motion is not prescribed: degrees of freedom are left free",
+            "Prescribe one angle for each degree of freedom, and make all joints ideal",
         )  # fmt: skip
     assembly, times = assemble(mechanism), np.asarray(times, float)
     rounds = math.ceil(times.max(initial=0.0) / mechanism.period.seconds)

@@ -16,7 +16,6 @@ from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import refused
@@ -69,8 +68,8 @@ def _check_followed(scene: Scene, follow: str) -> None:
     if name == "slider-acceleration-deviation" and (point or not follow):
         raise InputError(
             "study.objective", name,
-            "a point is followed here" if point else "no body slides along a line of the ground here",
-            'Take "point-acceleration-deviation"' if point else 'Take another one, say "peak-contact-force"',
+            "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
+            'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
     if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
         raise InputError(
@@ -98,7 +97,7 @@ def check_drives(mechanism: Mechanism) -> None:
         if drive.prescribed:
             raise InputError(
                 f"mechanism.drives.{drive.name}.period", False,
-                f"prescribes an angle by time, while {main.name!r}, whose speed is free, gives the period",
+                f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period",
                 "Set period = true here",
             )  # fmt: skip
 
@@ -139,7 +138,7 @@ def check_columns(scene: Scene, points: Points | None) -> None:
                 continue  # noughts of a round surface may be varied
             if path not in known and _in_tables(scene, path) and scene.number(path) == 0.0:
                 raise InputError(
-                    name, 0.0, f"drives {path}, which is nought in this scene: nothing is there to be varied",
+                    name, 0.0, f"drives {path}, which is zero in this scene and cannot be varied",
                     "Give it a small value in the scene, or make it a variable of the study",
                 )  # fmt: skip
 
@@ -235,9 +234,7 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
 
 def rounds_of(scene: Scene) -> int:
     """Revolutions that a linkage without clearance goes through."""
-    averaged = scene.numerics.averaged_revolutions
-    most: int = MOST_ROUNDS if averaged == "auto" else averaged  # type: ignore[assignment]
-    return scene.numerics.transient_revolutions + most
+    return scene.numerics.transient_revolutions + scene.numerics.averaged_revolutions
 
 
 def moves_start(path: str) -> bool:

@@ -95,7 +95,7 @@ class SteadyEvaluator:
         self.lanes = lanes
         self._columns = columns
         self._scale = scales(scene)
-        self._plain = scene.with_({"numerics.target_error": None, "numerics.uncertainty": False})
+        self._plain = scene.with_({"numerics.target_error": None})
         self._sets: dict[tuple[float, int], Lanes] = {}
         self._asks: dict[int, _Ask] = {}
         contact = scene.effects.contact
@@ -230,7 +230,7 @@ def record_of(
     record["mean_gap"] = mean.gaps
     record["objective"] = objective(mean.gaps)
     record["objective_spread"] = np.std(objective(mean.outcomes.mean_gap), ddof=1)
-    record["objective_limit"] = mean.limit
+    record["objective_limit"] = record["objective_uncertainty"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period
     record["kick_growth"] = mean.growth

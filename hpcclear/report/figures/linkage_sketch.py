@@ -73,11 +73,11 @@ class Words:
         self._asked: list[tuple[Array, str, str]] = []
 
     def add(self, place: Any, text: str, colour: str) -> None:
-        """Ask for a word beside a place."""
+        """Request a word beside a place."""
         self._asked.append((np.array([float(place[0]), float(place[1])]), text, colour))
 
     def write(self) -> None:
-        """Write all, the first asked for nearest to their places."""
+        """Write all words, the first ones nearest to their places."""
         to_points = 72.0 / self._axes.figure.dpi
         frame = self._axes.get_window_extent()
         inside = np.array([frame.x0, frame.y0, frame.x1, frame.y1]) * to_points

@@ -18,7 +18,7 @@ _COLUMNS = 58  # letters of a line
 def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose]) -> "Figure":
     """The mechanism where its bodies are put together, and a key with every number's place.
 
-    Lengths are to scale; plays are not, they would be invisible. `poses`: where its bodies are
+    Lengths are to scale; clearances are not, since they would be invisible. `poses`: where its bodies are
     (`hpcclear.dynamics.planar.problem.poses_at_start`).
     """
     key = linkage_sketch.key(scene, poses)

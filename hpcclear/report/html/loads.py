@@ -30,8 +30,20 @@ def loads(content: Content) -> list[object] | None:
         status = Status(int(one["status"]))
         if not status.valid:
             parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
-        parts += [f"{label} ({name}): {text}." for label, text in bearings.remarks(one)]
-    return parts or None
+    return [*parts, *_remarks(content)] or None
+
+
+def _remarks(content: Content) -> list[str]:
+    """Every remark once, with the responses that it is on."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name, one in content.responses.items():
+        for remark in bearings.remarks(one):
+            found.setdefault(remark, []).append(name)
+    every = len(content.responses)
+    return [
+        f"{label} ({'all responses' if 1 < len(names) == every else ', '.join(names)}): {text}."
+        for (label, text), names in found.items()
+    ]
 
 
 def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
