@@ -1,6 +1,6 @@
 """Recipes with the version, the checksum and the dependencies of a source distribution.
 
-    python packaging/render.py DIST     writes DIST/packaging
+python packaging/render.py DIST     writes DIST/packaging
 """
 
 import hashlib
@@ -59,17 +59,21 @@ def main(dist: Path) -> None:
     fixed = {"VERSION": version, "SHA256": hashlib.sha256(source.read_bytes()).hexdigest()}
     place = dist / "packaging"
     shutil.rmtree(place, ignore_errors=True)
-    shutil.copytree(HERE, place, ignore=shutil.ignore_patterns("render.py", "README.md", "__pycache__"))
+    shutil.copytree(
+        HERE, place, ignore=shutil.ignore_patterns("render.py", "README.md", "__pycache__")
+    )
     lists: dict[str, dict[str, str | list[str]]] = {
         "conda-forge/recipe.yaml": {"BUILD": [*map(conda, build)], "RUN": [*map(conda, run)]},
-        "spack/packages/py-hpcclear/package.py": {
+        "spack/packages/py-hpcclear/package.py.in": {
             "BUILD": [spack(one, '"build"') for one in build],
             "RUN": [spack(one, '("build", "run")') for one in run],
         },
     }
     for name, words in lists.items():
         path = place / name
-        path.write_text(rendered(path.read_text(encoding="utf-8"), fixed | words), encoding="utf-8")
+        text = rendered(path.read_text(encoding="utf-8"), fixed | words)
+        path.unlink()
+        path.with_name(path.name.removesuffix(".in")).write_text(text, encoding="utf-8")
         print(path)
 
 
