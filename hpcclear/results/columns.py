@@ -196,6 +196,7 @@ VERIFICATION: Columns = {
     "constraint_excess": number(("design",), "1",
         "by how much its estimates break the worst of them, over the threshold; at most 0 where they break none"),
     "samples": count(("design",), "number of simulations"),
+    "rare_samples": count(("design",), "number of further simulations, where the design fails, for its rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations whose penetration left the range of Hertz theory"),
     "random": text(("design",), "random inputs of its case"),

@@ -44,6 +44,7 @@ from hpcclear.study import (
     lives,
     optimisation,
     paper,
+    rare,
     refinement,
     responses,
     sensitivities,
@@ -189,8 +190,10 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
 def _verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
     if run.study.paired:
-        return tolerance.verified(run, designs)
-    return truth.simulate(run, designs, "verification")
+        true = tolerance.verified(run, designs)
+    else:
+        true = truth.simulate(run, designs, "verification")
+    return rare.decided(run, designs, true, "verification")
 
 
 def _write_samples(run: StudyRun) -> None:

@@ -7,6 +7,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.switches import switches
 from hpcclear.study import (
     chaos,
+    edge,
     lives,
     optimisation,
     refinement,
@@ -15,6 +16,7 @@ from hpcclear.study import (
     surrogates,
     tolerance,
     truth,
+    verdicts,
 )
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.paper import readings
@@ -49,13 +51,15 @@ def _of_stages(scene: Scene) -> dict[str, int]:
     if study.verification.infill_rounds:
         verified += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
     begun, rounds = refinement.simulations(study)
+    failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
     return {
         "wear": lives.simulations(scene),
         "sensitivity": sensitivities.simulations(study),
         "kriging": surrogates.simulations(study),
         "check": begun,
         "infill": rounds,
-        "verification": (extremes + verified) * count,
+        "edge": edge.simulations(study),
+        "verification": (extremes + verified) * (count + failing // len(study.cases)),
         "pairs": tolerance.simulations(study),
         "lives": lives.simulations_of_designs(scene),
         "chaos": (extremes + verified) * 2 * chaos.PAIRS,
