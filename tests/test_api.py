@@ -62,7 +62,7 @@ def test_evaluate_refuses_what_makes_no_mechanism():
     scene = hpcclear.load_scene(SCENE, SHORT)
     with pytest.raises(InputError, match=r"sample 1.*clearance as large"):
         hpcclear.evaluate(scene, {"C": [3e-4, 0.05]})
-    with pytest.raises(InputError, match="nothing"):
+    with pytest.raises(InputError, match="no entry is varied"):
         hpcclear.evaluate(scene, {})
     with pytest.raises(InputError, match="not a number of this scene"):
         hpcclear.evaluate(scene, {"drive.spead": 1.0})

@@ -121,10 +121,8 @@ TURN_END = OF_SAMPLE(
     "angle of the free body that gives the period at which its revolution ends: its start and all its turns",
     "rad",
 )
-HELD_MOMENT = OF_SAMPLE(
-    "of a sample without anything to integrate: largest moment of the drive", "N m"
-)
-HELD_DEVIATION = OF_SAMPLE("likewise: deviation of the followed acceleration", "m/s^2")
+HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest drive torque", "N m")
+HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
 LAW_NUMBERS = 8
@@ -137,7 +135,7 @@ EXPONENT = OF_JOINT(
     "of the depth in the normal force; this and the next are what peaks between steps are found by"
 )
 DAMPING = OF_JOINT(
-    "factor of the rate in the normal force, of the rate over the impact speed in a latched law",
+    "factor of the rate in the normal force, or of the rate over the impact speed",
     "s/m",
 )
 DEEPEST_VALID = OF_JOINT("depth from where on a result is flagged", "m")
@@ -173,7 +171,7 @@ PARAMETERS = OF_SAMPLE.end
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
 # What joints have stands side by side, so that the compiler knows the distances between one joint's rows, whichever it is.
-# Rates that are integrated name the effect that asks for them.
+# Rates that are integrated name the effect that requires them.
 WRITTEN = Rows()
 EACH = MAX_JOINTS
 GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
@@ -290,7 +288,7 @@ RATE_ERROR = OF_LANE("weighted by the difference of the pair", size=RATES)
 INTEGRAL = OF_LANE("since the start of the revolution (gaps: of their absolute values)", size=RATES)
 TIME = OF_LANE("since the start of this revolution", "s")
 STEP = OF_LANE("the step being tried", "s")
-NEXT_STEP = OF_LANE("what the controller asks for", "s")
+NEXT_STEP = OF_LANE("step that the controller proposes", "s")
 STAGE_TIME = OF_LANE("of the stage", "s")
 ERROR = OF_LANE("mean square of the scaled error")
 LOG_ERROR = OF_LANE("log2 of the last accepted one")
@@ -319,7 +317,7 @@ STRICTER_WITHIN = OF_LANE("that within the range of stability")
 STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
 MAX_CURVES = 8
 CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
-ACTIVE = OF_LANE("contact latched (1) or flight (0)", "", EACH)
+ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
 INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
 PEAK = OF_LANE("largest contact force", "N", EACH)
 DEEPEST = OF_LANE("largest penetration", "m", EACH)
@@ -364,12 +362,12 @@ OUT_TIME = OF_OUTCOME("of these", "s")
 OUT_ATTEMPTS = OF_OUTCOME("steps tried")
 OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
 OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
-OUT_ACCELERATION = OF_OUTCOME("deviation of the followed acceleration", "m/s^2")
+OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
 OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
 OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
 OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
 OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
-OUT_ACTIVE = OF_OUTCOME("contact latched at the end", "", EACH)
+OUT_ACTIVE = OF_OUTCOME("contact whose impact speed is kept, at the end", "", EACH)
 OUT_INVERSE_IMPACT = OF_OUTCOME("1 / d'_0 there", "s/m", EACH)
 OUT_LARGEST_RATE = OF_OUTCOME("of the objective's", "", EACH)
 OUT_MEAN = OF_OUTCOME(

@@ -1,4 +1,4 @@
-"""Rows of a flat buffer, numbered one behind the other as they are declared: what each holds, its unit, who asks for it."""
+"""Rows of a flat buffer, numbered one behind the other as they are declared: what each holds, its unit, who requires it."""
 
 from typing import NamedTuple
 
