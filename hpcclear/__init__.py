@@ -9,12 +9,14 @@ Public names are loaded when they are first used, so that importing the package 
 - `run_study`: the whole study
 - `to_table`: a result as a pandas DataFrame
 - `ContactLaw`, `FrictionLaw`, `Parameter`: what a law of one's own declares
+- `Objective`: what an objective of one's own declares
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hpcclear.base.objectives import Objective
     from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
@@ -28,6 +30,7 @@ __version__ = "0.1.0"
 __all__ = [
     "ContactLaw",
     "FrictionLaw",
+    "Objective",
     "Parameter",
     "Scene",
     "evaluate",
@@ -41,6 +44,7 @@ __all__ = [
 _HOME = {
     "ContactLaw": "dynamics.laws.declared",
     "FrictionLaw": "dynamics.laws.declared",
+    "Objective": "base.objectives",
     "Parameter": "dynamics.laws.declared",
     "Scene": "scene",
     "load_scene": "scene",

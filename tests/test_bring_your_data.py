@@ -286,3 +286,28 @@ def test_editors_take_files():
     assert not list(validator.iter_errors(content))
     content["effects"]["slider_load"]["bor"] = 1
     assert list(validator.iter_errors(content))
+
+
+def test_a_sketch_draws_each_table():
+    from hpcclear.dynamics.planar.problem import poses_at_start
+    from hpcclear.report import sketch_figure
+    from hpcclear.report.figures.curves import tabulated
+
+    linkage = load_scene(LINKAGE)
+    (gas,) = tabulated(linkage)
+    assert (gas.key, gas.unit, gas.turns) == ("mechanism.loads.gas.size", "N", 2)
+    with_load = load_scene(
+        JOBS / "slider_crank.toml",
+        ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
+    )
+    for scene, poses, peak in ((linkage, poses_at_start(linkage), None), (with_load, None, 1.0)):
+        figure = sketch_figure(scene, poses)
+        curve = figure.axes[-1]
+        (line,) = curve.get_lines()
+        angles, values = line.get_data()
+        assert curve.get_xlim() == (0.0, 360.0 * tabulated(scene)[0].turns)
+        assert angles[0] < 0.0 < 360.0 < angles[-1] + 1e-9  # the seam is drawn closed
+        assert values[1] == values[-1]
+        assert "kN" in curve.get_title(loc="left")
+        assert peak is None or values.max() == peak
+    assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []

@@ -29,7 +29,7 @@ import formula
 
 def test_the_accuracy_of_a_probability_follows_what_is_allowed():
     rare = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
-    assert goals.wanted(rare, MomentAccuracy()) == (1e-4, False)
+    assert goals.wanted(rare, MomentAccuracy()) == (2e-5, False)
     assert goals.wanted(rare, MomentAccuracy(exceedance=0.02)) == (0.02, False)
     assert goals.wanted(Goal(statistic="exceedance", limit=1.0), MomentAccuracy()) == (0.01, False)
 

@@ -3,6 +3,7 @@
 import dis
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,7 +116,10 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS, first=0)
+    every, whole = (SimpleNamespace(whole=flag, largest=None) for flag in (None, 1))
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(
+        joints=at.MAX_JOINTS, first=0, objective=every
+    )
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
     responses = at.Effects(joints=2, responses=1)
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
@@ -127,6 +131,9 @@ def test_what_is_measured_goes_by_the_effects():
     assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
     worn = at.Effects(joints=1, first=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
+    judged = at.Effects(joints=1, first=1, objective=every)
+    assert list(at.measures_of(judged)) == [at.JOINTS[1].objective_rate]
+    assert list(at.measures_of(judged._replace(objective=whole))) == [at.OBJECTIVE_RATES]
     for mask, largest in (
         (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
         (at.JOINT_MASK, at.MAX_JOINTS - 1),
@@ -187,9 +194,10 @@ def test_no_stepper_names_a_rate_of_its_own():
     powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
     followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
     own = powers | followed
-    of_joints = {row for joint in at.JOINTS for row in (joint.force, joint.sliding_power)}
+    fields = ("force", "sliding_power", "objective_rate")
+    of_joints = {getattr(joint, field) for joint in at.JOINTS for field in fields}
     assert {getattr(at, name) for name in own} | of_joints == rows
-    own |= {"SLIDING_POWERS", "sliding_power"}
+    own |= {"SLIDING_POWERS", "sliding_power", "OBJECTIVE_RATES", "objective_rate"}
     room = Path(hpcclear.dynamics.__file__).parent
     for folder in ("explicit", "implicit"):
         for path in (room / folder).glob("*.py"):

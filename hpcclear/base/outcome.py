@@ -139,7 +139,7 @@ RESPONSES = (
 )
 """Fields of `OUTCOME` that a study of one of them asks for."""
 
-ON_REQUEST = (*RESPONSES, "sliding_work", "sliding_waves", "energy_error")
+ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
@@ -175,6 +175,11 @@ OUTCOME = np.dtype(
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
+        (
+            "rate_of_objective",
+            np.float64,
+            MAX_JOINTS,
+        ),  # what is made of the objective's own rate; NaN without one
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         (
             "sliding_waves",

@@ -41,6 +41,7 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
+    objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
@@ -166,7 +167,13 @@ FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of a guided body, or of a point alon
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
 FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
 SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-FORCE_KINKS = SLIDING_POWERS + MAX_JOINTS
+OBJECTIVE_RATES = SLIDING_POWERS + MAX_JOINTS  # of each joint, or the first of the whole mechanism
+SLIDING_SPEEDS = (
+    OBJECTIVE_RATES + MAX_JOINTS
+)  # of each joint; these and normals for the objective's rate only
+NORMALS_X = SLIDING_SPEEDS + MAX_JOINTS
+NORMALS_Y = NORMALS_X + MAX_JOINTS
+FORCE_KINKS = NORMALS_Y + MAX_JOINTS
 """Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
 sides of friction's ramp."""
 LOW_KINKS = FORCE_KINKS + MAX_JOINTS
@@ -192,6 +199,7 @@ _PLACES = range(MAX_JOINTS)
 GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
 _FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
 _SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
+_OBJECTIVES = tuple(Integrated(OBJECTIVE_RATES + k, "objective") for k in _PLACES)
 _PROFILES = tuple(Integrated(PROFILES + k, "profile") for k in range(WAVE_ROWS))
 MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
@@ -203,6 +211,7 @@ MEASURES = (
     Integrated(FOLLOWED_SQUARE, "responses"),
     Integrated(FOLLOWED_ACROSS, "responses"),
     *_SLIDING,
+    *_OBJECTIVES,
 )
 INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
@@ -223,10 +232,16 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
+    places = open_of(effects)
+    whole = effects.objective is not None and effects.objective.whole
     closed = {
         one.rate
-        for of_joints in (_FORCES, _SLIDING)
-        for one, flag in zip(of_joints, open_of(effects), strict=True)
+        for of_joints, there in (
+            (_FORCES, places),
+            (_SLIDING, places),
+            (_OBJECTIVES, Open(1) if whole else places),
+        )
+        for one, flag in zip(of_joints, there, strict=True)
         if flag is None
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
@@ -288,7 +303,8 @@ INVERSE_IMPACT = ACTIVE + MAX_JOINTS  # 1 / d'_0
 PEAK = INVERSE_IMPACT + MAX_JOINTS
 DEEPEST = PEAK + MAX_JOINTS  # largest penetration
 ENDED = DEEPEST + MAX_JOINTS  # contacts ended in this revolution
-WORK = ENDED + MAX_JOINTS
+LARGEST_RATE = ENDED + MAX_JOINTS  # of the objective's
+WORK = LARGEST_RATE + MAX_JOINTS
 
 BANK = WORK + PARAMETERS
 """Rows of what a motion reads and writes: those of `work`, then the parameters."""
@@ -337,8 +353,9 @@ OUT_LATCHED = OUT_PEAK + MAX_JOINTS
 OUT_DEEPEST = OUT_LATCHED + MAX_JOINTS
 OUT_ACTIVE = OUT_DEEPEST + MAX_JOINTS
 OUT_INVERSE_IMPACT = OUT_ACTIVE + MAX_JOINTS
+OUT_LARGEST_RATE = OUT_INVERSE_IMPACT + MAX_JOINTS
 OUT_MEAN = (
-    OUT_INVERSE_IMPACT + MAX_JOINTS
+    OUT_LARGEST_RATE + MAX_JOINTS
 )  # time means over the averaged revolutions, in the order of INTEGRATED
 OUT_TOTAL = OUT_MEAN + len(INTEGRATED)  # integrals over all revolutions, likewise
 OUT_STATE = OUT_TOTAL + len(INTEGRATED)
@@ -364,6 +381,10 @@ class Joint(NamedTuple):
     low_kink: int
     high_kink: int
     sliding_power: int
+    objective_rate: int
+    sliding_speed: int
+    normal_x: int
+    normal_y: int
     active: int  # rows of `work`
     inverse_impact: int
 
@@ -371,7 +392,9 @@ class Joint(NamedTuple):
 JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
-        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
+        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
+        OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip
@@ -417,6 +440,7 @@ class Rules(NamedTuple):
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
     profile: Any  # where around joints sliding work is done is told
+    largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`
 
@@ -425,7 +449,8 @@ def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
-    flags = (e.latched, e.torque, turning, e.responses, e.profile)
+    largest = None if e.objective is None else e.objective.largest
+    flags = (e.latched, e.torque, turning, e.responses, e.profile, largest)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

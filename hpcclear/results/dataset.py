@@ -115,7 +115,7 @@ def dataset(
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
-    if objective != MEAN_GAP:
+    if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 

@@ -54,6 +54,7 @@ def linkage_of(scene: Scene) -> Linkage:
         gravity=scene.effects.gravity > 0.0,
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
+        objective=scene.objective.rate_of,
         bristled=scene.bristles > 0,
         waves=any(scene.waves().values()),
         places=scene.open_places,
@@ -64,16 +65,22 @@ def linkage_of(scene: Scene) -> Linkage:
 
 def _check_followed(scene: Scene, follow: str) -> None:
     """InputError where the objective is of something that is not followed."""
-    name, point = scene.objective.name, "." in follow
-    if name == "slider-acceleration-deviation" and (point or not follow):
+    name, asks, point = scene.objective.name, scene.objective.asks, "." in follow
+    if "slider_acceleration_deviation" in asks and (point or not follow):
         raise InputError(
-            "study.objective", name,
+            scene.objective_key, name,
             "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
             'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
-    if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
+    if "acceleration_x" in asks and not follow:
         raise InputError(
-            "study.objective", name, "no point is followed",
+            scene.objective_key, name, "nothing is followed, and it asks for an acceleration",
+            'Name a point: mechanism.followed = "body.point"',
+        )  # fmt: skip
+    of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}
+    if asks & of_points and not point:
+        raise InputError(
+            scene.objective_key, name, "no point is followed",
             'Name it: mechanism.followed = "body.point"',
         )  # fmt: skip
 
