@@ -116,7 +116,9 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
         reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
         raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
     if quantity.nonzero and lower < 0.0 < upper:
-        raise invalid("0 is between the bounds", "Keep to one sign: nothing turns at 0", key=key)
+        raise invalid(
+            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
+        )
     return lower, upper
 
 
