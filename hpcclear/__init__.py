@@ -7,6 +7,7 @@ Public names are loaded when they are first used, so that importing the package 
 - `evaluate`: many designs as an xarray Dataset, in this process
 - `grid`: a map, its entries as coordinates
 - `run_study`: the whole study
+- `to_table`: a result as a pandas DataFrame
 - `ContactLaw`, `FrictionLaw`, `Parameter`: what a law of one's own declares
 """
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
     from hpcclear.ensemble.maps import grid
+    from hpcclear.report.tables import to_table
     from hpcclear.scene import Scene, load_scene
     from hpcclear.study import run_study
 
@@ -33,6 +35,7 @@ __all__ = [
     "load_scene",
     "run_study",
     "simulate",
+    "to_table",
 ]
 
 _HOME = {
@@ -45,6 +48,7 @@ _HOME = {
     "evaluate": "ensemble.api",
     "grid": "ensemble.maps",
     "run_study": "study",
+    "to_table": "report.tables",
 }
 
 

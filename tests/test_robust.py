@@ -382,7 +382,7 @@ def test_an_input_over_many_length_scales_is_refused():
 
 def test_matern_has_no_tensor_rule_and_no_closed_form():
     rough = replace(surrogate(), kernel=MATERN)
-    with pytest.raises(InputError, match="no product") as caught:
+    with pytest.raises(InputError, match="not a product") as caught:
         RobustObjective(rough, DESIGN, UNIFORM[:1])
     assert caught.value.key == "surrogate"
     averaged = RobustObjective(rough, DESIGN, UNIFORM[:1], draws=(64, np.random.default_rng(0)))

@@ -24,6 +24,7 @@ from hpcclear.scene import units as scene_units
 from hpcclear.scene.domain import box
 from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
+from hpcclear.scene.unit_names import UNITS
 
 ROOT = Path(__file__).parent.parent
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
@@ -367,9 +368,10 @@ def test_widened_box_holds_every_random_inertia() -> None:
 
 def test_common_units_agree_with_pint() -> None:
     registry = pint.UnitRegistry()
-    for (unit, target), factor in scene_units._COMMON.items():
-        expected = registry.Quantity(1.0, unit).to(target).magnitude
-        assert float(factor) == pytest.approx(expected, rel=4e-16)
+    for unit, (size, powers) in UNITS.items():
+        expected = registry.Quantity(1.0, unit.replace("‰", "permille")).to_root_units()
+        assert float(size) == pytest.approx(expected.magnitude, rel=1e-15), unit
+        assert {str(k): v for k, v in expected.unit_items()} == powers, unit
 
 
 @pytest.mark.parametrize(

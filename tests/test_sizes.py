@@ -113,17 +113,17 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS)
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS, first=0)
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
-    responses = at.Effects(crank_rod=1, rod_slider=1, responses=1)
+    responses = at.Effects(joints=2, responses=1)
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
-    assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
-    assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
+    assert list(at.measures_of(responses)) == [at.FORCE, at.FORCE + 1, *followed]
+    assert list(at.measures_of(responses._replace(joints=1, first=1))) == [at.FORCE + 1, *followed]
     assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
         at.FORCE + k for k in range(3)
     ]
-    assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
-    worn = at.Effects(rod_slider=1, wear=1)
+    assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
+    worn = at.Effects(joints=1, first=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
     for mask, largest in (
         (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
@@ -141,7 +141,7 @@ def test_rules_are_numbers_of_one_kind():
     for effects, on in (
         (at.Effects(), set()),
         (effects_with({"latched", "torque"}), {"latched", "free", "turning"}),
-        (effects_with({"baumgarte", "coulomb", "gravity"}), {"turning"}),
+        (effects_with({"baumgarte", "coulomb", "wear"}), {"turning"}),
     ):
         rules = at.rules_of(effects)
         assert {name for name in rules._fields[:-2] if getattr(rules, name)} == on
@@ -150,8 +150,8 @@ def test_rules_are_numbers_of_one_kind():
 
 def test_rules_say_which_joints_are_open():
     for effects, places in (
-        (at.Effects(crank_rod=1, rod_slider=1), (0, 2)),
-        (at.Effects(rod_slider=1), (1, 2)),
+        (at.Effects(joints=2), (0, 2)),
+        (at.Effects(joints=1, first=1), (1, 2)),
         (at.Effects(joints=5), (0, 5)),
         (at.Effects(torque=1), (0, 0)),
     ):

@@ -260,7 +260,7 @@ def test_a_range_that_does_not_hold_the_lives_says_what_would(tmp_path):
     code, output = run(words(tmp_path / "narrow", "study.variables.C23.range=[0.28e-3,0.35e-3]"), 0)
     assert code == 2
     assert "study.variables.C23.range" in output
-    assert "lives have clearances from" in output
+    assert "service lives have clearances from" in output
 
 
 def test_ages_that_lives_do_not_reach_are_told(tmp_path):

@@ -48,7 +48,7 @@ _ALL = (
     Objective("mean-gap", "m", "mean distance from the clearance circle", lambda records: records["objective"], "mean_gap"),
     _largest("mean-contact-force", "N", "mean contact force, of the joint where it is larger"),
     _largest("peak-contact-force", "N", "peak contact force, of the joint where it is larger"),
-    _plain("peak-crank-moment", "N m", "peak moment of the drive on the crank"),
+    _plain("peak-crank-moment", "N m", "peak torque of the drive on the crank"),
     _plain("slider-acceleration-deviation", "m/s^2", "standard deviation in time of the slider acceleration"),
     _plain("point-acceleration-deviation", "m/s^2",
         "root mean square about its mean of the acceleration of the followed point"),

@@ -7,13 +7,17 @@ import click
 from hpcclear.cli.options import of_one_process, show
 from hpcclear.ranks.stopping import Exit
 
-_TITLES = {"contact": "normal force", "friction": "friction"}
+_TITLES = {
+    "contact": "effects.contact.law (normal force)",
+    "geometry": "effects.contact.geometry (shapes that touch; left out, spheres)",
+    "friction": "effects.friction.law (friction)",
+}
 
 
 @click.command(short_help="List laws of contact and friction, with their sources.")
 @of_one_process
 def laws() -> int:
-    """List the laws that a scene may name in effects.contact.law and effects.friction.law.
+    """List the laws and contact geometries that a scene may name in effects.contact and effects.friction.
 
     Each with its formula, parameters, units, bounds, range and source. A law of your own: docs/extending.md.
 
@@ -23,7 +27,7 @@ def laws() -> int:
     from hpcclear.scene.laws import known_laws
 
     for kind, title in _TITLES.items():
-        show(f"effects.{kind}.law ({title})")
+        show(title)
         for name, law in known_laws(kind).items():
             console().print(table(name, list(_rows(law))))
     return Exit.DONE

@@ -198,7 +198,7 @@ def responses_told(problem: Problem) -> tuple[str, ...]:
     if not problem.effects.responses:
         return ()
     linkage = problem.linkage
-    if linkage is None or (linkage.follow and not linkage.follows_a_point):
+    if linkage.follow and not linkage.follows_a_point:
         return tuple(name for name in RESPONSES if "point" not in name)
     followed = "point" if linkage.follows_a_point else "nothing"
     return tuple(name for name in RESPONSES if followed in name or "acceleration" not in name)

@@ -18,22 +18,15 @@ MAX_COORDINATES = 24
 class Effects(NamedTuple):
     """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
 
-    crank_rod: Any = None  # clearance at O12
-    rod_slider: Any = None  # clearance at O23
-    joints: Any = None  # of a linkage other than the slider-crank: how many have clearance
+    joints: Any = None  # how many have clearance
+    first: Any = 0  # place of the first of them; the others follow
     contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
     friction: Any = None
-    torque: Any = None  # the crank is free, driven by a torque
-    torque_table: Any = None
-    torque_falls: Any = None  # with the speed
-    gravity: Any = None
-    load: Any = None  # constant slider load
-    load_table: Any = None
-    guide: Any = None  # guide friction on the slider
-    baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
+    torque: Any = None  # the body that gives the period is free, driven by a torque
+    baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
-    responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
+    responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
@@ -48,7 +41,6 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
-    bending: Any = None  # of a slider-crank's rod: how many modes, each a coordinate
 
     @property
     def latched(self) -> Any:
@@ -83,10 +75,8 @@ def bristles_of(effects: Effects) -> int:
 
 
 def open_of(effects: Effects) -> Open:
-    """Those of a set of effects: O12 has the first place and O23 the second; other linkages fill them from the first on."""
-    if effects.joints is not None:
-        return Open(*[1] * effects.joints)
-    return Open(effects.crank_rod, effects.rod_slider)
+    """Those of a set of effects."""
+    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -115,41 +105,21 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
 
 # ---- parameters of one sample -------------------------------------------------------------------
 (
-    SPEED,  # rad/s, prescribed crank speed
-    CRANK_LENGTH,
-    ROD_LENGTH,
-    ROD_NEAR,  # u2: from the first pin to the mass centre
-    ROD_FAR,  # L2 - u2
-    ROD_MASS,
-    INV_ROD_MASS,
-    ROD_INERTIA,
-    INV_ROD_INERTIA,
-    SLIDER_MASS,
-    INV_SLIDER_MASS,
-    CRANK_MOMENT,  # m1 u1
-    CRANK_INERTIA,  # about the crank's bearing, flywheel included
-    GRAVITY,
-    LOAD,
-    TORQUE,
-    TORQUE_FALL,  # share of it that a rad/s takes: the inverse of the speed without load
-    GUIDE_COEFFICIENT,
-    GUIDE_INVERSE_RAMP,
-    BAUMGARTE_ALPHA2,  # 2 alpha
-    BAUMGARTE_BETA2,  # beta^2
+    SPEED,  # rad/s, of the drive: a turn over its share of the period
+    DRIVEN_LENGTH,  # m, largest distance between points of the body that gives the period
     PERIOD,  # s, one revolution at the prescribed speed
     FIRST_STEP,  # s
-    CRANK_MASS,
-    CRANK_NEAR,  # u1
-    CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
-    SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
     EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
     TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
-) = range(30)
+    HELD_MOMENT,  # N m, of a sample without anything to integrate: largest moment of the drive,
+    HELD_DEVIATION,  # m/s^2, deviation of the followed acceleration
+    HELD_PEAK,  # m/s^2, and its largest size
+) = range(10)
 JOINT_ROWS = 30
 LAW_NUMBERS = 8
 """Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
-JOINT_BLOCKS = 30  # of all joints, one behind the other
+JOINT_BLOCKS = 10  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,
@@ -171,12 +141,8 @@ FRICTION_NUMBERS = CONTACT_NUMBERS + LAW_NUMBERS
     FILM_FLOOR,  # least thickness over the clearance
     FILM_STEEPNESS,  # s/m, of the film's force over that of inertia; with bristles next to nothing, but not nothing
 ) = range(FRICTION_NUMBERS + LAW_NUMBERS, JOINT_ROWS)
-JOINT_12 = JOINT_BLOCKS
-JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
-"""First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
-BENDING = OWN
-"""First row of what a slider-crank's rod that bends has, in the order of `linkage.bending.entries`."""
+"""First row of what a linkage has of its own."""
 WAVES = OWN + 192
 """First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
 of them another, its slope's."""
@@ -193,13 +159,10 @@ PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS
 GAP = 0
 FORCE = GAP + MAX_JOINTS
 GAP_RATE = FORCE + MAX_JOINTS
-(GAP_12, GAP_23), (FORCE_12, FORCE_23), (RATE_12, RATE_23) = (
-    (first, first + 1) for first in (GAP, FORCE, GAP_RATE)
-)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of the slider, or of a point along x; for responses only
+FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of a guided body, or of a point along x; responses only
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
 FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
 SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
@@ -319,7 +282,6 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
 ) = range(INTEGRAL + RATES, INTEGRAL + RATES + 27)
 MAX_CURVES = 8
 CURVES = STRICTER_AT_EDGE + 1  # values of tabulated curves at the stage
-TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
 # of each joint
 ACTIVE = CURVES + MAX_CURVES  # contact latched (1) or flight (0)
 INVERSE_IMPACT = ACTIVE + MAX_JOINTS  # 1 / d'_0
@@ -336,7 +298,6 @@ STAGES = BANK
 
 # ---- tabulated curves, one behind the other -----------------------------------------------------
 CELLS = 2048  # cubic cells over one turn, 4 coefficients each
-TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
 TABLES = 4 * MAX_CURVES * CELLS  # at most
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
@@ -414,7 +375,6 @@ JOINTS = tuple(
     )
     for k in _PLACES
 )  # fmt: skip
-O12, O23 = JOINTS[:2]
 
 
 class Block(NamedTuple):

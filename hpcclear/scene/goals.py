@@ -1,4 +1,4 @@
-"""What a case asks of a design: statistics of f over its random inputs, or a formula, made small or kept below a limit."""
+"""Objectives and constraints of a case: statistics of f over its random inputs, or formulas, minimised or bounded."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -40,7 +40,9 @@ class Goal(Table):
                     str(error), "Write, say, m2 + m3", "formula", self.formula[:80]
                 ) from None
         if self.statistic == "exceedance" and self.limit is None:
-            raise invalid("what is exceeded is not said", "Add limit, a value of f", "limit", None)
+            raise invalid(
+                "the threshold is missing", "Add limit, the threshold of f", "limit", None
+            )
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
@@ -52,7 +54,7 @@ class Goal(Table):
         return 0.95 if self.level is None else self.level
 
     def same_as(self, other: "Goal") -> bool:
-        """Whether it is the same of every design, as far as spelling tells."""
+        """Whether it is the same for every design, as far as its spelling shows."""
         if self.formula is not None and other.formula is not None:
             return "".join(self.formula.split()) == "".join(other.formula.split())
         same = (self.statistic, self.limit) == (other.statistic, other.limit)
@@ -84,7 +86,7 @@ MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
 def in_si(case: Any, objective: object, key: str) -> Any:
-    """A case's row with words as goals, and `limit` and `most` in SI by the unit of the study's objective.
+    """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     Raises
     ------

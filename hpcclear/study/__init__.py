@@ -11,7 +11,7 @@
 5. Verification: the best of them, on scatter of their own. Alpha has the least mean, beta the least
    deviation (gamma, delta, epsilon the least of what a case makes small besides), and each design of the front is surely
    better than each other in one of them.
-6. Chaos: samples of these designs twice, a hair beside, for the share of their scatter that is chaos.
+6. Chaos: samples of these designs twice, with a relative perturbation of 1e-9, for the share of their scatter that is chaos.
 7. Findings: responses of the optimised designs; for the scene of a publication also what it prints
    and claims, beside ours (`hpcclear.study.paper`).
 
@@ -85,7 +85,7 @@ def run_study(
     """
     study = scene.required_study
     if not study.cases:
-        raise InputError("study.cases", None, "there is nothing to optimise", "Name a case")
+        raise InputError("study.cases", None, "there is no case to optimise", "Name a case")
     lives.check(scene)
     optimisation.check(scene)
     for text in unused(scene):

@@ -19,6 +19,10 @@ SMOOTH = 0.1
 """Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
 
 
+SHARE_OF_MOST = 0.1
+"""Half-width of a probability, over the largest that is allowed, at which it is known well enough though not decided."""
+
+
 @dataclass(frozen=True)
 class Told:
     """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
@@ -59,7 +63,8 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     if goal.statistic == "quantile":
         return accuracy.quantile or accuracy.deviation, True
     if goal.statistic == "exceedance":
-        return accuracy.exceedance or 0.01, False
+        usual = SHARE_OF_MOST * goal.most if isinstance(goal, Constraint) else 0.01
+        return accuracy.exceedance or usual, False
     return 1e-6, True
 
 

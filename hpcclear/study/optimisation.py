@@ -148,7 +148,7 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
 
     try:
         objective = averaged(draws)
-    except InputError:  # no rule has nodes enough for a model as short of breath as its noise
+    except InputError:  # length scales too short for a quadrature rule
         if draws is not None:
             raise
         objective = averaged((study.swarm.monte_carlo_samples, rng))

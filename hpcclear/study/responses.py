@@ -13,7 +13,7 @@ from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import Planar, turns_of
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
@@ -108,10 +108,11 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
 
 
 def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
-    """The response after its transient."""
-    turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+    """The response after its transient, all of which is averaged."""
+    turns = turns_of(scene.linkage)
     begin = 2.0 * np.pi * turns * scene.numerics.transient_revolutions
-    return response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    kept = response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    return kept.assign_attrs(transient_turns=0)
 
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:

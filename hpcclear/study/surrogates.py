@@ -37,7 +37,7 @@ def domain(run: StudyRun, names: Sequence[str]) -> Box:
 
 
 def method_of(scene: Scene) -> Method:
-    """The kind of surrogate that a study asks for.
+    """The kind of surrogate that a study requests.
 
     Raises
     ------

@@ -108,6 +108,9 @@ def _call(law: Law, name: str, **others: str) -> str:
 
 def _contact(law: Law) -> dict[str, str]:
     functions = law.functions()
+    if "factor" in functions:
+        elastic, kink = _call(law, "elastic"), _call(law, "factor")
+        return {"force": f"no_less({elastic} * {kink}, 0.0)", "elastic": elastic, "kink": kink}
     at_rest = _call(law, "force", rate="0.0")
     elastic = _call(law, "elastic") if "elastic" in functions else at_rest
     kink = f"{_call(law, 'force')} / ({elastic} + 1e-300)"

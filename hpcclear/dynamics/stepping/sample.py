@@ -48,7 +48,7 @@ def make_stricter(lane, W, work, par, settings):
         row = at.JOINT_BLOCKS + k * at.JOINT_ROWS + at.FILM_STEEPNESS
         film = max(film, par[row * W + lane])
     rtol = settings[RTOL]
-    speed = 1.0 + par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]
+    speed = 1.0 + par[at.SPEED * W + lane] * par[at.DRIVEN_LENGTH * W + lane]
     by_film = rtol * min(speed * film / OF_INERTIA, 1.0 / STRICT)
     within = max(par[at.STRICTNESS * W + lane], by_film * by_film)
     edge = 0.0

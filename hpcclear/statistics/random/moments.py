@@ -142,7 +142,12 @@ class RobustObjective:
             self._draws = self._drawn(*draws)
         elif not model.separable:
             label = model.leaves[0].label
-            raise InputError("surrogate", label, "no product of the inputs", 'use "monte-carlo"')
+            raise InputError(
+                "surrogate",
+                label,
+                "the model is not a product of functions of single inputs",
+                'use "monte-carlo"',
+            )
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes)  # type: ignore[arg-type]
@@ -187,7 +192,10 @@ class RobustObjective:
         simple = isinstance(leaf, Kriging) and leaf.separable and not others
         if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
-                "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
+                "model",
+                self.model.names,
+                "the model has no closed form",
+                "compare with Monte Carlo",
             )
         return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
 

@@ -5,7 +5,7 @@ to 0.1, r1 and r2 one random number each per particle. What the paper leaves ope
 setting for all problems:
 
 - **Archive**: the feasible non-dominated points met, thinned where crowded (`pareto.Archive`).
-- **Leaders** (P_g): tournaments of `tournament` archive members; the loneliest one wins.
+- **Leaders** (P_g): tournaments of `tournament` archive members; the least crowded member wins.
 - **Personal best** (P): the newest point, unless the old one dominates or equals it.
 - **Bounds**: speeds clipped at `speed_limit` of each range; a particle that leaves is put on the
   bound and that component of its velocity is reversed.
@@ -42,7 +42,7 @@ BROKEN_ANEW = 0.3
 
 
 class ParticleSwarm:
-    """A particle swarm that asks for points to evaluate and is told their objectives.
+    """A particle swarm that requests points to evaluate and receives their objectives.
 
     Parameters
     ----------

@@ -166,7 +166,7 @@ def _uncertainty(slope: Array, error: Array, truncation: Array) -> Array:
 def _first_determined(
     slope: Array, error: Array, uncertainty: Array, critical: Array, start: int
 ) -> int | None:
-    """The widest interval after `start` in which, and before which, the slope is surely not 0."""
+    """The widest interval after `start` in which, and before which, the slope is significantly not 0."""
     sure = np.abs(slope) > critical * uncertainty
     sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
     for at in range(start + 1, len(slope)):

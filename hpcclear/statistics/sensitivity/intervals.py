@@ -173,8 +173,8 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
         raise InputError(
             "values",
             int(failed.sum()),
-            "so many simulations failed that no surface can be fitted",
-            "look at their status, mend them, or take more points",
+            "too many simulations failed to fit a surface",
+            "look at their status, correct the cause, or use more points",
         )
     return SensitivityHistory(
         intervals=design.intervals,

@@ -5,12 +5,12 @@ Section 4.2 of the paper, step 4, leaves "greater impact" open. The rule here:
 1. The effect of a variable is its derivative's magnitude times the length of its global interval:
    the change of f over that interval if the slope held. Effects share the unit of f, so kilograms
    compare with metres.
-2. At each clearance the effects are measured against the largest one that can be told from 0 (by
+2. At each clearance the effects are measured against the largest one that differs significantly from 0 (by
    more than z standard errors, z being the normal quantile of the stated confidence). A variable is
 
-   - influential, if its effect can be told from 0 and reaches the stated fraction of the largest;
-   - negligible, if its effect plus z standard errors stays below that fraction, or its effect can
-     be told from 0 and lies below;
+   - influential, if its effect differs significantly from 0 and reaches the stated fraction of the largest;
+   - negligible, if its effect plus z standard errors stays below that fraction, or its effect
+     differs significantly from 0 and lies below;
    - undecided otherwise: the standard error is too large to tell, or there is no estimate.
 
 3. A variable is selected if it is influential at no less than the stated share of the clearances

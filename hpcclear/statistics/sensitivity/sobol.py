@@ -1,4 +1,4 @@
-"""Global sensitivity: Sobol indices of independent inputs, with bootstrap confidence limits.
+"""Global sensitivity: Sobol indices of independent inputs, with bootstrap confidence intervals.
 
 They say which share of the variance of f over the whole box an input is responsible for, alone
 (first order) and with all its interactions (total), where the first-order derivative only speaks
@@ -6,7 +6,7 @@ of one point. The inputs must be independent and uniform in their bounds: an ine
 depend on a mass enters as the ratio, which is independent, not as the inertia.
 
 Estimators: Saltelli et al. 2010 for the first order, Jansen 1999 for the total
-(DOI 10.1016/j.cpc.2009.09.018, table 2, rows b and f), on scrambled Sobol points.
+(DOI 10.1016/j.cpc.2009.09.018, table 2, rows b and f), on randomised Sobol points.
 """
 
 from dataclasses import dataclass
@@ -107,7 +107,7 @@ def analyse_sobol(
             "values",
             n_dropped,
             "a simulation failed in nearly every row",
-            "look at their status, mend them, or narrow the bounds",
+            "look at their status, correct the cause, or narrow the bounds",
         )
     first, total = _indices(y)
     n_rows = y.shape[1]

@@ -68,7 +68,8 @@ class Leaf(Protocol):
         """The input it varies fastest in: where a box is cut."""
 
     def moments(self, points: Array) -> Array | None:
-        """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2); None: those of `predict`."""
+        """Mean and standard deviation over equally likely points of n designs, (n, s, d) to (n, 2); None: those of
+        `predict`."""
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Return the model as plain arrays of numbers and text, of any shapes, without pickle."""
@@ -143,6 +144,6 @@ def inside(
             float(points[row, column]),
             f"outside the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]; "
             "it does not extrapolate",
-            "ask inside the domain, or fit the surrogate on a wider one",
+            "evaluate inside the domain, or fit the surrogate on a wider one",
         )
     return points

@@ -40,7 +40,7 @@ class Accuracy:
     n_test : int
         Test points that counted.
     n_dropped : int
-        Test points whose true value was not finite (a failed simulation).
+        Test points whose simulated value was not finite (a failed simulation).
     constant : bool
         The test values are equal up to rounding, so that R2 and RMAE are undefined.
     scale : float
@@ -68,7 +68,7 @@ class Accuracy:
 
 
 def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
-    """Compare predictions with true values (eqs. 26 and 27, both readings).
+    """Compare predictions with simulated values (eqs. 26 and 27, both readings).
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     Raises
     ------
     InputError
-        If fewer than two true values are finite.
+        If fewer than two simulated values are finite.
 
     Notes
     -----
@@ -99,7 +99,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
             "test points",
             true.size,
             f"accuracy needs at least two finite test values, {n_dropped} failed",
-            "take more test points or mend the failing simulations",
+            "use more test points or correct the failing simulations",
         )
     error, mean = true - predicted, float(true.mean())
     scale = float(np.abs(true).max())

@@ -100,7 +100,8 @@ class Piecewise:
         return out
 
     def moments(self, points: np.ndarray) -> np.ndarray | None:
-        """Mean and deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else None."""
+        """Mean and standard deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else
+        None."""
         return self.leaves[0].moments(points) if len(self.leaves) == 1 else None
 
     def to_arrays(self) -> dict[str, np.ndarray]:

@@ -202,7 +202,8 @@ class Regression:
         return int(np.argmax(spread))
 
     def moments(self, points: Array) -> Array | None:
-        """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2), by the regressor if it has them."""
+        """Mean and standard deviation over equally likely points of n designs, (n, s, d) to (n, 2), by the regressor if it
+        has them."""
         if not hasattr(self._model, "moments"):
             return None
         mean, scale = self._scale

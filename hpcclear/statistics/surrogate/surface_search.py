@@ -71,7 +71,7 @@ Search = Generator[Array, Array, SurfaceSearch]
 def fit_until_accepted(
     evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]], searches: Sequence[Search]
 ) -> list[SurfaceSearch]:
-    """Carry out searches side by side: what all of them ask for is evaluated at once, round by round.
+    """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def search(
             "surrogate",
             tuple(orders),
             f"no surface could be fitted: {attempts[-1].note}",
-            "raise max_points, lower the orders, or mend the failing simulations",
+            "raise max_points, lower the orders, or correct the failing simulations",
         )
     reason = (
         f"no order of {tuple(orders)} reaches R2 >= {targets[0]:g} and RMAE <= {targets[1]:g} "
@@ -176,6 +176,6 @@ def _test_values(values: Array) -> Array:
             "test points",
             len(values),
             "fewer than two of them have a finite value",
-            "take more test points or mend the failing simulations",
+            "use more test points or correct the failing simulations",
         )
     return values
