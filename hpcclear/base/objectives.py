@@ -1,8 +1,7 @@
 """What a study may make small: each objective's name, unit and words, and what it is of a sample's record.
 
-The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` puts the objective that was asked for in its
-place, on the rank that simulated it, and everybody after that reads ``objective``.
-"""
+The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` replaces it by the requested objective, on the
+rank that simulated it, and everybody after that reads ``objective``."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -66,7 +65,7 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth")
 """The same places, as variables of files are called by them."""
 
 MEAN_GAP = OBJECTIVES["mean-gap"]
-"""f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
+"""f of eq. 13, what a scene without a study, and of a study that names no other."""
 
 
 def of_joints(objective: Objective, places: Sequence[int], labels: Sequence[str]) -> Objective:
@@ -88,7 +87,7 @@ _OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("obj
 
 
 def asked(records: Records, objective: Objective) -> Records:
-    """Records (n,) as the kernel leaves them, with the objective that was asked for as ``objective``.
+    """Records (n,) as the kernel leaves them, with the requested objective as ``objective``.
 
     How far f scatters between revolutions and copies says nothing of another objective, so that is NaN then.
     """
