@@ -11,7 +11,7 @@ import report_data as data
 import xarray as xr
 from own_engine import engine
 
-from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.base.objectives import OURS
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import beside
@@ -227,7 +227,7 @@ SHORT |= {("one joint", "slider-acceleration-deviation"), ("damped", "mean-conta
     [
         pytest.param(s, o, marks=[] if (s, o) in SHORT else [pytest.mark.full], id=f"{s} {o}")
         for s in SCENES
-        for o in OBJECTIVES
+        for o in OURS
     ],
 )
 def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, scene, objective):
@@ -261,7 +261,7 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
         if objective != "mean-gap":
             assert "distance from the clearance" not in told
     assert all(len(line) <= 80 for line in printed.replace(str(tmp_path), ".").splitlines())
-    words = OBJECTIVES[objective].words
+    words = OURS[objective].words
     assert words in page
     assert words in " ".join(printed.split())
     for name in ("piston", "shank", "m1"):

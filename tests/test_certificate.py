@@ -765,7 +765,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
         ranks = alone()
         simulations = Simulations(scene, ranks, checkpoint, "quiet")
         run = StudyRun(scene, tmp_path, ranks, checkpoint, simulations, told.append)
-        stage.certify(run)
+        stage.certify(run, certificate_extent)
         return run, (tmp_path / "effects.nc").read_bytes()
 
     first, written = once()

@@ -19,7 +19,7 @@ from hpcclear.cli.printing import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together, tables_of
+from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.ensemble.api import as_points, evaluate
@@ -429,6 +429,6 @@ def test_a_row_like_another_takes_over_what_its_tables_do_not_say():
 def test_the_angle_of_a_body_that_is_held_is_told():
     """By the joint that holds it: it has no coordinate of its own."""
     examples = LINKAGES.parents[1] / "docs" / "mkdocs" / "examples"
-    told = put_together(mechanism_of(tables_of(load_scene(examples / "linkage.toml")))).report()
+    told = put_together(mechanism_of(load_scene(examples / "linkage.toml").linkage)).report()
     assert "frame: 90 deg (from 0)" in told
     assert "crank: 25 deg (from 25)" in told

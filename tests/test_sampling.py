@@ -288,9 +288,9 @@ def test_broken_table_is_refused(tmp_path: Path, text: str, key: str, fragment: 
 
 
 def test_unreadable_tables_are_refused(tmp_path: Path) -> None:
-    latin = tmp_path / "latin.csv"
-    latin.write_bytes("m2\n1\n# für".encode("latin-1"))
-    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero"), latin):
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"m2\n1\n\x81\x02")
+    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero"), binary):
         with pytest.raises(InputError) as caught:
             read_points(path, ROBUST)
         assert caught.value.key == "table of points"

@@ -23,6 +23,7 @@ FILES = (
     "CONTRIBUTING.md",
     "docs/adding-an-effect.md",
     "docs/architecture.md",
+    "docs/citing.md",
     "docs/extending.md",
     "docs/glossary.md",
     "docs/index.md",

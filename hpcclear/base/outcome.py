@@ -68,8 +68,8 @@ _TEXT = {
         "raise the drive torque, the initial speed or the flywheel inertia",
     ),
     Status.AVERAGE_CAP: (
-        "the standard error of the objective was still above its target at the last revolution allowed",
-        "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
+        "an automatic average of an earlier version was still above its target at the last revolution allowed",
+        "set numerics.target_error; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
         "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "
@@ -139,7 +139,7 @@ RESPONSES = (
 )
 """Fields of `OUTCOME` that a study of one of them records."""
 
-ON_REQUEST = (*RESPONSES, "sliding_work", "sliding_waves", "energy_error")
+ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
@@ -159,7 +159,7 @@ OUTCOME = np.dtype(
         (
             "objective_uncertainty",
             np.float64,
-        ),  # m, scatter over kicked copies; NaN unless asked for
+        ),  # m, its half-width: over kicked copies, or of the steady mean; NaN where nothing checked it
         ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
         (
             "peak_contact_force",
@@ -175,6 +175,11 @@ OUTCOME = np.dtype(
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
+        (
+            "rate_of_objective",
+            np.float64,
+            MAX_JOINTS,
+        ),  # what is made of the objective's own rate; NaN without one
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         (
             "sliding_waves",

@@ -21,20 +21,23 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import ensembles, laws, scenes, studies
+from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
 _ROOT_ALONE = (
     scenes.init,
+    scenes.import_,
     scenes.simulate,
     ensembles.merge,
     scenes.report,
     scenes.reproduce,
     scenes.crate,
+    cite.cite,
     scenes.schema,
     laws.laws,
+    *results.COMMANDS,
 )
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 
@@ -42,6 +45,7 @@ _ON_RANKS = (
     scenes.check,
     ensembles.sample,
     ensembles.map_command,
+    ensembles.bifurcation,
     ensembles.wear,
     ensembles.effects,
     studies.run,

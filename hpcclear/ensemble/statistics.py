@@ -170,7 +170,6 @@ class _Streaming:
             self._raw = {
                 "folder": str(raw.absolute()),
                 "attributes": session.attributes,
-                "objective": scene.objective.name,
                 "joints": session.joints,
             }
         self._files = raw_files(self._raw, scene, points)

@@ -71,13 +71,12 @@ def check_worn(scene: Scene) -> None:
                 f"study.random.{name}", name, "is the name of a result", "Rename it, and give its path"
             )  # fmt: skip
     _check_bounds(scene)
-    for entry, off in (("target_error", None), ("uncertainty", False)):
-        if getattr(scene.numerics, entry) != off:
-            raise InputError(
-                f"numerics.{entry}", getattr(scene.numerics, entry),
-                "wear simulations have replicas of their own for the confidence intervals of wear rate and f",
-                "Remove it, and set wear.copies",
-            )  # fmt: skip
+    if scene.numerics.target_error is not None:
+        raise InputError(
+            "numerics.target_error", scene.numerics.target_error,
+            "wear simulations have replicas of their own for the confidence intervals of wear rate and f",
+            "Remove it, and set wear.copies",
+        )  # fmt: skip
 
 
 def _check_bounds(scene: Scene) -> None:
@@ -177,7 +176,7 @@ def follow(
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
     plan = Plan(
-        scene.wear.cycles, scene.wear.tolerance, float(_averaged(scene)), scene.wear.copies,
+        scene.wear.cycles, scene.wear.tolerance, float(scene.numerics.averaged_revolutions), scene.wear.copies,
         scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
     )  # fmt: skip
     relief = relief_of(scene)
@@ -230,13 +229,8 @@ def _simulated(
 def waiting_longer(scene: Scene) -> Scene:
     """The scene for copies that wait longer before they are measured, by an interval as long as is averaged."""
     numerics = scene.numerics
-    wait = numerics.transient_revolutions + int(_averaged(scene))
+    wait = numerics.transient_revolutions + numerics.averaged_revolutions
     return scene.with_({"numerics.transient_revolutions": wait})
-
-
-def _averaged(scene: Scene) -> int:
-    averaged: Any = scene.numerics.averaged_revolutions
-    return 1 if averaged == "auto" else averaged
 
 
 def _go_on(

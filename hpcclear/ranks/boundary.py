@@ -24,6 +24,7 @@ from hpcclear.base.errors import (
     check_address_space,
     mendable,
 )
+from hpcclear.base.extras import installing
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
@@ -204,8 +205,8 @@ def _load_mpi() -> Any:
             "MPI library",
             "none",
             f"mpi4py cannot load one ({' '.join(str(error).split())})",
-            "Load the site's MPI module, set MPI4PY_LIBMPI to its libmpi, or install one with "
-            "pip install 'hpcclear[mpich]'",
+            "Load the site's MPI module, or set MPI4PY_LIBMPI to its libmpi. To have one of your own: "
+            + installing("mpich").partition(": ")[2],
         ) from error
     return MPI
 

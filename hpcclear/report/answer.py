@@ -66,7 +66,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     scatter = _scatter(files, best)
     return [
         Line("recommended", _named(best)),
-        Line("criterion", f"lowest {_merit(ours)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
+        Line("criterion", f"{_merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
              f"f: {labels.objective(verified)}"),
         Line("values", _values(best)),
         Line("mean", _moment(best, "mean", original)),
@@ -138,9 +138,11 @@ def constraints(best: xr.Dataset) -> Iterator[str]:
     """Yield the constraints of the case of a design, each with its value and verdict."""
     if "constraints" in best and str(best["constraints"].item()):
         for text in str(best["constraints"].item()).split("; "):
-            head, _, verdict = text.rpartition(": ")
-            shown = re.sub(r" (\S+) at most", r" = \1, at most", labels.statistic(head))
-            yield f"{shown}: {VERDICTS.get(verdict, verdict)}" if head else text
+            text = re.sub(r" ([^\s)]+) at most", r" = \1, at most", labels.statistic(text))
+            text = text.replace(") at most", "), at most")
+            for word, printed in VERDICTS.items():
+                text = text.replace(f": {word}", f": {printed}")
+            yield text
 
 
 def is_plain(one: xr.Dataset) -> bool:
@@ -154,7 +156,7 @@ def is_plain(one: xr.Dataset) -> bool:
 def standing(text: str) -> str:
     """Return the worst verdict on a design's constraints, in the words of the file."""
     for word in VERDICTS:
-        if any(part.endswith(f": {word}") for part in text.split("; ")):
+        if f": {word}" in text:
             return word
     return ""
 
@@ -197,20 +199,44 @@ def _judged(ours: xr.Dataset) -> np.ndarray:
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
     order = ("", "kept", "cannot be told", "broken")
     ranks = np.array([order.index(standing(str(one))) for one in ours["constraints"].to_numpy()])
-    return np.where(ranks == ranks.min(), ours["first_true"].to_numpy(), np.inf)
+    merit = ours["first_true"].to_numpy()
+    level = ranks == ranks.min()
+    if ranks.min() > 1 and "constraint_excess" in ours:  # none is surely within: the nearest
+        excess = ours["constraint_excess"].to_numpy()
+        within = level & (excess <= 0.0)
+        level, merit = (within, merit) if within.any() else (level, excess)
+    return np.where(level, merit, np.inf)
 
 
-def _merit(ours: xr.Dataset) -> str:
+def _merit(ours: xr.Dataset, best: xr.Dataset) -> str:
     """What `_judged` goes by, in words."""
-    first = ours.isel(design=0)
-    if is_plain(first):
-        return f"mean + {SPAN:g} standard deviations of f"
-    words = labels.statistic(str(first["first_goal"].item()))
-    return f"{words} within the constraints" if str(first["constraints"].item()) else words
+    if is_plain(best):
+        return f"lowest mean + {SPAN:g} standard deviations of f"
+    words = f"lowest {labels.statistic(str(best['first_goal'].item()))}"
+    found = standing(str(best["constraints"].item()))
+    if found == "broken":
+        return "smallest violation of the constraints"
+    if found == "cannot be told":
+        inside = float(best.get("constraint_excess", np.nan)) <= 0.0
+        return (
+            f"{words} where estimates satisfy the constraints,"
+            if inside
+            else "smallest estimated violation of the constraints"
+        )
+    return f"{words} within the constraints" if found else words
+
+
+_NONE = {
+    "broken": "none: every simulated design violates a constraint",
+    "cannot be told": "none: no simulated design is certain to satisfy the constraints",
+}
+"""What stands in place of a recommendation where no design surely keeps to the constraints, by the best verdict."""
 
 
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
+    if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
+        return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
     return name
@@ -364,6 +390,9 @@ def _next(
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
+    prices = re.findall(r"about (\d+) simulations would decide", str(best.get("constraints", "")))
+    if prices:
+        yield f"study.verification.most_samples={max(map(int, prices))} to decide the constraints"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):

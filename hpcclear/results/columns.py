@@ -71,6 +71,8 @@ RESPONSE: Columns = {
     "load_work": number(("time",), "J", "work done by the slider load since the start"),
     "dissipated_energy": number(("time",), "J", "energy dissipated since the start"),
     "energy_residual": number(("time",), "J", "residual of the energy balance"),
+    "peak_contact_pressure": number(("joint",), "Pa", "largest pressure at the peak contact force"),
+    "contact_half_angle": number(("joint",), "rad", "half of the angle of contact at the peak contact force"),
     **outcome(),
 }
 
@@ -80,6 +82,12 @@ SAMPLES: Columns = {
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
     **outcome("sample"),
     "sliding_waves": number(("sample", "wave"), "J", "sliding work of a revolution times waves of the contact's angle"),
+}
+
+BIFURCATION: Columns = {
+    "value": count(("value",), "number of the value"),
+    "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
+    "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
 }
 
 SENSITIVITY: Columns = {
@@ -193,7 +201,10 @@ VERIFICATION: Columns = {
     "deviation_tolerance": number(("design",), "1", "the same of the standard deviation"),
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "verdicts on the constraints of its case"),
+    "constraint_excess": number(("design",), "1",
+        "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation"),
     "samples": count(("design",), "number of simulations"),
+    "rare_samples": count(("design",), "number of further simulations, where the design fails, for its rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations with indentation outside the range of Hertz contact"),
     "random": text(("design",), "random inputs of its case"),

@@ -102,6 +102,11 @@ KINDS = {
     "samples": _kind(
         "Samples of a mechanism with clearance joints", columns.SAMPLES, ("sample",), whole=True
     ),
+    "bifurcation": _kind(
+        "One value for each revolution, against an entry of the scene",
+        columns.BIFURCATION,
+        ("value",),
+    ),
     "sensitivity": _kind("Sensitivity of the objective against clearance", columns.SENSITIVITY),
     "kriging": _kind(
         "Kriging models of the objective",

@@ -21,6 +21,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.results.files import Buffer, write_bytes
 
@@ -63,7 +64,7 @@ def read_bytes(path: Path) -> bytes:
     again = "Remove it or restore a copy, and run the command that makes it again"
     try:
         # non-blocking: opening a pipe must not hang
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+        with open(os.open(path, host.flags("O_RDONLY", "O_NONBLOCK")), "rb") as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode):
                 raise bad("it is not a regular file", "Name a file that hpcclear wrote")

@@ -75,13 +75,7 @@ def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
     if not bending:
         return
     key = f"{next(iter(bending))}.bending"
-    if not scene.is_planar and scene.numerics.formulation == "baumgarte":
-        raise invalid(
-            "the nine-coordinate slider-crank formulation does not include bending modes",
-            'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
-            key=key, value=None,
-        )  # fmt: skip
-    for name in () if scene.is_planar else scene.clearance_joints():
+    for name in scene.clearance_joints() if scene.template is not None else ():
         if scene.clearance_joint(name).out_of_round is not None:
             raise out_of_round(name, key)
     if scene.wear is not None and scene.wear.waves and scene.worn_joints():

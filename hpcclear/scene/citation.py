@@ -15,6 +15,17 @@ TITLE = (
     "Size Based on Sensitivity Analysis"
 )
 
+BIBTEX = f"""@article{{ShockVibration6079249,
+  title   = {{{TITLE}}},
+  journal = {{Shock and Vibration}},
+  volume  = {{2020}},
+  pages   = {{6079249}},
+  year    = {{2020}},
+  url     = {{https://www.hindawi.com/journals/sv/2020/6079249/}},
+  note    = {{Add the authors from the journal's page}},
+}}"""
+"""The same work for BibTeX; the text used for this program does not name its authors."""
+
 _LENGTHS = {"crank.length": 0.05, "rod.length": 0.12}  # m
 _JOINT = {
     "bearing_radius": 0.02,  # m

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.plugins.sources import digest
-from hpcclear.scene.mechanism import TorqueDrive, slender_inertia
+from hpcclear.scene.mechanism import Mechanism, TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar, PlanarSlide
 from hpcclear.scene.plausibility import implausible
@@ -59,14 +59,12 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         yield "energy balance of each sample"
     if scene.responses_asked():
         yield "mean contact forces, torque of the drive and slider acceleration of each sample"
-    if scene.numerics.uncertainty:
-        yield "uncertainty of each sample"
 
 
 def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     yield from implausible(scene)
-    for name in () if scene.is_planar else ("crank", "rod"):
+    for name in ("crank", "rod") if isinstance(scene.mechanism, Mechanism) else ():
         link = getattr(scene.mechanism, name)
         least = slender_inertia(link.mass, link.length)
         if link.inertia < least * (1 - 1e-12):

@@ -13,6 +13,7 @@ from hpcclear.base.errors import InputError, nearest
 from hpcclear.plugins import DISTRIBUTIONS
 from hpcclear.plugins.sources import SCIPY
 from hpcclear.scene.fields import Quantity, invalid
+from hpcclear.scene.fits import law_of
 from hpcclear.scene.plugged import as_invalid
 
 OF_LIMITS = frozenset({"range", "about_design"})
@@ -79,6 +80,7 @@ def _ours() -> dict[str, Form]:
         "beta": ("shapes half_width", "mean", _beta),
         "weibull": ("scale shape", "location range about_design", _weibull),
         "samples": ("values", "about_design", lambda e: quantiles.Samples(e["values"])),
+        "fit": ("", "fit bore pin range", law_of),
         "wear": ("cycles", "half_width", _worn),
     }
     return {

@@ -16,6 +16,8 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.places import Angle, PairTable
 
+Turns = Annotated[int, Count(least=1, most=64)]
+
 
 def check_start(drive: Any) -> None:
     """Refuse a drive that starts from rest without an expected speed.
@@ -47,11 +49,11 @@ class PlanarSpeed(Table):
     kind: Literal["constant-speed"]
     body: str
     """That turns."""
-    speed: Annotated[float, Quantity("rad/s")]
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="nothing would turn")]
     """rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
     period: bool = False
     """Whether its turn is the revolution; the first drive is, where none says so."""
-    turns: Annotated[int, Count(least=1, most=64)] = 1
+    turns: Turns = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
     360 degrees or more begins in the second."""
 
@@ -108,7 +110,7 @@ class PlanarTorque(Table):
     """Inertia that turns with the body, kg m2."""
     period: bool = False
     """Whether a turn of the body is the revolution; the first drive is, where none says so."""
-    turns: Annotated[int, Count(least=1, most=64)] = 1
+    turns: Turns = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
     360 degrees or more begins in the second."""
 

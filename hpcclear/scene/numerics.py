@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from hpcclear.base.remarks import remark
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
+from hpcclear.scene.goals import ObjectiveName
 
 
 class Numerics(Table):
@@ -32,25 +34,21 @@ class Numerics(Table):
     """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled in proportion (see
     the manual)."""
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
-    """Target relative error of the objective; tolerance and revolutions are then chosen automatically."""
+    """Relative error of the objective to aim at, of responses and samples: f becomes a steady mean, with its 95 % half-width.
+    Chooses tolerance and revolutions in place of the entries here."""
     target_revolutions: Annotated[int, Count(100, 10**12)] = 20_000
     """With target_error: largest number of revolutions of a design, all replicas together; beyond it the target is missed."""
     transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
     """Revolutions before the average starts."""
-    averaged_revolutions: Annotated[int | Literal["auto"], Count(1, 10**9, word="auto")] = 5
-    """Revolutions of the average; "auto" goes on until objective_tolerance is met."""
-    objective_tolerance: Annotated[float, Quantity("", above=0, below=1)] = 1e-3
-    """For "auto": relative standard error of the objective at which averaging ends."""
-    max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
-    """For "auto": largest number of averaged revolutions."""
+    averaged_revolutions: Annotated[int, Count(1, 10**9)] = 5
+    """Revolutions of the average."""
+    objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
+    """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
     objective_joints: tuple[str, ...] = ()
     """Joints with clearance whose gaps or contact forces make up the objective; default all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
     """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status
     STEP_CAP."""
-    uncertainty: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also reports the half-width of its objective, by replicas of tighter tolerance, their starts
-    perturbed by 1e-10. A single response (`hpcclear simulate`) always does."""
     energy: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also records its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False

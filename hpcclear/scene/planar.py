@@ -22,6 +22,7 @@ from hpcclear.scene.fields import (
     nearest,
 )
 from hpcclear.scene.film import Film
+from hpcclear.scene.fits import with_clearance
 from hpcclear.scene.mechanism import Material, check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
@@ -135,6 +136,12 @@ class PlanarClearance(Table):
     """R_B - R_J, m."""
     bearing_radius: PositiveLength
     """R_B, m."""
+    length: PositiveLength | None = None
+    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
+    fit: str | None = None
+    """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
+    diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
+    """In place of `clearance`: twice that, the difference of both diameters, m."""
     materials: Materials
     start_eccentricity: Place = NOWHERE
     """Journal centre minus bearing centre at the start, m."""
@@ -144,6 +151,8 @@ class PlanarClearance(Table):
     """Oil between its surfaces; left out, the joint is dry."""
     out_of_round: OutOfRound | None = None
     """Waves around its surfaces; left out, they are round."""
+
+    _in_radii = model_validator(mode="before")(with_clearance)
 
     @model_validator(mode="after")
     def _journal_fits(self) -> "PlanarClearance":

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 
 from hpcclear.scene.driving import speed_entry
+from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.tables import SceneTables
 
 FASTEST = 30.0
@@ -29,14 +30,14 @@ STEEL = 7850.0
 
 def implausible(scene: SceneTables) -> Iterator[str]:
     """A sentence for each number that is likely a slip of units."""
-    if not scene.is_planar:
+    if isinstance(scene.mechanism, Mechanism):
         yield from _drive(scene)
         yield from _bodies(scene)
         yield from _rod(scene)
     yield from _joints(scene)
     yield from _films(scene)
     if scene.numerics.beta == 0.0 and (
-        scene.is_planar or scene.numerics.formulation == "baumgarte"
+        scene.template is None or scene.numerics.formulation == "baumgarte"
     ):
         yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
     effects = scene.effects
@@ -53,7 +54,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
 def _drive(scene: SceneTables) -> Iterator[str]:
     drive = scene.drive
     key = speed_entry(drive)
-    speed = float(getattr(drive, key))
+    speed = abs(float(getattr(drive, key)))
     turns = speed / (2.0 * math.pi)
     mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:

@@ -7,6 +7,7 @@ the index of the sample, so that nothing depends on how many points are drawn at
 import hashlib
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -293,15 +294,17 @@ def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> 
 
 def sampled(scene: Scene) -> Points:
     """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
-    match scene.required_study.method:
+    method = scene.required_study.method
+    match method:
         case "lhs":
-            return latin_hypercube(scene)
+            points = latin_hypercube(scene)
         case "random-lhs":
-            return monte_carlo(scene, stratified=True)
+            points = monte_carlo(scene, stratified=True)
         case "qmc":
-            return monte_carlo(scene, scrambling=0)
+            points = monte_carlo(scene, scrambling=0)
         case _:
-            return monte_carlo(scene)
+            points = monte_carlo(scene)
+    return replace(points, sampling=method)
 
 
 _PAGE = 4096  # points made at a time

@@ -123,7 +123,7 @@ class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
 
     algorithm: Annotated[str, PluginName(SEARCHES)] | None = None
-    """Default "swarm". Others: "pymoo:NSGA2" and more of pymoo, with their own settings (`pip install 'hpcclear[pymoo]'`);
+    """Default "swarm". Others: "pymoo:NSGA2" and more of pymoo, with their own settings (`pip install pymoo`);
     "module:Name" of a Python file beside the scene; the name of an installed plug-in. Each evaluates `particles` designs
     at a time, `iterations` times."""
     particles: Annotated[int, Count(2, 10**6)] = 100

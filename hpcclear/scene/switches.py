@@ -145,7 +145,13 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
             "law": table.declared.without_loss,
             "minimum_impact_speed": table.minimum_impact_speed,
         }
-        yield Switch("contact damping", {"effects.contact": elastic}, {floor: floor})
+        kept = [floor]
+        if table.geometry is not None:
+            names = [one.name for one in table.declared.geometry.parameters]
+            elastic |= {"geometry": table.geometry} | {name: table.value(name) for name in names}
+            kept += [f"effects.contact.{name}" for name in names]
+        moved = {path: path for path in kept}
+        yield Switch("contact damping", {"effects.contact": elastic}, moved)
 
 
 def _outside(scene: Scene) -> Iterator[Switch]:
@@ -154,7 +160,8 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
-        yield from _mean("slider load", "effects.slider_load", effects.slider_load, 1)
+        turns = turns_of(scene.linkage)
+        yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
     if effects.guide_friction is not None:
         yield Switch("guide friction", {"effects.guide_friction": None})
     if isinstance(mechanism, Planar):
@@ -199,7 +206,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
-        turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+        turns = turns_of(scene.linkage)
         yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hpcclear.base.errors import InputError
@@ -82,12 +82,20 @@ class Mechanism:
         return next((drive for drive in self.drives if drive.body == body), None)
 
 
+def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+    """A mechanism with other numbers, arrays among them, which its checks are not made for."""
+    made = object.__new__(Mechanism)
+    for one in fields(Mechanism):
+        object.__setattr__(made, one.name, tables.get(one.name, getattr(mechanism, one.name)))
+    return made
+
+
 def straight(mechanism: Mechanism) -> Mechanism:
     """The same of rigid bodies alone."""
     if all(body.bending is None for body in mechanism.bodies):
         return mechanism
     bodies = tuple(replace(body, bending=None) for body in mechanism.bodies)
-    return replace(mechanism, bodies=bodies)
+    return with_numbers(mechanism, bodies=bodies)
 
 
 def modes_of(mechanism: Mechanism) -> int:

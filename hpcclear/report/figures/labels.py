@@ -67,8 +67,10 @@ def scale(units: str, values: ArrayLike) -> Scale:
         return Scale(1.0, pretty(units))
     power = int(match[2] or 1)
     exponent = int(np.floor(np.log10(largest) / (3 * power) + 1e-9)) * 3
-    limit = 0 if match[1] == "m" and "/" not in units else 9  # lengths above a metre stay in metres
-    exponent = min(max(exponent, -9), limit)
+    most = (
+        9 if match[1] != "m" else 3 if "/" in units else 0
+    )  # lengths above a metre stay in metres
+    exponent = min(max(exponent, -9), most)
     return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
 
 

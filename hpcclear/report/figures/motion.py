@@ -19,9 +19,12 @@ def check_some(responses: Collection[object], remedy: str) -> None:
 
 
 def phase(response: xr.Dataset) -> Array:
-    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle."""
-    name = "drive_phase" if "drive_phase" in response else "crank_angle"
-    return response[name].to_numpy()
+    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
+    way it turns."""
+    if "drive_phase" in response:
+        return response["drive_phase"].to_numpy()
+    angle = response["crank_angle"].to_numpy()
+    return -angle if angle[-1] < angle[0] else angle
 
 
 def turns(response: xr.Dataset) -> Array:
@@ -107,6 +110,24 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     found.append(("crank_moment", "", "torque of the drive"))
     if "slider_acceleration" in response:
         found.append(("slider_acceleration", "", "slider acceleration"))
+    return found
+
+
+def series(response: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Every series (t,) by its name; of joints, bodies and points by that and their label, which a single one may lack."""
+    found: dict[str, xr.DataArray] = {}
+    for key, variable in response.data_vars.items():
+        name, others = str(key), [dim for dim in variable.dims if dim != "time"]
+        if "time" not in variable.dims or len(others) > 1:
+            continue
+        if not others:
+            found[name] = variable
+            continue
+        labels = [str(label) for label in response[others[0]].to_numpy()]
+        for k, label in enumerate(labels):
+            found[f"{name} {label}"] = variable.isel({others[0]: k})
+        if len(labels) == 1:
+            found[name] = variable.isel({others[0]: 0})
     return found
 
 

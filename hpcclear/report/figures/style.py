@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.results import files
 
 if TYPE_CHECKING:
@@ -101,8 +102,7 @@ def matplotlib() -> Any:
         import matplotlib as module
     except ModuleNotFoundError:
         reason = "figures are drawn with matplotlib, which is not installed"
-        remedy = "Install it with: pip install 'hpcclear[analysis]'"
-        raise InputError("matplotlib", None, reason, remedy) from None
+        raise InputError("matplotlib", None, reason, installing("analysis")) from None
     return module
 
 

@@ -30,13 +30,16 @@ _MISSING = {
 }
 
 
-def write_report(directory: str | Path) -> Path:
-    """Write DIRECTORY/report.html from the result files in the directory.
+def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
+    """Write a page from the result files in a directory, or from chosen ones.
 
     Parameters
     ----------
-    directory : path
-        Holds any of the files of `run`, `sample`, `accuracy` and `simulate`; what is missing is said on the page.
+    *places : path
+        A directory with any of the files of `run`, `sample`, `accuracy` and `simulate`, or files of theirs. What is missing
+        in a directory is said on the page.
+    output : path, optional
+        Of the page; report.html in the directory, or in that of the first file, by default.
 
     Returns
     -------
@@ -46,12 +49,12 @@ def write_report(directory: str | Path) -> Path:
     Raises
     ------
     InputError
-        No such directory, no result in it, matplotlib missing, or no permission to write.
+        No such directory, no result in it, a chosen file that is none, matplotlib missing, or no permission to write.
     StorageError
         The disk is full or fails.
     """
-    content = read(directory)
-    path = Path(directory) / NAME
+    content = read(*places)
+    path = content.directory / NAME if output is None else Path(output)
     files.write_bytes(path, _page(content).encode(), _MARK)
     return path
 
@@ -115,6 +118,7 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
         ("designs", "Optimised designs", "designs.html", designs.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
+        ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
         ("loads", "Loads of the bearings", "parts.html", loads.loads),
         ("summary", "Summary", "summary.html", sections.summary),
         ("motion", "Animation", "motion.html", lambda one: one.responses or None),
@@ -156,9 +160,9 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    if content.responses and not set(content.files) - {"timing"}:
+    if not content.whole or (content.responses and not set(content.files) - {"timing"}):
         return troubles or None
-    for kind in ("accuracy", "wear", "effects"):
+    for kind in ("accuracy", "wear", "effects", "map", "bifurcation"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:
             return troubles or None  # a directory of that command lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]

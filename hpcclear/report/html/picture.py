@@ -8,7 +8,7 @@ import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.report.answer import goals_of, leading_goals, recommended
-from hpcclear.report.figures import labels, motion
+from hpcclear.report.figures import labels, motion, moving
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 
@@ -116,12 +116,12 @@ def _usual(one: xr.Dataset, ending: str) -> dict[str, Goal]:
     }
 
 
-def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[float, ...]:
+def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[()] | tuple[float, float]:
     """Ends of the confidence interval of a simulated value; nothing where they are not known."""
     if ending != "_true" or f"{name}_lower" not in one:
         return ()
     ends = float(one[f"{name}_lower"]), float(one[f"{name}_upper"])
-    return ends if np.isfinite(ends).all() else ()
+    return ends if np.isfinite(np.array(ends)).all() else ()
 
 
 def _searched(one: xr.Dataset) -> dict[str, Goal]:
@@ -274,8 +274,8 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))
-    e = np.stack([shown["eccentricity_x"].to_numpy(), shown["eccentricity_y"].to_numpy()], axis=-1)
-    bodies, points, angles = _slider_crank(shown, e) if "rod_x" in shown else _linkage(shown)
+    e = moving.eccentricities(shown)
+    bodies, points, angles = moving.bodies(shown)
     pairs = [_pair(points, e[:, j]) for j in range(e.shape[1])]
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
     return {
@@ -290,39 +290,6 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
         "e": _digits(e.reshape(len(e), -1)),
         "force": _digits(shown["contact_force"].to_numpy()),
     }
-
-
-Drawn = tuple[list[list[int]], np.ndarray, np.ndarray]
-"""Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
-
-
-def _slider_crank(shown: xr.Dataset, e: np.ndarray) -> Drawn:
-    """Points of crank, rod and slider.
-
-    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
-    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
-    """
-    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
-    phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
-    crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
-    # crank length * crank = rod - u2 * along + e12
-    both = np.column_stack([crank.ravel(), along.ravel()])
-    pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
-    slider = np.column_stack([shown["slider_position"].to_numpy(), np.zeros(len(pin))])
-    points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
-    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
-
-
-def _linkage(shown: xr.Dataset) -> Drawn:
-    names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
-    bodies = [
-        [k for k, name in enumerate(names) if name == body]
-        for body in map(str, shown["body"].to_numpy())
-    ]
-    points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
-    angles = shown["body_angle"].to_numpy()
-    # without the whole turns before, which would cost digits
-    return bodies, points, angles - motion.TURN * np.floor(angles[0] / motion.TURN)
 
 
 def _pair(points: np.ndarray, e: np.ndarray) -> list[int]:

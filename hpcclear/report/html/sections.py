@@ -1,12 +1,15 @@
 """Sections of the page on samples, findings and data quality, made from what there is; None where nothing is."""
 
 import numpy as np
+import xarray as xr
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.report import failures
+from hpcclear.report import failures, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.scene.loading import scene_of_text
 from hpcclear.statistics.random.survival import quantiles
 
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
@@ -136,6 +139,35 @@ def claims(content: Content) -> list[object] | None:
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
     header = ["claim", "verdict", "the numbers that decide"]
     return [held, Table(header, rows, "Claims of the paper, tested on this data")]
+
+
+def statistics(content: Content) -> list[object] | None:
+    """Mean, standard deviation and quantiles of the samples, shares beyond thresholds of the study, and warnings."""
+    samples = content.get("samples")
+    if samples is None:
+        return None
+    lines = spread.statistics(samples, _thresholds(samples))
+    rows = [[line.label, line.text] for line in lines]
+    table = Table(
+        ["quantity", "95 % confidence interval in brackets"], rows, "Statistics of the samples"
+    )
+    warnings = [f"Warning: {text}." for text in spread.remarks(samples)]
+    return [*([table] if rows else []), *warnings] or None
+
+
+def _thresholds(samples: xr.Dataset) -> list[spread.Beyond]:
+    """Values of f that the cases of the study keep below, or whose exceedance they make small."""
+    try:
+        study = scene_of_text(str(samples.attrs.get("scene", "")), "scene").study
+    except InputError:
+        return []
+    goals = [
+        goal
+        for case in (study.cases if study else ())
+        for goal in (*(case.objectives or ()), *(case.constraints or ()))
+    ]
+    values = {goal.limit for goal in goals if goal.limit is not None}
+    return [spread.Beyond("objective", value) for value in sorted(values)]
 
 
 def trust(content: Content) -> list[object] | None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.statistics.search.asking import KEY, Task
 
 ALGORITHMS = {
@@ -116,7 +117,7 @@ def _begun(name: str, task: Task) -> Pymoo:
             KEY,
             f"pymoo:{name}",
             "is an algorithm of pymoo, which is not installed",
-            "Install it with: pip install 'hpcclear[pymoo]', or leave the entry out",
+            f"{installing('pymoo')}, or leave the entry out",
         ) from None
     module = importlib.import_module(f"pymoo.algorithms.moo.{ALGORITHMS[name]}")
     entries: dict[str, Any] = {"pop_size": task.particles}

@@ -60,7 +60,6 @@ class RegressionMethod:
 
     source: Any
     label: str
-    fields = FIELDS
 
     def fit(
         self,
@@ -131,7 +130,6 @@ class Regression:
     stored: Mapping[str, Array] = field(default_factory=dict)
 
     separable = False
-    fields = FIELDS
     columns = COLUMNS
 
     @cached_property

@@ -127,8 +127,7 @@ def search(
     InputError
         If no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
-    limits = surfaces.check_bounds(bounds)
-    _check_search(settings)
+    limits = np.asarray(bounds, float)
     orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
     test = sample(settings.n_test, limits, rng)
     true = _test_values((yield test))
@@ -180,17 +179,3 @@ def _test_values(values: Array) -> Array:
             "use more test points or correct the failing simulations",
         )
     return values
-
-
-def _check_search(settings: SearchSettings) -> None:
-    if len(settings.orders) == 0:
-        raise InputError("orders", tuple(settings.orders), "no order to try", "list at least one")
-    if settings.n_test < 2:
-        raise InputError("n_test", settings.n_test, "R2 needs two test points", "take at least 2")
-    if not 1 <= settings.n_points <= settings.max_points:
-        raise InputError(
-            "n_points",
-            settings.n_points,
-            "outside 1 .. max_points",
-            f"take 1 to {settings.max_points} points",
-        )
