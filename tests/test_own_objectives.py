@@ -172,7 +172,7 @@ FAULTS = {
     "another kind": ("Bad = load", "is no objective"),
     "what nobody gives": (
         "def f(normal_forc): return normal_forc\nBad = Objective('', 'N', rate=f)",
-        "asks for 'normal_forc', which nobody gives",
+        "uses 'normal_forc', which is not defined",
     ),
     "what no record has": (
         "def f(sound): return sound\nBad = Objective('', 'N', f)", "asks for 'sound'",

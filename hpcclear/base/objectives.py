@@ -1,7 +1,7 @@
 """What a study may make small: each objective's name, unit and words, and what it is of a sample's record.
 
 Ours and a user's are declared alike. The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` replaces
-it by the requested objective, on the rank that simulated it, and everybody after that reads ``objective``. """
+it by the requested objective, on the rank that simulated it, and everybody after that reads ``objective``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
