@@ -230,7 +230,7 @@ _NONE = {
     "broken": "none: every simulated design violates a constraint",
     "cannot be told": "none: no simulated design is certain to satisfy the constraints",
 }
-"""What stands in place of a recommendation where no design surely keeps to the constraints, by the best verdict."""
+"""What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
 
 def _named(best: xr.Dataset) -> str:

@@ -189,7 +189,7 @@ def trust(content: Content) -> list[object] | None:
                     code.message,
                     failures.where(status == code, failures.variables(samples)),
                     code.remedy,
-                    _listed(hit),
+                    _listed(hit, len(numbers)),
                 ]
             )
     if rows:
@@ -202,7 +202,7 @@ def trust(content: Content) -> list[object] | None:
     for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]
         if hit.size:
-            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit)])
+            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit, len(numbers))])
     if rows:
         parts.append(
             Table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
@@ -212,6 +212,9 @@ def trust(content: Content) -> list[object] | None:
     return parts
 
 
-def _listed(numbers: np.ndarray) -> str:
+def _listed(numbers: np.ndarray, of: int) -> str:
+    """Numbers of samples, the first ones only where they are many, "all" where all are meant."""
+    if len(numbers) == of > 1:
+        return "all"
     shown = ", ".join(str(n) for n in numbers[:LISTED])
     return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"
