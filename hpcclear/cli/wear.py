@@ -11,7 +11,7 @@ from hpcclear.cli.printing import _load, console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
-from hpcclear.statistics.random.survival import quantiles
+from hpcclear.statistics.random.survival import quantile_limits, quantiles
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -72,12 +72,21 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
-    """Median and nine tenths of a quantile over lives."""
-    told = []
-    for level in (0.05, 0.5, 0.95):
-        value = float(content[name].sel(quantile=level))
-        told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {beyond:.4g}")
-    return f"{told[1]} (5 to 95 %: {told[0]} to {told[2]})"
+    """Median and nine tenths of lives, each with its confidence interval."""
+    levels = np.array([0.05, 0.5, 0.95])
+    lower, upper = quantile_limits(content[name].to_numpy(), levels)
+
+    def one(value: float) -> str:
+        return f"{max(value, 0.0):.4g}" if value < np.inf else f"beyond {beyond:.4g}"
+
+    values = [float(content[f"{name}_quantile"].sel(quantile=level)) for level in levels]
+    shown = [
+        f"{one(value)} (95 % CI {one(low)} to {one(high)})"
+        if np.isfinite([value, low, high]).any()
+        else one(value)
+        for value, low, high in zip(values, lower, upper, strict=True)
+    ]
+    return f"{shown[1]}; 5th percentile {shown[0]}; 95th percentile {shown[2]}"
 
 
 def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
@@ -92,8 +101,8 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     if not given:
         return [*rows, ("life", "no limit was given (wear.limit)")]
     rows += [
-        ("life, revolutions", _spread(content, "lifetime_quantile", cycles)),
-        ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).min()))),
+        ("life, revolutions", _spread(content, "lifetime", cycles)),
+        ("life, hours", _spread(content, "lifetime_hours", float((cycles * each).min()))),
     ]
     limits = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
     rows.append((f"survive {cycles:.4g}", f"{float(last['survival']):.3g} of the runs ({limits})"))

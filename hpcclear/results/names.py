@@ -75,6 +75,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "judged": _meanings("told", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
+    "together": _meanings("independent", "correlated"),
     "dominated": _meanings("not_surely", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -112,6 +113,7 @@ KINDS = {
     "front": _kind("Fronts of mean and deviation", columns.FRONT, ("case", "run", "solution")),
     "verification": _kind("Designs simulated directly", columns.VERIFICATION, ("design",)),
     "chaos": _kind("How much of the scatter of designs is chaos", columns.CHAOS),
+    "contributions": _kind("Which input makes the scatter of designs", columns.CONTRIBUTIONS),
     "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
     "readings": _kind("The paper's designs under readings of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples, streamed", columns.STATISTICS),

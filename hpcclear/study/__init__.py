@@ -40,6 +40,7 @@ from hpcclear.scene.points import Points
 from hpcclear.study import (
     certificate,
     chaos,
+    contributions,
     fronts,
     lives,
     optimisation,
@@ -179,6 +180,7 @@ def _tell_the_story(given: StudyRun, written: Scene) -> None:
         over_life = run.stage("lives", lives.of_designs, written, table.choices)
     verification.write(run, table, true, model, remarks, printed, over_life)
 
+    contributions.write(run, table.choices, true)
     scatter = run.stage("chaos", chaos.simulate, designs)
     chaos.write(run, table.choices, {name: one[table.rows] for name, one in scatter.items()})
 

@@ -13,7 +13,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html import costs
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
-from hpcclear.statistics.random.survival import quantiles
+from hpcclear.statistics.random.survival import quantile_limits, quantiles
 
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
 LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
@@ -58,7 +58,11 @@ def _lives_words(content: Content) -> list[str]:
         median = lives.sel(quantile=0.5)
         turns, hours = float(median["lifetime_quantile"]), float(median["lifetime_hours_quantile"])
         if np.isfinite(turns):
-            words.append(f"Median service life: {turns:.4g} revolutions, {hours:.4g} h.")
+            (low,), (high,) = quantile_limits(lives["lifetime"].to_numpy(), np.array([0.5]))
+            reach = f"{high:.4g}" if np.isfinite(high) else f"beyond {cycles:.4g}"
+            words.append(
+                f"Median service life: {turns:.4g} revolutions (95 % CI {max(low, 0.0):.4g} to {reach}), {hours:.4g} h."
+            )
     if any(name.startswith("limit_") for name in lives.attrs):
         limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
         words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {limits}).")

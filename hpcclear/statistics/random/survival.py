@@ -41,6 +41,30 @@ def quantiles(values: Array, levels: Array) -> Array:
     return np.stack(found)
 
 
+def quantile_limits(values: Array, levels: Array) -> tuple[Array, Array]:
+    """95 % limits of quantiles of values (n,) that are independent, (levels,) each: two of the ordered values.
+
+    Whatever the distribution, a quantile lies between the values of two ranks with a binomial probability (H. A. David and
+    H. N. Nagaraja, "Order Statistics" (2003), doi:10.1002/0471722162). NaN are left out; where there are too few values for a
+    limit it is minus or plus infinity.
+    """
+    from scipy.special import bdtr
+
+    ordered = np.sort(values[~np.isnan(values)])
+    total, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
+    padded = np.concatenate([[-np.inf], ordered, [np.inf]])
+    limits = np.empty((2, len(levels)))
+    counts = np.arange(total + 1.0)
+    for k, level in enumerate(levels):
+        below = bdtr(counts, total, level) if total else np.ones(1)  # of at most so many values
+        lower = int(
+            (below <= tail).sum()
+        )  # the largest rank with P(fewer values below) within the tail
+        upper = int((below < 1.0 - tail).sum()) + 1
+        limits[:, k] = padded[lower], padded[upper]
+    return limits[0], limits[1]
+
+
 def rank_correlation(first: Array, second: Array) -> float:
     """Spearman's rank correlation of two samples (n,), of the rows that both know; NaN of fewer than four."""
     from scipy.stats import rankdata
