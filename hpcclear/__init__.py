@@ -7,17 +7,21 @@ Public names are loaded when they are first used, so that importing the package 
 - `evaluate`: many designs as an xarray Dataset, in this process
 - `grid`: a map, its entries as coordinates
 - `run_study`: the whole study
+- `to_table`: a result as a pandas DataFrame
 - `ContactLaw`, `FrictionLaw`, `Parameter`: what a law of one's own declares
+- `Objective`: what an objective of one's own declares
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hpcclear.base.objectives import Objective
     from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
     from hpcclear.ensemble.maps import grid
+    from hpcclear.report.tables import to_table
     from hpcclear.scene import Scene, load_scene
     from hpcclear.study import run_study
 
@@ -26,6 +30,7 @@ __version__ = "0.1.0"
 __all__ = [
     "ContactLaw",
     "FrictionLaw",
+    "Objective",
     "Parameter",
     "Scene",
     "evaluate",
@@ -33,11 +38,13 @@ __all__ = [
     "load_scene",
     "run_study",
     "simulate",
+    "to_table",
 ]
 
 _HOME = {
     "ContactLaw": "dynamics.laws.declared",
     "FrictionLaw": "dynamics.laws.declared",
+    "Objective": "base.objectives",
     "Parameter": "dynamics.laws.declared",
     "Scene": "scene",
     "load_scene": "scene",
@@ -45,6 +52,7 @@ _HOME = {
     "evaluate": "ensemble.api",
     "grid": "ensemble.maps",
     "run_study": "study",
+    "to_table": "report.tables",
 }
 
 

@@ -1,8 +1,6 @@
 """Error against core-hours, measured on some of the samples: what the `plan` command knows."""
 
 import multiprocessing
-import os
-import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
+from hpcclear.base import host
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -39,6 +38,9 @@ FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
 
 LARGEST_DESIGN = 4096
 """Points of the design that are drawn for measuring: the cost of a sample depends on where it lies."""
+
+USUAL_STARTUP, USUAL_MEMORY = 3.0, 400.0 * 2**20
+"""Seconds and bytes of a rank that are assumed where the system does not say, as outside Linux."""
 
 EFFICIENCY = 0.95
 """Of ranks that share out samples: the rest is waiting at the end."""
@@ -149,10 +151,16 @@ def measure(
     alone = extent.responses_of(scene) if study.cases else 0
 
     def made() -> Plan:
-        peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        startup = process_age_at_start()
+        peak, startup = host.peak_memory(), process_age_at_start()
+        if not np.isfinite([peak, startup]).all():
+            peak, startup = USUAL_MEMORY, USUAL_STARTUP
         return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
 
+    if not np.isfinite([host.peak_memory(), process_age_at_start()]).all():
+        tell(
+            f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
+            f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
+        )
     with _company(scene, points, workers if ranks.size == 1 else 1, tell):
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
@@ -192,10 +200,7 @@ def _company(
     scene: Scene, points: Points, workers: int, tell: Callable[[str], object] = lambda text: None
 ) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    others = max(min(workers, cores) - 1, 0)
+    others = max(min(workers, len(host.cores())) - 1, 0)
     context = multiprocessing.get_context("spawn")
     stop, ready = context.Event(), context.Semaphore(0)
     content = {k: v for k, v in scene.resolved().items() if k != "study"}
@@ -246,7 +251,7 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
     if study is None or not study.worn:
         return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
     if error is not None:
-        reason = "lives of worn joints are followed at the settings of the file"
+        reason = "service lives are simulated at the settings of the file"
         remedy = "Leave it out, and set wear.tolerance and wear.copies"
         raise InputError("--error", error, reason, remedy)
     return ()

@@ -340,12 +340,13 @@ def samples_of(
     joints: Sequence[str] = JOINTS,
 ) -> xr.Dataset:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
+    drawn = {"sampling": points.sampling} if points.sampling else {}
     return dataset.samples_dataset(
         points.names,
         points.values,
         dict(zip(points.names, points.units, strict=True)),
         records,
-        attributes,
+        {**attributes, **drawn},
         objective,
         points.words,
         joints,

@@ -32,8 +32,8 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     """Return the designs whose merit (n,) is within `FLAT` of the best, what they share, and the lightest; "" if none."""
     least = float(merit.min())
     near = np.isfinite(merit) & (merit - least <= FLAT * abs(least))
-    again = [*_again(ours, best), str(best["design"].item())]
-    names = [str(name) for name in ours["design"].to_numpy()[near] if str(name) not in again]
+    own = [*again(ours, best), str(best["design"].item())]
+    names = [str(name) for name in ours["design"].to_numpy()[near] if str(name) not in own]
     if not names:
         return ""
     together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
@@ -64,8 +64,8 @@ def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
 
 def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """Return other designs that are statistically indistinguishable from the best."""
-    again = _again(ours, best)
-    return [name for name in _twins(ours, best) if name not in again]
+    same = again(ours, best)
+    return [name for name in _twins(ours, best) if name not in same]
 
 
 def _listed(names: list[str]) -> str:
@@ -77,8 +77,8 @@ def _listed(names: list[str]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Other names of the best: all variables are the same numbers."""
+def again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Return other names of a design: all variables are the same numbers."""
     variables = labels.design_variables(ours)
     alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
     for variable in variables:

@@ -1,20 +1,14 @@
 """Lines on the scatter of one design: which random inputs contribute to its variance, and what tighter tolerances bring."""
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.report.spread import Line
+
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
-
-
-class Line(NamedTuple):
-    """One line of the answer: its subject and its text."""
-
-    label: str
-    text: str
 
 
 def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:

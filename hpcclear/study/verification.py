@@ -266,9 +266,9 @@ def write(
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}"
-        asked = "what its case makes small" if len(study.cases) > 1 else asked
+        asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
-            words = content[name].attrs["long_name"].replace("mean and deviation", asked)
+            words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"

@@ -41,30 +41,6 @@ def quantiles(values: Array, levels: Array) -> Array:
     return np.stack(found)
 
 
-def quantile_limits(values: Array, levels: Array) -> tuple[Array, Array]:
-    """95 % limits of quantiles of values (n,) that are independent, (levels,) each: two of the ordered values.
-
-    Whatever the distribution, a quantile lies between the values of two ranks with a binomial probability (H. A. David and
-    H. N. Nagaraja, "Order Statistics" (2003), doi:10.1002/0471722162). NaN are left out; where there are too few values for a
-    limit it is minus or plus infinity.
-    """
-    from scipy.special import bdtr
-
-    ordered = np.sort(values[~np.isnan(values)])
-    total, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
-    padded = np.concatenate([[-np.inf], ordered, [np.inf]])
-    limits = np.empty((2, len(levels)))
-    counts = np.arange(total + 1.0)
-    for k, level in enumerate(levels):
-        below = bdtr(counts, total, level) if total else np.ones(1)  # of at most so many values
-        lower = int(
-            (below <= tail).sum()
-        )  # the largest rank with P(fewer values below) within the tail
-        upper = int((below < 1.0 - tail).sum()) + 1
-        limits[:, k] = padded[lower], padded[upper]
-    return limits[0], limits[1]
-
-
 def rank_correlation(first: Array, second: Array) -> float:
     """Spearman's rank correlation of two samples (n,), of the rows that both know; NaN of fewer than four."""
     from scipy.stats import rankdata
@@ -73,3 +49,40 @@ def rank_correlation(first: Array, second: Array) -> float:
     if both.sum() < 4 or np.ptp(first[both]) == 0.0 or np.ptp(second[both]) == 0.0:
         return float("nan")
     return float(np.corrcoef(rankdata(first[both]), rankdata(second[both]))[0, 1])
+
+
+def order_limits(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
+    """95 % confidence limits of a quantile of independent values, by their order alone; NaN where too few values are known.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Finite, of any distribution.
+    level : float
+        Probability of staying below, strictly between 0 and 1.
+    unknown : int
+        Further values of which nothing is known, such as failed simulations: the limits hold wherever these lie.
+
+    References
+    ----------
+    H. A. David and H. N. Nagaraja, "Order Statistics" (2003), section 7.1, doi:10.1002/0471722162.
+    """
+    from scipy.special import bdtr
+
+    total = len(values) + unknown
+    if total == 0:
+        return np.nan, np.nan
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    below = bdtr(np.arange(total), total, level)  # of at most k values below the quantile
+    lower = int(np.searchsorted(below, tail, side="right")) - 1 - unknown  # those may all be lowest
+    upper = int(np.searchsorted(below, 1.0 - tail))
+    ranked = np.sort(values)
+    least = ranked[lower] if 0 <= lower < len(ranked) else np.nan
+    most = ranked[upper] if upper < len(ranked) else np.nan
+    return float(least), float(most)
+
+
+def fewest(level: float) -> int:
+    """Number of independent values from which on `order_limits` has both limits of a quantile."""
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    return int(np.ceil(np.log(tail) / np.log(max(level, 1.0 - level)) - 1e-12))
