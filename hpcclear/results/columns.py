@@ -220,6 +220,20 @@ CHAOS: Columns = {
     "pairs": count(("design",), "samples simulated twice", required=True),
 }
 
+CONTRIBUTIONS: Columns = {
+    "design": text(("design",), "name of the design"),
+    "input": text(("input",), "random input"),
+    "contribution": number(("design", "input"), "1",
+        "share of the variance of the objective that an input makes alone, or with those it is correlated with", required=True),
+    "contribution_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "halved": number(("design", "input"), "1",
+        "fall of the standard deviation with half the scatter of an input, relative", required=True),
+    "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "unexplained": number(("design",), "1", "share of the variance that no input or pair of them explains", required=True),
+    "unexplained_error": number(("design",), "1", "standard error of it"),
+    "together": flag(("input",), "whether the input is correlated with others, whose contribution is one"),
+}
+
 CLAIMS: Columns = {
     "claim": count(("claim",), "number of the claim"),
     "text": text(("claim",), "what is claimed", required=True),

@@ -75,6 +75,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "judged": _meanings("reported", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
+    "together": _meanings("independent", "correlated"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -119,6 +120,7 @@ KINDS = {
         "Simulated designs with confidence intervals", columns.VERIFICATION, ("design",)
     ),
     "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
+    "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
     "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
     "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
