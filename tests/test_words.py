@@ -36,6 +36,7 @@ FILES = (
     "docs/validation.md",
     "docs/how-to/accuracy.md",
     "docs/how-to/archive.md",
+    "docs/how-to/bring-your-data.md",
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",

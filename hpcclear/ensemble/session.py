@@ -350,6 +350,7 @@ def samples_of(
         objective,
         points.words,
         joints,
+        points.labels,
     )
 
 

@@ -78,6 +78,7 @@ RESPONSE: Columns = {
 
 SAMPLES: Columns = {
     "sample": count(("sample",), "number of the sample in the design"),
+    "label": text(("sample",), "name of the design in the table that it comes from"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
     **outcome("sample"),

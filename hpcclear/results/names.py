@@ -93,7 +93,9 @@ def _kind(
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
     required = (
-        set(data) - {*ON_REQUEST, *JUDGED} if whole else {n for n in data if data[n].required}
+        set(data) - {*ON_REQUEST, *JUDGED, "label"}
+        if whole
+        else {n for n in data if data[n].required}
     )
     return Kind(title, coords, data, frozenset(required), design_dims, limit_dims)
 

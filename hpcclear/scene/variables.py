@@ -44,6 +44,7 @@ RESERVED = frozenset(
             *JUDGED,
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        "label",
         *("searched", "searched_first", "searched_second", "constraints"),
     )
 )
