@@ -11,6 +11,7 @@ Public names are loaded when they are first used, so that importing the package 
 - `run_study`, also as `study`: the whole study, on as many processes as are wanted
 - `to_table`: a result as a pandas DataFrame
 - `ContactLaw`, `FrictionLaw`, `Parameter`: what a law of one's own declares
+- `Objective`: what an objective of one's own declares
 """
 
 from importlib import import_module
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import hpcclear.study as study
     from hpcclear.accuracy.plan import plan
+    from hpcclear.base.objectives import Objective
     from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
@@ -34,6 +36,7 @@ __version__ = "0.1.0"
 __all__ = [
     "ContactLaw",
     "FrictionLaw",
+    "Objective",
     "Parameter",
     "Scene",
     "bifurcation",
@@ -53,6 +56,7 @@ __all__ = [
 _HOME = {
     "ContactLaw": "dynamics.laws.declared",
     "FrictionLaw": "dynamics.laws.declared",
+    "Objective": "base.objectives",
     "Parameter": "dynamics.laws.declared",
     "Scene": "scene",
     "load_scene": "scene",

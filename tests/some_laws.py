@@ -12,7 +12,7 @@ def effects_with(names, **more) -> at.Effects:
     """Effects of these names that are on; with an open joint and no law of contact named, Hertz'."""
     on = set(names) - {*CONTACT, *FRICTION}
     found = [CONTACT[name] for name in CONTACT if name in names]
-    is_open = bool({"crank_rod", "rod_slider", "joints"} & {*on, *more})
+    is_open = "joints" in {*on, *more}
     law = found[0] if found else "hertz" if is_open else None
     rubs = [name for name in FRICTION if name in names]
     return at.Effects(

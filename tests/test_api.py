@@ -1,16 +1,23 @@
 """The public names: light to import, and what they return."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import report_data as data
 from light import loaded_by
 
 import hpcclear
+import hpcclear.plugins
 from hpcclear import report
 from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE, KICKS
+from hpcclear.ensemble.api import as_points
 
+ROOT = Path(__file__).parents[1]
 SCENE = "jobs/slider_crank.toml"
 SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
 
@@ -26,6 +33,23 @@ def test_every_public_name_is_there():
         assert getattr(hpcclear, name) is not None
     with pytest.raises(AttributeError):
         hpcclear.no_such_name  # noqa: B018
+
+
+def test_the_page_says_of_every_public_name_what_it_is_and_how_long_it_stays():
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    table = page.partition("## What is stable")[2].partition("\n- ")[0]
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (\w+) \|$", table, re.MULTILINE)
+    assert sorted(name for name, *_ in rows) == sorted(hpcclear.__all__)
+    assert {promise for *_, promise in rows} <= {"stable", "provisional"}
+    for attribute in re.findall(r"`(\w+)`", {n: words for n, words, _ in rows}["Scene"]):
+        assert hasattr(hpcclear.Scene, attribute)
+    assert f"`{InputError.__module__}.InputError`" in page
+    assert hpcclear.plugins.trusting is not None
+
+
+def test_every_public_name_has_its_line_in_the_package_s_text():
+    for name in hpcclear.__all__:
+        assert f"`{name}`" in hpcclear.__doc__
 
 
 def test_evaluate_takes_paper_names_and_paths():
@@ -61,10 +85,10 @@ def test_a_response_has_the_bits_of_the_sample_and_its_series_belong_to_it():
 def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_replicas_and_more():
     scene = hpcclear.load_scene(SCENE, SHORT)
     response = hpcclear.simulate(scene)
-    sample = hpcclear.evaluate(scene.with_({"numerics.uncertainty": True}), {"m1": 0.3})
+    sample = evaluate_records(scene, as_points(scene, {"m1": 0.3}), kicks=KICKS)[0]
     assert response.attrs["integrator"] == "tsitouras"
     farthest = float(response["objective_uncertainty"]) / COVERAGE_ALONE
-    assert farthest >= float(sample["objective_uncertainty"][0]) / COVERAGE * (1.0 - 1e-12) > 0.0
+    assert farthest >= float(sample["objective_uncertainty"]) / COVERAGE * (1.0 - 1e-12) > 0.0
     assert farthest < 1e-3 * response["objective"]
 
 

@@ -128,7 +128,7 @@ def test_commands_and_options_that_are_named_exist(page):
 
 
 FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind"}
-FOREIGN |= {"--full", "--quick", "--latest", "--lowest", "--with"}
+FOREIGN |= {"--full", "--quick", "--nightly", "--latest", "--lowest", "--with"}
 """Options of other programs: srun, apptainer, the two commands, tests/elsewhere.sh."""
 
 

@@ -309,7 +309,7 @@ def test_a_table_of_newlines_takes_no_memory(tmp_path):
     table = tmp_path / "points.csv"
     table.write_bytes(b"\n" * 8_000_000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(InputError, match="holds no points"):
+    with pytest.raises(InputError, match="contains no points"):
         read_points(table, load_scene(SCENE))
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000  # kB
     table.write_bytes(b"C\n" + b"," * 1_000_000)

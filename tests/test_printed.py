@@ -181,7 +181,7 @@ def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
     assert (shown["x"], shown["y"]) == ("95th percentile of f (mm)", "m2 + m3")
     assert [label.partition(" (")[0] for label in shown["axes"][2:]] == [
         "mean of f",
-        "deviation of f",
+        "standard deviation of f",
     ]
     solutions = [p for p in shown["points"] if p["kind"] == "solution"]
     masses = (front["m2"] + front["m3"]).to_numpy()
@@ -197,7 +197,7 @@ def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
 def test_a_plain_front_shows_mean_and_deviation():
     shown = picture.front(content({"front": data.front(), "verification": data.verification()}))
     assert shown["x"].startswith("mean of f")
-    assert shown["y"].startswith("deviation of f")
+    assert shown["y"].startswith("standard deviation of f")
     assert "axes" not in shown
 
 

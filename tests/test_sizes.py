@@ -3,6 +3,7 @@
 import dis
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,18 +116,24 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS)
+    every, whole = (SimpleNamespace(whole=flag, largest=None) for flag in (None, 1))
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(
+        joints=at.MAX_JOINTS, first=0, objective=every
+    )
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
-    responses = at.Effects(crank_rod=1, rod_slider=1, responses=1)
+    responses = at.Effects(joints=2, responses=1)
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
-    assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
-    assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
+    assert list(at.measures_of(responses)) == [at.FORCE, at.FORCE + 1, *followed]
+    assert list(at.measures_of(responses._replace(joints=1, first=1))) == [at.FORCE + 1, *followed]
     assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
         at.FORCE + k for k in range(3)
     ]
-    assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
-    worn = at.Effects(rod_slider=1, wear=1)
+    assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
+    worn = at.Effects(joints=1, first=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
+    judged = at.Effects(joints=1, first=1, objective=every)
+    assert list(at.measures_of(judged)) == [at.JOINTS[1].objective_rate]
+    assert list(at.measures_of(judged._replace(objective=whole))) == [at.OBJECTIVE_RATES]
     for mask, largest in (
         (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
         (at.JOINT_MASK, at.MAX_JOINTS - 1),
@@ -143,7 +150,7 @@ def test_rules_are_numbers_of_one_kind():
     for effects, on in (
         (at.Effects(), set()),
         (effects_with({"latched", "torque"}), {"latched", "free", "turning"}),
-        (effects_with({"baumgarte", "coulomb", "gravity"}), {"turning"}),
+        (effects_with({"baumgarte", "coulomb", "wear"}), {"turning"}),
     ):
         rules = at.rules_of(effects)
         assert {name for name in rules._fields[:-2] if getattr(rules, name)} == on
@@ -152,8 +159,8 @@ def test_rules_are_numbers_of_one_kind():
 
 def test_rules_say_which_joints_are_open():
     for effects, places in (
-        (at.Effects(crank_rod=1, rod_slider=1), (0, 2)),
-        (at.Effects(rod_slider=1), (1, 2)),
+        (at.Effects(joints=2), (0, 2)),
+        (at.Effects(joints=1, first=1), (1, 2)),
         (at.Effects(joints=5), (0, 5)),
         (at.Effects(torque=1), (0, 0)),
     ):
@@ -186,10 +193,11 @@ def test_no_stepper_names_a_rate_of_its_own():
     rows = {one.rate for one in at.MEASURES}
     powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
     followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
-    own = powers | followed | {"FORCE_12", "FORCE_23"}
-    of_joints = {row for joint in at.JOINTS for row in (joint.force, joint.sliding_power)}
+    own = powers | followed
+    fields = ("force", "sliding_power", "objective_rate")
+    of_joints = {getattr(joint, field) for joint in at.JOINTS for field in fields}
     assert {getattr(at, name) for name in own} | of_joints == rows
-    own |= {"SLIDING_POWERS", "sliding_power"}
+    own |= {"SLIDING_POWERS", "sliding_power", "OBJECTIVE_RATES", "objective_rate"}
     room = Path(hpcclear.dynamics.__file__).parent
     for folder in ("explicit", "implicit"):
         for path in (room / folder).glob("*.py"):

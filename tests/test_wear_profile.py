@@ -387,7 +387,7 @@ def test_an_angular_life_of_a_turning_journal(tmp_path):
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
     code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
     assert code == 0, output
-    assert "worn evenly" in " ".join(output.split())
+    assert "with uniform wear" in " ".join(output.split())
     found = dataset.read(tmp_path / "out.nc", "wear")
     np.testing.assert_allclose(found.clearance, found.even_clearance, rtol=1e-5)
     end = found.isel(cycle=-1, joint=0, quantile=2)

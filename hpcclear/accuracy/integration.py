@@ -62,8 +62,8 @@ def reference_of(scene: Scene, designs: int) -> Reference:
     second = method.prepare(REFERENCE_RTOL)[0]().values
     second[:, 2] = [solve_turn(scene, one, "LSODA", 10 * REFERENCE_RTOL)[0][2] for one in made]
     scale = np.abs(values)
-    scale[:, 0] = [one.named.crank_length for one in made]
-    scale[:, 1] = [one.named.crank_length * one.named.speed for one in made]
+    scale[:, 0] = [one.named.driven_length for one in made]
+    scale[:, 1] = [one.named.driven_length * one.named.speed for one in made]
     scale = np.where(scale > 0.0, scale, np.nan)
     return Reference(values, scale, rms((second - values) / scale))
 

@@ -60,7 +60,6 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
         "averaged_revolutions": 1,
         "target_error": None,
         "atol": None,
-        "uncertainty": False,
         "energy": False,
         **numerics,
     }

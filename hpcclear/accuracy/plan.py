@@ -1,8 +1,6 @@
 """Error against core-hours, measured on some of the samples: what the `plan` command knows."""
 
 import multiprocessing
-import os
-import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
-from hpcclear.base import markup
+from hpcclear.base import host, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -41,6 +39,9 @@ FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
 
 LARGEST_DESIGN = 4096
 """Points of the design that are drawn for measuring: the cost of a sample depends on where it lies."""
+
+USUAL_STARTUP, USUAL_MEMORY = 3.0, 400.0 * 2**20
+"""Seconds and bytes of a rank that are assumed where the system does not say, as outside Linux."""
 
 EFFICIENCY = 0.95
 """Of ranks that share out samples: the rest is waiting at the end."""
@@ -172,11 +173,17 @@ def measure(
     single = extent.responses_of(scene) if study.cases else 0
 
     def made() -> Plan:
-        peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        startup = process_age_at_start()
+        peak, startup = host.peak_memory(), process_age_at_start()
+        if not np.isfinite([peak, startup]).all():
+            peak, startup = USUAL_MEMORY, USUAL_STARTUP
         columns = len(study.variables)
         return Plan(tuple(rows), study.samples, whole, startup, peak, columns, single, workers)
 
+    if not np.isfinite([host.peak_memory(), process_age_at_start()]).all():
+        tell(
+            f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
+            f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
+        )
     seconds, _ = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
     rows.append(Row(None, scene, seconds, ""))
     show(replace(made(), first=True))
@@ -230,10 +237,7 @@ def _company(
     scene: Scene, points: Points, workers: int, tell: Callable[[str], object] = lambda text: None
 ) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    others = max(min(workers, cores) - 1, 0)
+    others = max(min(workers, len(host.cores())) - 1, 0)
     context = multiprocessing.get_context("spawn")
     stop, ready = context.Event(), context.Semaphore(0)
     content = {k: v for k, v in scene.resolved().items() if k != "study"}
@@ -284,7 +288,7 @@ def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
     if study is None or not study.worn:
         return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
     if error is not None:
-        reason = "lives of worn joints are followed at the settings of the file"
+        reason = "service lives are simulated at the settings of the file"
         remedy = "Leave it out, and set wear.tolerance and wear.copies"
         raise InputError("--error", error, reason, remedy)
     return ()

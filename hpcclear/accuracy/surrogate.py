@@ -66,7 +66,7 @@ def measure(
 ) -> Surrogates:
     """Fit the surrogates to samples of each size and compare them with fresh simulations.
 
-    They are two, and what the study asks for, where that is another than Kriging with the squared exponential.
+    They are two, and what the study requests, where that is another than Kriging with the squared exponential.
     `values`, shape (n,), and `sample_seconds` are those of `simulate`.
     """
     region, rng = region_of(scene, case), _generator(scene)

@@ -9,7 +9,7 @@ Found = TypeVar("Found")
 
 
 def answered(asking: Generator[Asked, Answer, Found], answer: Callable[[Asked], Answer]) -> Found:
-    """What a procedure finds when all it asks for is answered; raises what `answer` does."""
+    """What a procedure finds when all it requests is answered; raises what `answer` does."""
     asked = next(asking)
     while True:
         told = answer(asked)

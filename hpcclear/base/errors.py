@@ -4,11 +4,12 @@ import difflib
 import errno
 import importlib.util
 import os
+import platform
 import re
-import resource
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from hpcclear.base import host
 from hpcclear.base.plain import plain
 
 MOST_LISTED = 20
@@ -120,9 +121,9 @@ def check_address_space(others: bool = False) -> None:
     `others`: other ranks run beside it. To be called before anything is loaded: out of memory amid an import Python 3.11
     may raise the error for ever.
     """
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    limit = host.address_space_limit()
     least = LEAST_BESIDE_OTHERS if others else LEAST_ADDRESS_SPACE
-    if limit != resource.RLIM_INFINITY and limit < least * 2**20:
+    if limit is not None and limit < least * 2**20:
         known = f"the limit of address space is {limit // 2**20} MB, it takes {least}"
         raise _out_of_memory(known)
 
@@ -147,10 +148,13 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
             return InputError(
                 "file", name, os.strerror(number or 0), "Choose another name or place"
             )
+        if isinstance(one, ModuleNotFoundError) and one.name in host.UNIX_MODULES:
+            reason = f"this command needs the module {one.name}, which only Unix has"
+            return InputError("system", platform.system(), reason, host.WSL)
         if isinstance(one, MemoryError) or number == errno.ENOMEM:
             return _out_of_memory(str(one))
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and any(
+    limit = host.address_space_limit()
+    if limit is not None and any(
         isinstance(one, ImportError | SystemError | OSError) for one in chain
     ):
         return _out_of_memory(f"the limit of address space is {limit // 2**20} MB")

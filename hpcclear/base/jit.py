@@ -110,7 +110,7 @@ def doubles_in_use() -> int:
 
 @contextmanager
 def interleaved(lanes: int) -> Iterator[None]:
-    """Have loops over so many lanes that are compiled inside taken all at once, vector by vector side by side.
+    """Have loops over so many lanes that are compiled inside taken all at once, vector by vector in one batch.
 
     The work on one vector waits for its own roots and quotients, and the processor looks too few instructions ahead to begin
     with the next: a force evaluation took one and a half times as long. LLVM would interleave only what needs no more
@@ -126,7 +126,7 @@ def interleaved(lanes: int) -> Iterator[None]:
 
 @emitted
 def narrow_vectors(typingctx):
-    """Have the function that calls this use vectors of 256 bits at most, whatever the processor is told.
+    """Have the function that calls this use vectors of 256 bits at most, whatever the processor.
 
     For loops over coordinates, of which there are four as a rule: with 512 bits they do not fill one vector, and a single
     response by the pair took 1.4 times as long.

@@ -17,7 +17,7 @@ def truncated_quantile(chance: Array, low: float, high: float) -> Array:
     chance : array of any shape
         Probabilities, between 0 and 1.
     low, high : float
-        The limits, in standard deviations, low < high.
+        The limits, in standard deviations, low < 0 < high.
 
     Returns
     -------
@@ -26,8 +26,6 @@ def truncated_quantile(chance: Array, low: float, high: float) -> Array:
     """
     from scipy.special import ndtr, ndtri  # a quarter of a second that a Latin hypercube saves
 
-    if low >= 0:  # an upper tail is inverted as a lower one, to keep its digits
-        return -truncated_quantile(1 - chance, -high, -low)
     below = ndtr(low)
-    share = 1 - (below + ndtr(-high)) if high > 0 else ndtr(high) - below
+    share = 1 - (below + ndtr(-high))
     return np.clip(ndtri(below + share * chance), low, high)

@@ -26,6 +26,8 @@ class Quantiles(Protocol):
         """Least and largest value that counts."""
         ...
 
+    def __hash__(self) -> int: ...
+
     def __call__(self, chance: Array) -> Array:
         """Values below which a share `chance` lies, of any shape, strictly between 0 and 1."""
         ...
@@ -120,7 +122,7 @@ class Cut:
         return np.clip(self.whole.ppf(below + chance * (above - below)), *self.span)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # what a plug-in made need not be comparable
 class Foreign(Cut):
     """One that a plug-in made."""
 

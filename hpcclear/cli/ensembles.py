@@ -32,16 +32,16 @@ def _check_kind(
 ) -> None:  # fmt: skip
     """Raise InputError where options name two kinds of sampling at once."""
     if part is not None and (statistics or fresh):
-        reason = "parts of samples are merged, under the names they were given"
+        reason = "a part of a job array writes its samples for a later merge"
         raise InputError("--part", part, reason, "Drop --statistics and --fresh")
     if statistics and points is not None:
-        reason = "--statistics makes the study's Monte Carlo points on demand"
+        reason = "--statistics generates the study's Monte Carlo points itself"
         raise InputError("--points", str(points), reason, "Drop one of the two")
     if thresholds and statistics:
         reason = "--statistics keeps a histogram and no samples"
         raise InputError("--beyond", ", ".join(thresholds), reason, "Drop one of the two")
     if raw is not None and not statistics:
-        reason = "without --statistics the samples are what is written"
+        reason = "without --statistics the samples are written anyway"
         raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
 
 

@@ -41,7 +41,7 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
         other = path.with_suffix(".nc")
         table = path if path.suffix in (".csv", ".xlsx", ".mat", ".parquet") else "TABLE.csv"
         raise click.BadParameter(
-            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}. "
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Write {str(other)!r}. "
             f"For a table, then: hpcclear export {other} -o {table}"
         )
     return path
@@ -175,7 +175,7 @@ def place_of(output: Path) -> Path:
 def check_free(path: Path) -> None:
     """Raise InputError if something is there: what a user wrote is not written over."""
     if path.exists():
-        raise InputError("file", str(path), "is there already", "Choose another name")
+        raise InputError("file", str(path), "exists already", "Choose another name")
 
 
 def is_root() -> bool:

@@ -1,4 +1,4 @@
-"""Commands about one scene: `init`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
+"""Commands about one scene: `init`, `import`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
 
 import time
 from pathlib import Path
@@ -34,11 +34,12 @@ if TYPE_CHECKING:
     "--four-stroke",
     "A gas force against two turns of the crank, in an engine written as a linkage.",
 )
+@flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
-def init(file: Path, four_stroke: bool) -> int:
+def init(file: Path, four_stroke: bool, jobs: bool) -> int:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
-    An existing file is never overwritten.
+    With --jobs, write the scenes and scripts that the documentation names, as a directory. Nothing is overwritten.
 
     Example: hpcclear init engine.toml --four-stroke
     """
@@ -47,11 +48,67 @@ def init(file: Path, four_stroke: bool) -> int:
     from hpcclear.results import files
 
     check_free(file)
+    if jobs:
+        _copy_jobs(file)
+        return Exit.DONE
     files.probe(place_of(file))
     name = "four_stroke.toml" if four_stroke else "starter.toml"
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
+    return Exit.DONE
+
+
+def _copy_jobs(place: Path) -> None:
+    """Write the example scenes and the scripts that need no clone to a new directory."""
+    from importlib import resources
+
+    from hpcclear.results import files
+
+    with resources.as_file(resources.files(__package__).joinpath("jobs")) as source:
+        kinds = ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+        found = sorted(path for kind in kinds for path in source.glob(kind))
+        for path in found:
+            target = place / path.relative_to(source)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            files.write_bytes(target, path.read_bytes())
+    show(
+        f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
+    )
+
+
+@click.command("import", short_help="Write a linkage from a table of its points.")
+@click.argument("table", type=PATH)
+@click.argument("file", type=PATH)
+@click.option(
+    "--sketch",
+    type=PATH,
+    metavar="FIGURE",
+    help="Draw the linkage with names, axes and signs to this file (png, svg, pdf).",
+)
+@of_one_process
+def import_(table: Path, file: Path, sketch: Path | None) -> int:
+    """Write a linkage from a table of its points.
+
+    TABLE is a CSV file or Excel workbook with the columns name, x [mm], y [mm] and bodies; points that bodies share
+    are pins, "ground" stands still. Without bodies the points are a chain of bars between the first and the last.
+    FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
+
+    Example: hpcclear import points.csv linkage.toml --sketch linkage.png
+    """
+    from hpcclear.results import files
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.points_of_linkage import linkage_of, text_of
+
+    check_free(file)
+    content = linkage_of(table)
+    scene = load_scene(content)
+    mechanism = content["mechanism"]
+    files.write_bytes(file, text_of(content, table.name).encode())
+    show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    if sketch is not None:
+        _draw(scene, sketch)
+    show(f"next     put masses and the speed in, then: hpcclear check {file}")
     return Exit.DONE
 
 
@@ -95,13 +152,10 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
 def _draw(scene: "Scene", sketch: Path) -> None:
     """Draw the mechanism to a file and print where it is."""
+    from hpcclear.dynamics.planar.problem import poses_at_start
     from hpcclear.report import save, sketch_figure
 
-    poses = None
-    if scene.is_planar:
-        from hpcclear.dynamics.planar.problem import poses_at_start
-
-        poses = poses_at_start(scene)
+    poses = poses_at_start(scene, 0.0 if scene.template is None else scene.template.DRAWN_AT)
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 

@@ -1,17 +1,11 @@
-"""Scenes without clearance at prescribed speed: outcomes and time series in closed form."""
+"""Samples of scenes without clearance whose drives prescribe everything: nothing is integrated."""
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics.layout import TURN
-from hpcclear.dynamics.linkage import ideal
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.prescribed import outcomes
-from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.views import Outcome, Parameters, Start
-from hpcclear.scene import Scene
-
-_CONTACT = ("eccentricity_x", "eccentricity_y", "penetration", "contact_force", "friction_force")
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.problem import Problem
+from hpcclear.dynamics.views import Outcome, Start
 
 
 class ClosedForm:
@@ -47,71 +41,23 @@ class ClosedForm:
 
     def run(self, par: Array, start: Start) -> Outcome:
         """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""
-        p = self._problem
-        if p.linkage is not None:
-            return p.marked(Outcome(outcomes(p, par)), par, start)
-        rows = ideal.ideal_outcomes(p.effects, par, p.load_table, p.transient, p.averaged)
-        return p.marked(Outcome(rows), par, start)
+        return self._problem.marked(Outcome(_outcomes(self._problem, par)), par, start)
 
 
-def ideal_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
-    """Instants (t,) and the time series of a response without clearance.
-
-    Parameters
-    ----------
-    scene : Scene
-        Both joints ideal, crank speed prescribed. Where every step is asked for (0 instants a revolution) there is
-        none, and 720 instants are taken.
-
-    Returns
-    -------
-    times : ndarray, shape (t,)
-        s.
-    series : dict
-        Names as in the response dataset. There is no contact: ``reaction_x`` and ``reaction_y`` (t, 2) are the
-        forces on the rod at O12 and O23, ``bearing_x`` and ``bearing_y`` those of the frame on the crank,
-        ``guide_force`` that of the guide on the slider, N.
-    """
-    problem = problem_of(scene, ledger=True, series=True)
-    par = parameters(scene)[0]
-    p = Parameters(par)
-    turns = problem.transient + problem.averaged
-    count = scene.output.instants_per_revolution or 720
-    angle = np.linspace(0.0, turns * TURN, turns * count + 1)
-    seen = ideal.ideal_response(problem.effects, par, problem.load_table, angle)
-    drive, _, lost, load = ideal.ideal_works(problem.effects, par, problem.load_table, angle)
-    omega = np.full_like(angle, p.speed)
-    kinetic = 0.5 * (
-        p.rod_mass * (seen[ideal.ROD_VX] ** 2 + seen[ideal.ROD_VY] ** 2)
-        + p.rod_inertia * seen[ideal.ROD_SPIN] ** 2
-        + p.slider_mass * seen[ideal.SLIDER_V] ** 2
-        + p.crank_inertia * omega**2
+def _outcomes(problem: Problem, par: Array) -> Array:
+    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, no contact, and no work, of which one response tells."""
+    rows = np.zeros((len(par), at.OUT))
+    revolutions = problem.transient + problem.averaged
+    rows[:, at.OUT_SPREAD] = 0.0 if problem.averaged > 1 else np.nan
+    rows[:, at.OUT_REVOLUTIONS] = revolutions
+    rows[:, at.OUT_TIME] = revolutions * par[:, at.PERIOD]
+    works = at.OUT_TOTAL + at.WORKS
+    rows[:, works : works + 4] = np.nan
+    known = (
+        (at.OUT_MOMENT, at.HELD_MOMENT),
+        (at.OUT_ACCELERATION, at.HELD_DEVIATION),
+        (at.OUT_FOLLOWED, at.HELD_PEAK),
     )
-    height = p.crank_moment * np.sin(angle) + p.rod_mass * seen[ideal.ROD_Y]
-    potential = scene.effects.gravity * height
-    total = kinetic + potential
-    none = np.zeros((len(angle), 2))
-    return angle / p.speed, {
-        "crank_angle": angle,
-        "crank_speed": omega,
-        "slider_position": seen[ideal.SLIDER_X],
-        "slider_velocity": seen[ideal.SLIDER_V],
-        "slider_acceleration": seen[ideal.SLIDER_A],
-        "rod_x": seen[ideal.ROD_X],
-        "rod_y": seen[ideal.ROD_Y],
-        "rod_angle": seen[ideal.ROD_ANGLE],
-        **dict.fromkeys(_CONTACT, none),
-        "reaction_x": seen[[ideal.FORCE_12_X, ideal.FORCE_23_X]].T,
-        "reaction_y": seen[[ideal.FORCE_12_Y, ideal.FORCE_23_Y]].T,
-        "bearing_x": seen[ideal.BEARING_X],
-        "bearing_y": seen[ideal.BEARING_Y],
-        "guide_force": seen[ideal.GUIDE_FORCE],
-        "crank_moment": seen[ideal.CRANK_MOMENT],
-        "kinetic_energy": kinetic,
-        "elastic_energy": np.zeros_like(angle),
-        "potential_energy": potential,
-        "driving_work": drive,
-        "load_work": load,
-        "dissipated_energy": lost,
-        "energy_residual": total - total[0] - drive - load + lost,
-    }
+    for row, of_sample in known:
+        rows[:, row] = par[:, of_sample]
+    return rows

@@ -18,22 +18,15 @@ MAX_COORDINATES = 24
 class Effects(NamedTuple):
     """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
 
-    crank_rod: Any = None  # clearance at O12
-    rod_slider: Any = None  # clearance at O23
-    joints: Any = None  # of a linkage other than the slider-crank: how many have clearance
+    joints: Any = None  # how many have clearance
+    first: Any = 0  # place of the first of them; the others follow
     contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
     friction: Any = None
-    torque: Any = None  # the crank is free, driven by a torque
-    torque_table: Any = None
-    torque_falls: Any = None  # with the speed
-    gravity: Any = None
-    load: Any = None  # constant slider load
-    load_table: Any = None
-    guide: Any = None  # guide friction on the slider
-    baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
+    torque: Any = None  # the body that gives the period is free, driven by a torque
+    baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
-    responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
+    responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
@@ -48,7 +41,7 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
-    bending: Any = None  # of a slider-crank's rod: how many modes, each a coordinate
+    objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
@@ -83,10 +76,8 @@ def bristles_of(effects: Effects) -> int:
 
 
 def open_of(effects: Effects) -> Open:
-    """Those of a set of effects: O12 has the first place and O23 the second; other linkages fill them from the first on."""
-    if effects.joints is not None:
-        return Open(*[1] * effects.joints)
-    return Open(effects.crank_rod, effects.rod_slider)
+    """Those of a set of effects."""
+    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -115,41 +106,21 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
 
 # ---- parameters of one sample -------------------------------------------------------------------
 (
-    SPEED,  # rad/s, prescribed crank speed
-    CRANK_LENGTH,
-    ROD_LENGTH,
-    ROD_NEAR,  # u2: from the first pin to the mass centre
-    ROD_FAR,  # L2 - u2
-    ROD_MASS,
-    INV_ROD_MASS,
-    ROD_INERTIA,
-    INV_ROD_INERTIA,
-    SLIDER_MASS,
-    INV_SLIDER_MASS,
-    CRANK_MOMENT,  # m1 u1
-    CRANK_INERTIA,  # about the crank's bearing, flywheel included
-    GRAVITY,
-    LOAD,
-    TORQUE,
-    TORQUE_FALL,  # share of it that a rad/s takes: the inverse of the speed without load
-    GUIDE_COEFFICIENT,
-    GUIDE_INVERSE_RAMP,
-    BAUMGARTE_ALPHA2,  # 2 alpha
-    BAUMGARTE_BETA2,  # beta^2
+    SPEED,  # rad/s, of the drive: a turn over its share of the period
+    DRIVEN_LENGTH,  # m, largest distance between points of the body that gives the period
     PERIOD,  # s, one revolution at the prescribed speed
     FIRST_STEP,  # s
-    CRANK_MASS,
-    CRANK_NEAR,  # u1
-    CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
-    SLIDER_INERTIA,
     STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
     EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
     TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
-) = range(30)
+    HELD_MOMENT,  # N m, of a sample without anything to integrate: largest moment of the drive,
+    HELD_DEVIATION,  # m/s^2, deviation of the followed acceleration
+    HELD_PEAK,  # m/s^2, and its largest size
+) = range(10)
 JOINT_ROWS = 30
 LAW_NUMBERS = 8
 """Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
-JOINT_BLOCKS = 30  # of all joints, one behind the other
+JOINT_BLOCKS = 10  # of all joints, one behind the other
 # within a joint's block
 (
     CLEARANCE,
@@ -171,12 +142,8 @@ FRICTION_NUMBERS = CONTACT_NUMBERS + LAW_NUMBERS
     FILM_FLOOR,  # least thickness over the clearance
     FILM_STEEPNESS,  # s/m, of the film's force over that of inertia; with bristles next to nothing, but not nothing
 ) = range(FRICTION_NUMBERS + LAW_NUMBERS, JOINT_ROWS)
-JOINT_12 = JOINT_BLOCKS
-JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
 OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
-"""First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
-BENDING = OWN
-"""First row of what a slider-crank's rod that bends has, in the order of `linkage.bending.entries`."""
+"""First row of what a linkage has of its own."""
 WAVES = OWN + 192
 """First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
 of them another, its slope's."""
@@ -193,17 +160,20 @@ PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS
 GAP = 0
 FORCE = GAP + MAX_JOINTS
 GAP_RATE = FORCE + MAX_JOINTS
-(GAP_12, GAP_23), (FORCE_12, FORCE_23), (RATE_12, RATE_23) = (
-    (first, first + 1) for first in (GAP, FORCE, GAP_RATE)
-)
 (DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
 FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
 DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of the slider, or of a point along x; for responses only
+FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of a guided body, or of a point along x; responses only
 FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
 FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
 SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-FORCE_KINKS = SLIDING_POWERS + MAX_JOINTS
+OBJECTIVE_RATES = SLIDING_POWERS + MAX_JOINTS  # of each joint, or the first of the whole mechanism
+SLIDING_SPEEDS = (
+    OBJECTIVE_RATES + MAX_JOINTS
+)  # of each joint; these and normals for the objective's rate only
+NORMALS_X = SLIDING_SPEEDS + MAX_JOINTS
+NORMALS_Y = NORMALS_X + MAX_JOINTS
+FORCE_KINKS = NORMALS_Y + MAX_JOINTS
 """Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
 sides of friction's ramp."""
 LOW_KINKS = FORCE_KINKS + MAX_JOINTS
@@ -229,6 +199,7 @@ _PLACES = range(MAX_JOINTS)
 GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
 _FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
 _SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
+_OBJECTIVES = tuple(Integrated(OBJECTIVE_RATES + k, "objective") for k in _PLACES)
 _PROFILES = tuple(Integrated(PROFILES + k, "profile") for k in range(WAVE_ROWS))
 MEASURES = (
     Integrated(DRIVE_POWER, "ledger"),
@@ -240,6 +211,7 @@ MEASURES = (
     Integrated(FOLLOWED_SQUARE, "responses"),
     Integrated(FOLLOWED_ACROSS, "responses"),
     *_SLIDING,
+    *_OBJECTIVES,
 )
 INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
@@ -260,10 +232,16 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
+    places = open_of(effects)
+    whole = effects.objective is not None and effects.objective.whole
     closed = {
         one.rate
-        for of_joints in (_FORCES, _SLIDING)
-        for one, flag in zip(of_joints, open_of(effects), strict=True)
+        for of_joints, there in (
+            (_FORCES, places),
+            (_SLIDING, places),
+            (_OBJECTIVES, Open(1) if whole else places),
+        )
+        for one, flag in zip(of_joints, there, strict=True)
         if flag is None
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
@@ -319,14 +297,14 @@ INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of the
 ) = range(INTEGRAL + RATES, INTEGRAL + RATES + 27)
 MAX_CURVES = 8
 CURVES = STRICTER_AT_EDGE + 1  # values of tabulated curves at the stage
-TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
 # of each joint
 ACTIVE = CURVES + MAX_CURVES  # contact latched (1) or flight (0)
 INVERSE_IMPACT = ACTIVE + MAX_JOINTS  # 1 / d'_0
 PEAK = INVERSE_IMPACT + MAX_JOINTS
 DEEPEST = PEAK + MAX_JOINTS  # largest penetration
 ENDED = DEEPEST + MAX_JOINTS  # contacts ended in this revolution
-WORK = ENDED + MAX_JOINTS
+LARGEST_RATE = ENDED + MAX_JOINTS  # of the objective's
+WORK = LARGEST_RATE + MAX_JOINTS
 
 BANK = WORK + PARAMETERS
 """Rows of what a motion reads and writes: those of `work`, then the parameters."""
@@ -336,7 +314,6 @@ STAGES = BANK
 
 # ---- tabulated curves, one behind the other -----------------------------------------------------
 CELLS = 2048  # cubic cells over one turn, 4 coefficients each
-TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
 TABLES = 4 * MAX_CURVES * CELLS  # at most
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
@@ -348,11 +325,8 @@ TABLES = 4 * MAX_CURVES * CELLS  # at most
     M2_F,
     COUNT_F,
     ELAPSED,  # s, whole revolutions so far
-    LAST_F,  # the objective of the revolution before
-    LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
-    FIRST_F,
-) = range(10)
-LATCHED = 10  # of each joint
+) = range(7)
+LATCHED = 7  # of each joint
 AVERAGED = (
     LATCHED + MAX_JOINTS
 )  # integrals over the averaged revolutions, in the order of INTEGRATED
@@ -379,8 +353,9 @@ OUT_LATCHED = OUT_PEAK + MAX_JOINTS
 OUT_DEEPEST = OUT_LATCHED + MAX_JOINTS
 OUT_ACTIVE = OUT_DEEPEST + MAX_JOINTS
 OUT_INVERSE_IMPACT = OUT_ACTIVE + MAX_JOINTS
+OUT_LARGEST_RATE = OUT_INVERSE_IMPACT + MAX_JOINTS
 OUT_MEAN = (
-    OUT_INVERSE_IMPACT + MAX_JOINTS
+    OUT_LARGEST_RATE + MAX_JOINTS
 )  # time means over the averaged revolutions, in the order of INTEGRATED
 OUT_TOTAL = OUT_MEAN + len(INTEGRATED)  # integrals over all revolutions, likewise
 OUT_STATE = OUT_TOTAL + len(INTEGRATED)
@@ -406,6 +381,10 @@ class Joint(NamedTuple):
     low_kink: int
     high_kink: int
     sliding_power: int
+    objective_rate: int
+    sliding_speed: int
+    normal_x: int
+    normal_y: int
     active: int  # rows of `work`
     inverse_impact: int
 
@@ -413,11 +392,12 @@ class Joint(NamedTuple):
 JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
-        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
+        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
+        OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip
-O12, O23 = JOINTS[:2]
 
 
 class Block(NamedTuple):
@@ -460,6 +440,7 @@ class Rules(NamedTuple):
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
     profile: Any  # where around joints sliding work is done is told
+    largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`
 
@@ -468,7 +449,8 @@ def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
-    flags = (e.latched, e.torque, turning, e.responses, e.profile)
+    largest = None if e.objective is None else e.objective.largest
+    flags = (e.latched, e.torque, turning, e.responses, e.profile, largest)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

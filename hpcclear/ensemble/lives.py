@@ -23,7 +23,7 @@ HOUR = 3600.0
 """s."""
 
 LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-"""Quantiles that are told."""
+"""Quantiles that are reported."""
 
 
 def ages_of(scene: Scene, lives: list[Life]) -> Array:
@@ -196,8 +196,11 @@ def doubts(content: xr.Dataset) -> list[str]:
     drift = content["drift"].to_numpy()
     moving = int((drift > content.attrs["tolerance"]).sum())
     if moving:
-        text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
-        texts.append(f"{text}; raise numerics.transient_revolutions")
+        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
+        texts.append(
+            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
+            "raise numerics.transient_revolutions"
+        )
     if "sharpest" in content:
         narrow = int((content["sharpest"] > 1.0).sum())
         if narrow:
@@ -216,7 +219,7 @@ def statistics(
     values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None,
     local: Array, at_end: Array,
 ) -> dict[str, Array]:  # fmt: skip
-    """Quantiles over lives, survival and exceedance with limits; lives that failed are left out.
+    """Quantiles over lives, survival and exceedance with confidence intervals; lives that failed are left out.
 
     `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit`, m, is what the
     largest clearance around a joint, `local` (lives, cycles, joints), exceeds.
@@ -250,7 +253,7 @@ def statistics(
 
 
 def _exceeded(clearance: Array, limit: float) -> Iterator[tuple[str, Array]]:
-    """Share of lives above a limit at each revolution and joint, and its 95 % limits."""
+    """Share of lives above a limit at each revolution and joint, and its 95 % confidence intervals."""
     total = (~np.isnan(clearance)).sum(axis=0)
     above = (clearance > limit).sum(axis=0)
     lower, upper = np.zeros(above.shape), np.ones(above.shape)

@@ -49,7 +49,7 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     except ValueError:
         raise wrong from None
     except UnitError as error:
-        raise InputError("map", words, str(error), f"Give limits in {unit or '1'}") from None
+        raise InputError("map", words, str(error), f"Give bounds in {unit or '1'}") from None
     if count < 1 or not np.isfinite([low, high]).all():
         raise wrong
     return name, paths, np.linspace(low, high, count)
@@ -97,7 +97,7 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
         raise InputError(
             "joints",
             None,
-            "without clearance there is nothing to map",
+            "there is no joint with clearance",
             'Set a joint\'s kind = "clearance"',
         )
     return points, grid[0].shape

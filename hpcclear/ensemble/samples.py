@@ -21,7 +21,7 @@ MEMORY = 2.3e-6
 """GB that root takes for a sample (`analysis/many_ranks.py`)."""
 
 NOTABLE = 1.0
-"""GB from which on that is told."""
+"""Memory (GB) above which a warning is printed."""
 
 
 def design(scene: Scene, table: Path | None) -> Points:
@@ -38,7 +38,7 @@ def design(scene: Scene, table: Path | None) -> Points:
         raise InputError(
             "study",
             None,
-            "the scene says nothing about sampling",
+            "the scene has no [study] table",
             "Add a [study] table, or give --points designs.csv",
         )
     return sampled(scene)

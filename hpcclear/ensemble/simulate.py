@@ -34,7 +34,7 @@ def content_of(scene: "Scene") -> dict[str, Any]:
     """
     content = scene.resolved()
     content.pop("study", None)
-    content["numerics"]["responses"] = scene.responses_asked()
+    content["numerics"] |= {"responses": scene.responses_asked(), "objective": scene.objective.name}
     return content
 
 
@@ -44,7 +44,6 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
 
     return {
         "scene": content_of(scene),
-        "objective": scene.objective.name,
         "names": points.names,
         "paths": points.paths,
         "lanes": DEFAULT_LANES,
@@ -89,7 +88,7 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
     if payload not in _COMPILED:
         first_compiled(evaluator, ranks)
         _COMPILED[:] = [*_COMPILED[1 - _MOST_COMPILED :], payload]
-    return Judge(evaluator, scene.objective_named(payload["objective"]))
+    return Judge(evaluator, scene.objective)
 
 
 def first_compiled(worker: Compiled, ranks: Ranks) -> Compiled:

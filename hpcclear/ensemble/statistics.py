@@ -137,7 +137,7 @@ def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
     if blocks <= collection.LISTED and not (folder / collection.NAME).is_file():
         missing.append(collection.NAME)
     if missing:
-        reason = f"the statistics are there, in {output}, and the samples were not kept ({missing[0]} is missing)"
+        reason = f"the statistics exist, in {output}, but the samples were not kept ({missing[0]} is missing)"
         raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
 
 
@@ -170,7 +170,6 @@ class _Streaming:
             self._raw = {
                 "folder": str(raw.absolute()),
                 "attributes": session.attributes,
-                "objective": scene.objective.name,
                 "joints": session.joints,
             }
         self._files = raw_files(self._raw, scene, points)

@@ -1,4 +1,4 @@
-"""Who simulates what: how many samples a rank gets at a time, and the books that are kept of them.
+"""Who simulates what: how many samples a rank gets at a time, and the record that is kept of them.
 
 Free of MPI, so that a scaling model can run the same policy on ranks that do not exist.
 """
@@ -46,7 +46,7 @@ class Worker(Protocol):
 
 
 class Points(Protocol):
-    """A design: an array (n, d), or anything that makes the rows asked for."""
+    """A design: an array (n, d), or anything that makes the rows requested."""
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -56,7 +56,7 @@ class Points(Protocol):
 
 
 class Need(NamedTuple):
-    """What a rank says of itself when it asks for samples."""
+    """What a rank says of itself when it requests samples."""
 
     lanes: int  # samples it works on at once
     pending: int  # samples it still has
@@ -112,7 +112,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
 
 
 class HandOut:
-    """Root's books of one design: what is left, what is out, what is finished.
+    """Root's record of one design: what is left, what is out, what is finished.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ class Desk:
 
     @property
     def hungry(self) -> bool:
-        """Whether it is time to ask for more."""
+        """Whether it is time to request more."""
         return not self.exhausted and self._worker.pending < self._ask_below
 
     @property

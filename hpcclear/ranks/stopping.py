@@ -10,10 +10,8 @@ from collections.abc import Callable
 from enum import IntEnum
 from types import FrameType, TracebackType
 
+from hpcclear.base.host import STOP_SIGNALS
 from hpcclear.ranks.launcher import launched_rank
-
-STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
-"""What batch systems and people send to end a job."""
 
 GRACE = 3.8
 """Seconds a rank has to flush and leave once it was told to; the promise is 5."""

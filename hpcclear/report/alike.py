@@ -26,8 +26,8 @@ def words(ours: xr.Dataset, best: xr.Dataset) -> str:
 
 def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """Return other designs that are statistically indistinguishable from the best."""
-    again = _again(ours, best)
-    return [name for name in _twins(ours, best) if name not in again]
+    same = again(ours, best)
+    return [name for name in _twins(ours, best) if name not in same]
 
 
 def _listed(names: list[str]) -> str:
@@ -39,8 +39,8 @@ def _listed(names: list[str]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Other names of the best: all variables are the same numbers."""
+def again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Return other names of a design: all variables are the same numbers."""
     variables = labels.design_variables(ours)
     alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
     for variable in variables:

@@ -14,8 +14,8 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
-from hpcclear.scene.table import csv_lines
-from hpcclear.scene.units import UnitError, decimal, factor
+from hpcclear.scene.sheets import read
+from hpcclear.scene.units import UnitError, factor
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
@@ -24,8 +24,6 @@ SHIFTS = 720
 
 MOST_POINTS = 4000
 """Measured points that the search for a shift uses."""
-
-_HEADING = re.compile(r"\s*([^\[\]()]*?)\s*(?:[\[(]\s*([^\[\]()]*?)\s*[\])])?\s*")
 
 
 @dataclass(frozen=True)
@@ -173,32 +171,19 @@ def compare(
 
 
 def read_columns(path: Path) -> list[Column]:
-    """Return the columns of a measured table, each with the unit of its heading."""
-    (_, headings), *rows = csv_lines(path, "measured table")
-    values = np.empty((len(rows), len(headings)))
-    for k, (line, cells) in enumerate(rows):
-        where = f"{path}, line {line}"
-        if len(cells) != len(headings):
-            reason = f"has {len(cells)} cells instead of {len(headings)}"
-            raise InputError(where, ",".join(cells)[:200], reason, "Give each column a value")
-        for j, cell in enumerate(cells):
-            try:
-                values[k, j] = decimal(cell)
-            except UnitError as error:
-                raise InputError(
-                    f"{where}, column {headings[j]}", cell, error.reason, error.remedy
-                ) from None
-    if len(headings) < 2 or len(rows) < 3:
+    """Return the columns of numbers of a measured table, each with its unit."""
+    sheet = read(path, "measured table")
+    columns = [one for one in sheet.columns if not sheet.is_text(one)]
+    if len(columns) < 2 or len(sheet.lines) < 3:
         reason = "has no series: an axis, a quantity and three rows are needed"
         raise InputError(
             "measured table", str(path), reason, "Give time or angle first, then quantities"
         )
-    found = []
-    for heading, column in zip(headings, values.T, strict=True):
-        parsed = _HEADING.fullmatch(heading)
-        name, unit = parsed.groups() if parsed else (heading, None)
-        found.append(Column(heading, name, unit or "", column))
-    return found
+    rows = range(len(sheet.lines))
+    return [
+        Column(one.heading, one.name, one.unit, np.array([sheet.number(one, row) for row in rows]))
+        for one in columns
+    ]
 
 
 def _axis(column: Column) -> tuple[str, str]:

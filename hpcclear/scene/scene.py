@@ -11,6 +11,7 @@ from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.plugged import texts_of
@@ -62,7 +63,7 @@ class Scene(SceneTables):
             key = f"study.random.{row.name}"
             if self.wear is None:
                 raise invalid(
-                    "the scene does not say what lives to follow",
+                    "the scene has no [wear] table",
                     "Add [wear], as in jobs/worn_study.toml", key, "wear",
                 )  # fmt: skip
             for path in row.paths:
@@ -171,7 +172,7 @@ class Scene(SceneTables):
         altered = unboxed({**(changes or {}), **more})
         for path, value in altered.items():
             check_path(path)
-            content = replace(content, path, value)
+            content = entry_replaced(content, path, value)
         result = scene_of(content)
         notes = "".join(f"# changed: {path} = {value!r}\n" for path, value in altered.items())
         result._text = notes + self.text

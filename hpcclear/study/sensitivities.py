@@ -315,7 +315,7 @@ def _sobol_points(run: StudyRun) -> Array:
 
 
 def _sobol_rows(study: Study) -> int:
-    """Rows of each of the two samples; none where fewer than two were asked for."""
+    """Rows of each of the two samples; none where fewer than two were requested."""
     rows = study.sensitivity.sobol_samples
     return rows if rows >= 2 else 0
 

@@ -26,7 +26,7 @@ def _curve(row: int) -> dict[str, Any]:
 
 @style.drawn
 def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
-    """Slider motion, where there is a slider, contact forces and crank moment over the last revolutions.
+    """Slider motion, where there is a slider, contact forces and torque of the drive over the last revolutions.
 
     Parameters
     ----------
@@ -91,7 +91,8 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 def spectrum_figure(
     response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
 ) -> "Figure":
-    """Amplitude spectra of slider acceleration (linkage: crank moment) and contact forces over orders of the crank frequency.
+    """Amplitude spectra of slider acceleration (linkage: torque of the drive) and contact forces over orders of the crank
+    frequency.
 
     `orders`: right end of the axis, multiples of the crank frequency; else as for `bifurcation_figure`, of one response.
     """
@@ -121,7 +122,7 @@ def spectrum_figure(
 
 @style.drawn
 def energy_figure(response: xr.Dataset) -> "Figure":
-    """Energy ledger: what drive and loads put in and what is lost since the start, what is stored, what is left unexplained.
+    """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual.
 
     Of a dataset of kind ``response``.
     """

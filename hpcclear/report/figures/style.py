@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.results import files
 
 if TYPE_CHECKING:
@@ -37,11 +38,11 @@ PALETTE = {
     "black": "#000000",
     "grey": "#767676",
 }
-"""Okabe and Ito's colours (without yellow, which is lost on white), told apart by every eye."""
+"""Okabe and Ito's colours (without yellow, which is lost on white), distinguished by every eye."""
 
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
-"""Line styles in the order of `CYCLE`: a curve is never told by its colour alone."""
+"""Line styles in the order of `CYCLE`: a curve is never identified by its colour alone."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 COLOURS = "viridis"  # perceptually even, the same order in grey
@@ -86,7 +87,7 @@ _MARKS = {
     "svg": b"<dc:title>hpcclear</dc:title>",
     "pdf": b"/Creator (hpcclear)",
 }
-"""What tells our figures from a user's, by kind: where the metadata of `render` come to stand."""
+"""What distinguishes our figures from a user's, by kind: where the metadata of `render` come to stand."""
 
 
 def matplotlib() -> Any:
@@ -101,8 +102,7 @@ def matplotlib() -> Any:
         import matplotlib as module
     except ModuleNotFoundError:
         reason = "figures are drawn with matplotlib, which is not installed"
-        remedy = "Install it with: pip install 'hpcclear[analysis]'"
-        raise InputError("matplotlib", None, reason, remedy) from None
+        raise InputError("matplotlib", None, reason, installing("analysis")) from None
     return module
 
 
@@ -219,7 +219,7 @@ def save(figure: "Figure", path: str | Path) -> Path:
     Raises
     ------
     InputError
-        The suffix is none of these, or the place cannot be written to.
+        The suffix is another one, or the place cannot be written to.
     StorageError
         The disk is full or fails.
     """

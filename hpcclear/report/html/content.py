@@ -61,13 +61,10 @@ def read(*places: str | Path) -> Content:
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
     troubles = []
-    for path in dataset.files_in(place) if whole else chosen:
-        try:
-            one = dataset.read(path)
-        except InputError as error:
-            if not whole:  # it was asked for
-                raise
-            troubles.append(f"{path.relative_to(place)} was left out: {error.reason}.")
+    found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
+    for path, one in found:
+        if isinstance(one, InputError):
+            troubles.append(f"{path.relative_to(place)} was left out: {one.reason}.")
             continue
         kind = "map" if SHAPE in one.attrs else str(one.attrs["hpcclear_kind"])
         if kind == "response":

@@ -11,7 +11,6 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
 from hpcclear.report.figures import (
-    accuracy,
     catalogue,
     designs,
     effects,
@@ -62,9 +61,6 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
             "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs."
         )
         yield caption, lambda: _shown(designs.front_figure(front, verified), caption)
-    costs = content.get("accuracy")
-    for name, draw in accuracy.FIGURES.items() if costs is not None else ():
-        yield from _of_file(draw, costs, f"Cost of accuracy: {name.replace('_', ' ')}.")
     found = content.responses
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]
@@ -101,7 +97,7 @@ def _of_file(
 ) -> Iterator[tuple[str, Maker]]:
     """A figure of one file, unless that is missing."""
     if found is not None:
-        yield caption, functools.partial(_tried, draw, found, caption)
+        yield caption, functools.partial(picture, draw, found, caption)
 
 
 def _warnings(kind: str, content: xr.Dataset | None) -> str:
@@ -121,10 +117,10 @@ def _plays(*responses: xr.Dataset) -> str:
     return f", at radial clearances of {' and '.join(told)}" if told else ""
 
 
-def _tried(
+def picture(
     draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
 ) -> dict[str, str] | None:
-    """The figure, unless the file has not what it needs (no Sobol indices, say)."""
+    """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
     try:
         made = draw(found)
     except InputError as error:

@@ -22,6 +22,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
+from hpcclear.statistics.random.rules import kernel_integral
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
@@ -112,7 +113,7 @@ class RobustObjective:
     Raises
     ------
     InputError
-        Names that do not fit together, a random input too wide for the tolerance, derived random
+        A random input too wide for the tolerance, derived random
         inputs on a piecewise model, a kernel that is no product of the inputs; and on a call, a
         support that leaves the surrogate's domain.
     """
@@ -141,7 +142,12 @@ class RobustObjective:
             self._draws = self._drawn(*draws)
         elif not model.separable:
             label = model.leaves[0].label
-            raise InputError("surrogate", label, "no product of the inputs", 'use "monte-carlo"')
+            raise InputError(
+                "surrogate",
+                label,
+                "the model is not a product of functions of single inputs",
+                'use "monte-carlo"',
+            )
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes)  # type: ignore[arg-type]
@@ -186,7 +192,10 @@ class RobustObjective:
         simple = isinstance(leaf, Kriging) and leaf.separable and not others
         if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
-                "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
+                "model",
+                self.model.names,
+                "the model has no closed form",
+                "compare with Monte Carlo",
             )
         return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
 
@@ -200,9 +209,6 @@ class RobustObjective:
         """Designs as floats, after checking that their random inputs stay inside the domain."""
         designs = np.ascontiguousarray(designs, dtype=np.float64)
         wiring, model = self._wiring, self.model
-        if designs.ndim != 2 or designs.shape[1] != len(wiring.column):
-            expected = f"(n, {len(wiring.column)})"
-            raise InputError("designs", designs.shape, "wrong shape", f"give shape {expected}")
         low, high = (np.empty((len(designs), len(model.names))) for _ in range(2))
         for group in wiring.groups:
             corners = wiring.places(group.dims, designs, wiring.corners(group))
@@ -250,10 +256,10 @@ class RobustObjective:
                 one = wiring.random[name]
                 if one.about_design:
                     about = about - design[wiring.column[name]]
-                single *= one.distribution.kernel_integral(about, length)
+                single *= kernel_integral(one.law, about, length)
                 apart = np.exp(-0.25 * ((about[:, None] - about) / length) ** 2)
                 middle = 0.5 * (about[:, None] + about)
-                double *= apart * one.distribution.kernel_integral(middle, length / sqrt(2))
+                double *= apart * kernel_integral(one.law, middle, length / sqrt(2))
             else:
                 at = wiring.fixed[name] if name in wiring.fixed else design[wiring.column[name]]
                 row = np.exp(-0.5 * ((at - about) / length) ** 2)

@@ -1,4 +1,5 @@
-"""By how much a mean or a deviation changes between two functions of the same random points, with limits.
+"""By how much a mean or a standard deviation changes between two functions of the same random points, with confidence
+intervals.
 
 Points come in replicates, each a design with its scatter, or a few points. A change is a ratio of sums over replicates less 1;
 what each replicate would move it by (its influence) is all that is known about its error. Where a motion is chaotic single
@@ -25,11 +26,11 @@ class Change(NamedTuple):
     limit: float
 
     def within(self, tolerance: float) -> bool:
-        """Whether it surely is no larger."""
+        """Whether it significantly is no larger."""
         return bool(abs(self.value) + self.limit <= tolerance)
 
     def beyond(self, tolerance: float) -> bool:
-        """Whether it surely is larger."""
+        """Whether it significantly is larger."""
         return bool(abs(self.value) - self.limit > tolerance)
 
 
