@@ -54,6 +54,7 @@ FILES = (
     "docs/how-to/speeds.md",
     "docs/how-to/stick-slip.md",
     "docs/how-to/surrogates.md",
+    "docs/how-to/take-results-away.md",
     "docs/how-to/wear.md",
     "docs/how-to/xarray.md",
 )
