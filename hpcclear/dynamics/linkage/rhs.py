@@ -9,9 +9,10 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from hpcclear.base.bits import beyond, call_at
+from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, interleaved, lane_function
 from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
@@ -128,7 +129,7 @@ def compiled_text(name: str) -> Any:
     lanes = int(name.split("_")[1])
     long = inspect.getsource(text).count("\n") > LONG
     with interleaved(lanes // 2 if long else lanes):
-        return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+        return c_function(SIGNATURE, text, fastmath=FASTMATH)
 
 
 @cache
