@@ -21,6 +21,7 @@ import numpy as np
 from numba import config, njit, types
 from numba.core.extending import intrinsic
 
+from hpcclear.base.cached import cached
 from hpcclear.base.private import private_folder, unwritable
 from hpcclear.base.remarks import remark
 from hpcclear.base.width import asked_width, features
@@ -179,6 +180,6 @@ def apart(compiled: Any) -> Any:
 
 def scalar_function(function: Callable[..., Any]) -> Any:
     """Compile what runs for one lane or one point at a time."""
-    compiled = njit(error_model="numpy", cache=True)(function)
+    compiled = cached(function)
     _written[compiled] = "scalar"
     return compiled
