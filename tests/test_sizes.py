@@ -2,7 +2,6 @@
 
 import dis
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,6 @@ from numba import njit
 from running import scene_with
 from some_laws import effects_with
 
-import hpcclear.dynamics
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
@@ -201,24 +199,6 @@ def test_lanes_begin_where_a_line_of_the_cache_does():
         lanes = Lanes(problem_of(scene_with()), width)
         assert lanes._block.work.ctypes.data % 64 == 0
         assert (lanes._block.work == 0.0).all()
-
-
-def test_no_stepper_names_a_rate_of_its_own():
-    """A rate is one entry of `layout.INTEGRATED` and its formula in the motion."""
-    names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
-    rows = {one.rate for one in at.MEASURES}
-    powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
-    followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
-    own = powers | followed
-    fields = ("force", "sliding_power", "objective_rate")
-    of_joints = {getattr(joint, field) for joint in at.JOINTS for field in fields}
-    assert {getattr(at, name) for name in own} | of_joints == rows
-    own |= {"SLIDING_POWERS", "sliding_power", "OBJECTIVE_RATES", "objective_rate"}
-    room = Path(hpcclear.dynamics.__file__).parent
-    for folder in ("explicit", "implicit"):
-        for path in (room / folder).glob("*.py"):
-            text = path.read_text()
-            assert not [name for name in own if f"at.{name}" in text], path.name
 
 
 # ---- loops that are written out --------------------------------------------------------------------
