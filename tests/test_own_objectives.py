@@ -226,6 +226,8 @@ def test_a_rate_without_a_motion_to_be_of_is_refused(tmp_path):
     with pytest.raises(InputError, match="this motion is prescribed") as caught:
         simulate(scene)
     assert caught.value.key == "numerics.objective"
+    of_joints = scene.with_({"numerics.objective": "mygoals:PeakForce"})
+    assert (evaluate(of_joints, HEAVIER)["objective"] == 0.0).all()  # as forces of ours
 
 
 def test_a_value_that_fails_in_use_names_the_objective():

@@ -40,7 +40,8 @@ def emitted(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
-    parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
+    parts = {root / "dynamics" / name for name in ("layout.py", "rows.py")}
+    parts |= set((root / "dynamics").glob("*/*.py"))
     # of laws the texts are, each named by its content
     parts -= set((root / "dynamics" / "laws").glob("*.py"))
     parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
