@@ -40,6 +40,7 @@ FILES = (
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",
+    "docs/how-to/decisions.md",
     "docs/how-to/designs.md",
     "docs/how-to/distribution.md",
     "docs/how-to/editor-and-shell.md",

@@ -301,9 +301,7 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     little = total + HALF_WIDTH * error < LITTLE
     texts = {
         kind: ", ".join(
-            f"{names[k]} {value[k]:.0%} ± {HALF_WIDTH * error[k]:.1%}"
-            for k in order
-            if not little[k]
+            scatter.share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
         )
         for kind, (value, error) in indices.items()
     }
@@ -313,6 +311,10 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     if texts["total"]:
         words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
         yield Line("interactions", f"{words}: {texts['total']}")
+    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
+    if noise > HALF_WIDTH * doubt and noise > LITTLE:
+        text = f"{scatter.share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
+        yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
     if little.any():
         hardly = ", ".join(names[k] for k in order if little[k])
         yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")

@@ -45,13 +45,13 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
 
 
 def _listed(parts: list[tuple[str, float, float]]) -> str:
-    """Names with shares and half-widths, the largest first; those that are no larger than their half-width say so."""
-    shown = []
-    for name, value, error in sorted(parts, key=lambda one: -one[1]):
-        half = HALF_WIDTH * error
-        shown.append(
-            f"{name} {value:.0%} ± {half:.1%}"
-            if value > half
-            else f"{name} 0% within ± {max(half, value):.1%}"
-        )
-    return ", ".join(shown)
+    """Names with shares and half-widths, the largest first."""
+    ranked = sorted(parts, key=lambda one: -one[1])
+    return ", ".join(share(name, value, HALF_WIDTH * error) for name, value, error in ranked)
+
+
+def share(name: str, value: float, half_width: float) -> str:
+    """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
+    if value > half_width:
+        return f"{name} {value:.0%} ± {half_width:.1%}"
+    return f"{name} 0% within {max(half_width, value):.1%}"

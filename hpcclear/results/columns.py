@@ -123,8 +123,10 @@ SENSITIVITY: Columns = {
     "mean_objective_error": number(("clearance",), "objective", "standard error of the value before"),
     "sobol_first": number(("parameter",), "1", "first-order Sobol index"),
     "sobol_first_error": number(("parameter",), "1", "its standard error"),
-    "sobol_total": number(("parameter",), "1", "total Sobol index"),
+    "sobol_total": number(("parameter",), "1", "total Sobol index, without the share of chaotic scatter"),
     "sobol_total_error": number(("parameter",), "1", "its standard error"),
+    "sobol_noise": number((), "1", "share of the variance over the ranges that is chaotic scatter, by perturbed runs"),
+    "sobol_noise_error": number((), "1", "its standard error"),
     "influence": number(("parameter",), "objective", "mean effect; parameters are ranked by it"),
     "selected": flag(("parameter",), "whether the parameter is selected for its influence"),
 }
