@@ -61,7 +61,7 @@ def test_results_never_replace_what_this_program_did_not_write(thesis, words):
         assert code == 0, output
     else:
         assert refused((code, output)), output
-        assert "did not write" in output
+        assert "was not written by hpcclear" in output
 
 
 def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):

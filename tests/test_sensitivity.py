@@ -235,7 +235,7 @@ def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
 
 
 def test_all_failed_is_refused() -> None:
-    with pytest.raises(InputError, match="no surface"):
+    with pytest.raises(InputError, match="fit a surface"):
         history(lambda p: np.full(len(p), np.nan))
 
 

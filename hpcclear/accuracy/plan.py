@@ -35,7 +35,7 @@ STEADY_PROBE = 8
 """Likewise where each is a steady mean: its copies fill the lanes."""
 
 FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
-"""How long the settings of the file, and each rung of the ladder, are measured on every rank."""
+"""How long the settings of the file, and each target error, are measured on every rank."""
 
 LARGEST_DESIGN = 4096
 """Points of the design that are drawn for measuring: the cost of a sample depends on where it lies."""
@@ -58,10 +58,10 @@ class Row:
     seconds: float
     """Core-seconds of one sample."""
     reached: str
-    """Limits that the samples tried came to; empty where the file names no target error."""
+    """Half-widths that the measured samples reached; empty without a target error in the file."""
 
     def settings(self) -> str:
-        """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
+        """Tolerance and revolutions in words; of a steady mean its half-width and the share of designs that meet the error."""
         n = self.scene.numerics
         if self.reached:
             return ", ".join(self.reached.split(", ")[:2])
@@ -276,12 +276,12 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
 
 
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
-    """Errors to measure: `TARGETS`, and the one asked for; none where lives are followed, which have copies of their own.
+    """Errors to measure: `TARGETS`, and the requested one; none for service lives, which have replicas of their own.
 
     Raises
     ------
     InputError
-        Lives cannot be followed, or an error was asked for that these have no use for.
+        Service lives cannot be simulated, or an error was requested that they do not use.
     """
     lives.check(scene)
     study = scene.study

@@ -103,7 +103,7 @@ def doubles_in_a_vector() -> int:
 
 
 def doubles_in_use() -> int:
-    """Numbers in the vectors that the compiler uses: half of what there is room for where it prefers 256 bits."""
+    """Numbers in the vectors that the compiler uses: half of the available ones where it prefers 256 bits."""
     half = "+prefer-256-bit" in (config.CPU_FEATURES or "")
     return min(doubles_in_a_vector(), 4 if half else 8)
 

@@ -13,9 +13,9 @@ from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -136,9 +136,11 @@ class Evaluator:
         self._objective = objective
         problem = problem_of(scene)
         if recorder is not None:
-            self._lanes: Lanes | ClosedForm = recorder
+            self._lanes: Lanes | PrescribedSamples = recorder
         else:
-            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+            self._lanes = (
+                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
+            )
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}

@@ -294,7 +294,7 @@ class Session:
         return self._checkpoint
 
     def tell_problems(self) -> None:
-        """Tell what was found in the checkpoint and could not be used, each once."""
+        """Report what was found in the checkpoint and could not be used, each once."""
         problems = [] if self._checkpoint is None else self._checkpoint.problems
         for problem in problems[self._told :]:
             self.tell(problem)
@@ -344,6 +344,7 @@ def samples_of(
         objective,
         points.words,
         joints,
+        points.labels,
     )
 
 

@@ -1,4 +1,4 @@
-"""Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
+"""Direct Monte Carlo of any size: points made on demand, statistics kept, samples only on request."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
