@@ -88,8 +88,8 @@ def bifurcation(
     x : str
         ``"PATH=LO:HI:N"``.
     observe : str
-        ``"objective"`` (f of each revolution), or a series of a response such as ``"slider_velocity"``, taken at `section`;
-        with ``"max "``, ``"min "`` or ``"mean "`` before it, of each revolution.
+        ``"objective"`` (the mean gap of each revolution), or a series of a response such as ``"slider_velocity"``, taken at
+        `section`; with ``"max "``, ``"min "`` or ``"mean "`` before it, of each revolution.
     section : float or str
         Crank angle, rad or with a unit.
     transient, revolutions : int
