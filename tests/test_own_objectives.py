@@ -200,7 +200,7 @@ FAULTS = {
     "a loop": (
         "def f(normal_force):\n    for _ in range(2): normal_force += normal_force\n    return normal_force\n"
         "Bad = Objective('', 'N', rate=f)",
-        "more in it than arithmetic",
+        "more than arithmetic",
     ),
     "a value that is an array": (
         "def f(rate): return rate\nBad = Objective('', 'N', f, load)", "its value raised TypeError",

@@ -89,8 +89,12 @@ def units_of(objective: Objective) -> dict[str, str]:
 def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[Line]:
     """Return mean, standard deviation and quantiles of f, the 95th percentile of each peak force, and shares beyond thresholds.
 
-    Parameters ---------- samples : xarray.Dataset Kind ``samples``. Failed ones are left out of moments; confidence intervals
-    of quantiles and shares hold whatever these were. thresholds : sequence of Beyond
+    Parameters
+    ----------
+    samples : xarray.Dataset
+        Kind ``samples``. Failed ones are left out of moments; confidence intervals of quantiles and shares hold whatever
+        these were.
+    thresholds : sequence of Beyond
 
     Returns
     -------

@@ -115,8 +115,12 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     confidence : float
         Confidence level.
 
-    Returns ------- Limited Its shifts are those of the order times the slope of the quantile function between the ends of the
-    interval (Bahadur); all NaN where fewer than `FEWEST` values or replicates are left."""
+    Returns
+    -------
+    Limited
+        Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur);
+        all NaN where fewer than `FEWEST` values or replicates are left.
+    """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
     if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
