@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from running import scene_with
-from some_laws import STIFFNESS
+from some_laws import row
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -172,7 +172,8 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     np.testing.assert_allclose(assembly.q[order], start.coordinates(4)[0], atol=1e-14)
     np.testing.assert_allclose(assembly.v[order], start.velocities(4)[0], rtol=1e-9, atol=1e-9)
     stiffness = [joint.stiffness for joint in mechanism.clearances]
-    found = [par[0, first + STIFFNESS] for first in (one.block for one in at.JOINTS[:2])]
+    first = row("contact", scene.effects.contact.law, "stiffness")
+    found = [par[0, one.block + first] for one in at.JOINTS[:2]]
     np.testing.assert_allclose(stiffness, found, rtol=1e-15)
 
 

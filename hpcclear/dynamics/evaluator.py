@@ -13,9 +13,9 @@ from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -136,9 +136,11 @@ class Evaluator:
         self._objective = objective
         problem = problem_of(scene)
         if recorder is not None:
-            self._lanes: Lanes | ClosedForm = recorder
+            self._lanes: Lanes | PrescribedSamples = recorder
         else:
-            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+            self._lanes = (
+                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
+            )
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}
@@ -238,6 +240,10 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     return record
 
 
+NO_RATE = -1e299
+"""A place whose largest rate is below this has none."""
+
+
 def outcome_records(
     labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
     objective: Objective = MEAN_GAP,
@@ -279,7 +285,8 @@ def outcome_records(
     records[RATE] = np.nan
     if objective.rate is not None:
         period = (outcome.time / outcome.revolutions)[:, None]
-        made = objective.made_of(outcome.mean_rate, outcome.largest_rate, period)
+        largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
+        made = objective.made_of(outcome.mean_rate, largest, period)
         records[RATE][valid] = made[valid]
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]

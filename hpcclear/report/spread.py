@@ -92,8 +92,7 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
     Parameters
     ----------
     samples : xarray.Dataset
-        Kind ``samples``. Failed ones are left out of moments; confidence intervals of quantiles and shares hold whatever
-        these were.
+        Kind ``samples``. Failed ones are left out of moments; the intervals of quantiles and shares hold whatever these were.
     thresholds : sequence of Beyond
 
     Returns

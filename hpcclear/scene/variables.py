@@ -44,6 +44,7 @@ RESERVED = frozenset(
             *JUDGED,
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        "label",
         *("searched", "searched_first", "searched_second", "constraints"),
     )
 )
@@ -116,7 +117,9 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
         reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
         raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
     if quantity.nonzero and lower < 0.0 < upper:
-        raise invalid("0 is between the bounds", "Keep to one sign: nothing turns at 0", key=key)
+        raise invalid(
+            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
+        )
     return lower, upper
 
 
