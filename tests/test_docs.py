@@ -36,7 +36,7 @@ BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
 SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
 INFO = re.compile(
-    r'(bash|python|toml|csv|text|singularity)( title="[^"]+"| (no-run|slow): \S.*| from \S+)?'
+    r'(bash|python|toml|csv|text|singularity|matlab)( title="[^"]+"| (no-run|slow): \S.*| from \S+)?'
 )
 
 

@@ -162,7 +162,7 @@ def test_the_swarm_needs_no_pymoo():
     [
         ("study.swarm.algorithm=pymoo:NSGA5", "study.swarm.algorithm", "there is no pymoo.py"),
         ("study.swarm.algorithm=NSGA2", "study.swarm.algorithm", "no search that is known"),
-        (f"study.swarm.particles={FEWEST - 1}", "study.swarm.particles", f"{FEWEST} at a time"),
+        (f"study.swarm.particles={FEWEST - 1}", "study.swarm.particles", f"at least {FEWEST}"),
     ],
 )
 def test_what_it_cannot_be_is_refused(entry, key, reason):

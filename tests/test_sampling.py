@@ -259,8 +259,8 @@ def test_table_needs_no_study_and_drives_the_clearances_there_are(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "key", "fragment"),
     [
-        ("", "table of points", "holds no points"),
-        ("m2\n", "table of points", "holds no points"),
+        ("", "table of points", "contains no points"),
+        ("m2\n", "table of points", "contains no points"),
         ("m2,C [kg]\n1,2", "{}", "quantity in m"),
         ("m2 [furlongz]\n1", "{}", "not a known unit"),
         ("m2,masss\n1,2", "{}", "neither a variable nor a number"),
@@ -288,9 +288,9 @@ def test_broken_table_is_refused(tmp_path: Path, text: str, key: str, fragment: 
 
 
 def test_unreadable_tables_are_refused(tmp_path: Path) -> None:
-    latin = tmp_path / "latin.csv"
-    latin.write_bytes("m2\n1\n# für".encode("latin-1"))
-    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero"), latin):
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"m2\n1\n\x81\x02")
+    for path in (tmp_path, tmp_path / "missing.csv", Path("/dev/zero"), binary):
         with pytest.raises(InputError) as caught:
             read_points(path, ROBUST)
         assert caught.value.key == "table of points"

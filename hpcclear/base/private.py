@@ -49,7 +49,7 @@ def private_folder(variable: str) -> Path:
         last = Path(tempfile.mkdtemp(prefix="hpcclear-"))
     except OSError:
         reason = f"there is no place for compiled code ({'; '.join(refusals)})"
-        remedy = "Set it to a directory of your own on a disk with room"
+        remedy = "Set it to a directory of your own with free space"
         raise InputError(variable, os.environ.get(variable), reason, remedy) from None
     atexit.register(shutil.rmtree, last, ignore_errors=True)
     remark(

@@ -40,9 +40,10 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
     """Raise BadParameter where a name promises another format than the one that is written."""
     if path is not None and path.suffix.lower() not in ENDINGS:
         other = path.with_suffix(".nc")
+        table = path if path.suffix in (".csv", ".xlsx", ".mat", ".parquet") else "TABLE.csv"
         raise click.BadParameter(
-            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}; "
-            f"in Python xarray.open_dataset({str(other)!r}).to_dataframe() makes a table of it"
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Write {str(other)!r}. "
+            f"For a table, then: hpcclear export {other} -o {table}"
         )
     return path
 
@@ -77,6 +78,7 @@ class Amount(click.FloatRange):
         return number
 
 
+TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
 LIMIT = click.option(
     "--time-limit",
@@ -174,7 +176,7 @@ def place_of(output: Path) -> Path:
 def check_free(path: Path) -> None:
     """Raise InputError if something is there: what a user wrote is not written over."""
     if path.exists():
-        raise InputError("file", str(path), "is there already", "Choose another name")
+        raise InputError("file", str(path), "exists already", "Choose another name")
 
 
 def is_root() -> bool:

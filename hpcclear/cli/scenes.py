@@ -1,4 +1,4 @@
-"""Commands about one scene: `init`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
+"""Commands about one scene: `init`, `import`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
 
 import time
 from pathlib import Path
@@ -8,6 +8,7 @@ import click
 
 from hpcclear.cli.options import (
     PATH,
+    TRUST,
     Written,
     check_free,
     flag,
@@ -26,8 +27,6 @@ from hpcclear.ranks.stopping import Exit
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
-
-TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 
 
 @click.command(short_help="Write a starter scene.")
@@ -79,6 +78,41 @@ def _copy_jobs(place: Path) -> None:
     )
 
 
+@click.command("import", short_help="Write a linkage from a table of its points.")
+@click.argument("table", type=PATH)
+@click.argument("file", type=PATH)
+@click.option(
+    "--sketch",
+    type=PATH,
+    metavar="FIGURE",
+    help="Draw the linkage with names, axes and signs to this file (png, svg, pdf).",
+)
+@of_one_process
+def import_(table: Path, file: Path, sketch: Path | None) -> int:
+    """Write a linkage from a table of its points.
+
+    TABLE is a CSV file or Excel workbook with the columns name, x [mm], y [mm] and bodies; points that bodies share
+    are pins, "ground" stands still. Without bodies the points are a chain of bars between the first and the last.
+    FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
+
+    Example: hpcclear import points.csv linkage.toml --sketch linkage.png
+    """
+    from hpcclear.results import files
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.points_of_linkage import linkage_of, text_of
+
+    check_free(file)
+    content = linkage_of(table)
+    scene = load_scene(content)
+    mechanism = content["mechanism"]
+    files.write_bytes(file, text_of(content, table.name).encode())
+    show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    if sketch is not None:
+        _draw(scene, sketch)
+    show(f"next     put masses and the speed in, then: hpcclear check {file}")
+    return Exit.DONE
+
+
 @click.command(short_help="Validate an input file and estimate run time.")
 @with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
@@ -119,13 +153,10 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
 def _draw(scene: "Scene", sketch: Path) -> None:
     """Draw the mechanism to a file and print where it is."""
+    from hpcclear.dynamics.planar.problem import poses_at_start
     from hpcclear.report import save, sketch_figure
 
-    poses = None
-    if scene.is_planar:
-        from hpcclear.dynamics.planar.problem import poses_at_start
-
-        poses = poses_at_start(scene)
+    poses = poses_at_start(scene, 0.0 if scene.template is None else scene.template.DRAWN_AT)
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
@@ -170,11 +201,14 @@ def simulate(written: Written, output: Path) -> int:
 
 
 @click.command(short_help="Write figures and an HTML page.")
-@click.argument("directory", type=PATH)
+@click.argument("places", type=PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
+@click.option(
+    "-o", "--output", type=PATH, help="Page to write. Default: report.html beside the results."
+)
 @TRUST
 @of_one_process
-def report(directory: Path, trust: bool) -> int:
-    """Write figures and a self-contained HTML page from a directory of results.
+def report(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
+    """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
     Example: hpcclear report results/quickstart
     """
@@ -182,7 +216,7 @@ def report(directory: Path, trust: bool) -> int:
     from hpcclear.report.html.page import write_report
 
     with trusting(trust):
-        show(f"report  {write_report(directory)}")
+        show(f"report  {write_report(*places, output=output and place_of(output))}")
     return Exit.DONE
 
 

@@ -49,7 +49,9 @@ def refused(path: Path, error: OSError | ValueError) -> InputError | StorageErro
     A `ValueError` (a NUL character, text that no file name can be) is a wrong place.
     """
     if isinstance(error, ValueError):
-        return InputError("output", str(path), "no file can be called so", "Choose another name")
+        return InputError(
+            "output", str(path), "the system does not allow this name", "Choose another name"
+        )
     reason = os.strerror(error.errno) if error.errno else str(error)
     if error.errno in _USER_ERRORS:
         return InputError("output", str(path), reason, _USER_ERRORS[error.errno].capitalize())
@@ -89,9 +91,9 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     if not ours:
         regular = stat.S_ISREG(about.st_mode)
         reason = (
-            "hpcclear did not write what is there, or it was cut off"
+            "the existing file was not written by hpcclear, or it was cut off"
             if regular
-            else "it is no regular file"
+            else "it is not a regular file"
         )
         remedy = "Choose another name" + (", or move that file away" if regular else "")
         raise InputError("output", str(path), reason, remedy)

@@ -62,7 +62,7 @@ class Holder:
         return holder if isinstance(holder.pid, int) and holder.pid > 0 else None
 
     def is_over(self) -> bool:
-        """Whether the holder is known to be gone; False when that cannot be told."""
+        """Whether the holder is known to be gone; False when that is not known."""
         here = Holder.this_process()
         if self.host == here.host:
             return self.boot != here.boot or not _alive(self.pid, self.started)
@@ -263,7 +263,7 @@ class Lock:
     def _refusal(self, holder: Holder | None) -> InputError:
         who = f"{holder} holds it" if holder is not None else "another run is taking it"
         remedy = (
-            f"Wait for that run or stop it. If it is gone for certain, remove {self.path} "
+            f"Wait for that run or stop it. If no run is active any more, remove {self.path} "
             "and run the command again"
         )
         return InputError("output", str(self.path.parent), f"{who}", remedy)

@@ -1,7 +1,7 @@
 """The published work that the numbers of a scene are taken from: its result files cite it.
 
-A scene is recognised by what it holds, not by its name or place: the lengths and the materials of
-the paper's Tables 1 and 2, which none of its studies varies. Masses, clearances, drive, effects and
+A scene is recognised by its content, not by its name or place: the lengths and materials of the paper's Tables 1 and 2.
+No study of the paper varies them. Masses, clearances, drive, effects and
 numerics may differ.
 """
 

@@ -11,8 +11,8 @@ from typing import Any
 import tomli_w
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.measured import files_named, with_values
-from hpcclear.scene.paths import replace
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene, scene_of
 from hpcclear.scene.tables import plain
@@ -58,10 +58,11 @@ def load_scene(
         text = _read(Path(source))
         content = parse(text, str(source))
     for override in overrides:
-        content = replace(content, *_override(override))
+        content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
     named = files_named(content)
-    content = dict(with_values(content, folder))
+    filled, read_as = with_values(content, folder)
+    content = dict(filled)
     own_plugins = "plugins" in content
     if not trust:
         check_trust(content, "mapping" if text is None else str(source))
@@ -72,7 +73,8 @@ def load_scene(
     if (
         text is None or named or own_plugins
     ):  # results carry the values: whoever has one need not have the file
-        scene._text = scene.to_toml()
+        scene._text = "".join(f"# {line}\n" for line in read_as) + scene.to_toml()
+        scene._readings = (*scene.readings, *read_as)
     else:
         # an empty line ends the notes, whatever a file's own first comment says
         own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
@@ -96,15 +98,15 @@ def scene_of_text(text: str, name: str) -> Scene:
     )
     for line in notes:
         if line.startswith(_NOTE):
-            content = replace(content, *_override(line.removeprefix(_NOTE)))
+            content = entry_replaced(content, *_override(line.removeprefix(_NOTE)))
     changes = dict(_change(line) for line in reversed(notes) if line.startswith(_CHANGE))
     files = [path for path in changes if path.rpartition(".")[2] == "file"]
     for key in (*files_named(content), *files):
-        reason = "its scene names a file of values, which the result does not carry"
-        raise InputError(key, name, reason, "Make the result again with this version")
+        reason = "its scene names a file of values that the result does not contain"
+        raise InputError(key, name, reason, "Create the result again with this version")
     changed = content
     for path, value in changes.items():
-        changed = replace(changed, path, value)
+        changed = entry_replaced(changed, path, value)
     check_trust(content, name)
     check_trust(changed, name)
     scene = load_scene(content, trust=True)
@@ -118,7 +120,7 @@ def _change(line: str) -> tuple[str, Any]:
         return path, ast.literal_eval(value)
     except (ValueError, SyntaxError, RecursionError, MemoryError):
         reason = "the note of a change cannot be read"
-        raise InputError("scene", line, reason, "Mend the line, or remove it") from None
+        raise InputError("scene", line, reason, "Correct the line, or remove it") from None
 
 
 def _plugins(scene: Scene) -> str:
@@ -156,7 +158,7 @@ def _read(
             what,
             name,
             f"is larger than {LARGEST_FILE} bytes",
-            "A scene needs a few thousand",
+            "Scenes have a few thousand bytes",
         )
     try:
         return data.decode("utf-8-sig")
@@ -174,13 +176,13 @@ def parse(text: str, name: str) -> dict[str, Any]:
     InputError
         If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
     """
-    remedy = "Mend the TOML syntax there"
+    remedy = "Correct the TOML syntax there"
     if len(text) > LARGEST_FILE:
         raise InputError(
             "scene file",
             name,
             f"is larger than {LARGEST_FILE} bytes",
-            "A scene needs a few thousand",
+            "Scenes have a few thousand bytes",
         )
     if _DOTTED.search(text):
         raise InputError(

@@ -1,20 +1,31 @@
-"""Measured samples of random inputs, read from CSV files where a scene is loaded."""
+"""What a scene takes from tables beside its file: measured samples of random inputs, curves, motions of drives."""
 
-import re
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.fields import nearest
-from hpcclear.scene.table import csv_lines
-from hpcclear.scene.units import UnitError, decimal
+from hpcclear.base.plain import plain
+from hpcclear.scene.file_curves import FileCurve, motion_of, pairs_of
+from hpcclear.scene.paths import replace
+from hpcclear.scene.sheets import place_of, read
+from hpcclear.scene.validation import validated
 
-_HEADER = re.compile(r"([^\[\]]{0,200}?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\])?")
+CURVES = {
+    "effects.slider_load": "N",
+    "drive.torque": "N*m",
+    "mechanism.drives.*.torque": "N*m",
+    "mechanism.loads.*.size": "N",
+    "mechanism.loads.*.torque": "N*m",
+}
+"""Entries that may be a curve against the crank angle, and their units."""
+MOTION = "mechanism.drives.*.angle"
+"""The entry that is a table of angles against time."""
 
 
-def with_values(content: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """The content of a scene with the values of files in place of `file` and `column` of its random inputs.
+def with_values(content: Mapping[str, Any], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
+    """The content of a scene with what files hold in the place of their names, and a sentence for each.
 
     Parameters
     ----------
@@ -28,33 +39,41 @@ def with_values(content: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     InputError
         If a file cannot be read, has no such column or a cell in it is no number.
     """
-    named = files_named(content)
-    if not named:
-        return content
-    study = content["study"]
-    read = {key.rpartition(".")[2]: _with_values(row, key, folder) for key, row in named.items()}
-    return {**content, "study": {**study, "random": {**study["random"], **read}}}
+    read_as = []
+    for key, row in files_named(content).items():
+        file = row["file"]
+        if not isinstance(file, str) or not file:
+            raise InputError(
+                f"{key}.file", file, "the name of a table is expected here", "Write it in quotes"
+            )
+        made: Any
+        if key.startswith("study.random."):
+            made, shown = _with_values(row, key, folder)
+        else:
+            made, shown = _curve(content, row, key, folder)
+        content = replace(content, key, made)
+        digest = hashlib.sha256(place_of(folder / file)[0].read_bytes()).hexdigest()
+        text = f"{key}: {file!r} is read as {shown}, SHA-256 {digest[:16]}"
+        read_as.append(plain(" ".join(text.split())))
+    return content, read_as
 
 
-def files_named(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the tables of a parsed scene that name a file of values, by their dotted keys."""
-    study = content.get("study")
-    rows = study.get("random") if isinstance(study, Mapping) else None
-    if not isinstance(rows, Mapping):
-        return {}
-    return {
-        f"study.random.{name}": row
-        for name, row in rows.items()
-        if isinstance(row, Mapping) and "file" in row
-    }
+def files_named(content: Mapping[str, Any], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+    """Return the tables of a parsed scene that name a file, by their dotted keys."""
+    return dict(_named(content, prefix))
 
 
-def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:
+def _named(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for key, entry in content.items():
+        if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
+            if "file" in entry:
+                yield f"{prefix}{key}", entry
+            else:
+                yield from _named(entry, f"{prefix}{key}.")
+
+
+def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> tuple[dict[str, Any], str]:
     file, column = row["file"], row.get("column")
-    if not isinstance(file, str) or not file:
-        raise InputError(
-            f"{key}.file", file, "the name of a CSV file is expected here", "Write it in quotes"
-        )
     if "values" in row:
         raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
     if column is not None and not isinstance(column, str):
@@ -62,37 +81,48 @@ def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> dict[str, An
             f"{key}.column", column, "the name of a column is expected here", "Write it in quotes"
         )
     kept = {name: entry for name, entry in row.items() if name not in ("file", "column")}
-    return {**kept, "values": _column(folder / file, column, key)}
+    values, shown = _column(folder / file, column, key)
+    return {**kept, "values": values}, shown
 
 
-def _column(path: Path, column: str | None, key: str) -> list[float | str]:
+def _column(path: Path, column: str | None, key: str) -> tuple[list[float | str], str]:
     """The cells of a column: numbers, or text with the unit of its header."""
-    (_, header), *rows = csv_lines(path, f"{key}.file")
-    if column is None and len(header) > 1:
-        remedy = f"Name one as column = {header[0]!r}: it has {', '.join(header[:20])}"
-        raise InputError(f"{key}.column", None, f"{path} has {len(header)} columns", remedy)
-    names = [_parsed(cell)[0] for cell in header]
-    wanted = header[0] if column is None else column
-    place = next((k for k, cell in enumerate(header) if wanted in (cell, names[k])), None)
-    if place is None:
-        remedy = nearest(wanted, tuple(names))
-        raise InputError(f"{key}.column", wanted, f"is no column of {path}", remedy)
-    unit = _parsed(header[place])[1]
-    values: list[float | str] = []
-    for line, cells in rows:
-        where = f"{path}, line {line}, column {names[place]}"
-        if len(cells) != len(header):
-            reason = f"has {len(cells)} cells instead of {len(header)}"
-            raise InputError(where, ",".join(cells)[:200], reason, "Give each column a value")
-        try:
-            value = decimal(cells[place])
-        except UnitError as error:
-            raise InputError(where, cells[place], error.reason, error.remedy) from None
-        values.append(f"{cells[place]} {unit}" if unit else value)
-    return values
+    sheet = read(path, f"{key}.file")
+    of_numbers = [one for one in sheet.columns if not sheet.is_text(one)] or sheet.columns
+    if column is None and len(of_numbers) > 1:
+        remedy = (
+            f"Name one as column = {sheet.columns[0].name!r}: it has {', '.join(sheet.names[:20])}"
+        )
+        raise InputError(f"{key}.column", None, f"{path} has {len(of_numbers)} columns", remedy)
+    chosen = of_numbers[0] if column is None else sheet.column(column, f"{key}.column")
+    values = [sheet.number(chosen, row) for row in range(len(sheet.lines))]
+    shown = f"{sheet.found}, {len(values)} values of {chosen.heading}"
+    return [f"{value!r} {chosen.unit}" if chosen.unit else value for value in values], shown
 
 
-def _parsed(cell: str) -> tuple[str, str]:
-    """Name and unit of a header such as ``C [mm]``."""
-    found = _HEADER.fullmatch(cell)
-    return (cell, "") if found is None else (found.group(1), found.group(2) or "")
+def _curve(
+    content: Mapping[str, Any], row: Mapping[str, Any], key: str, folder: Path
+) -> tuple[list[list[float]], str]:
+    parts = key.split(".")
+    general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
+    if general not in CURVES and general != MOTION:
+        raise InputError(
+            f"{key}.file", row["file"], "no file is read here",
+            f"Files stand in study.random.NAME, {', '.join((*CURVES, MOTION)).replace('*', 'NAME')}",
+        )  # fmt: skip
+    try:
+        curve = validated(FileCurve, row)
+    except InputError as error:
+        raise InputError(f"{key}.{error.key}", error.value, error.reason, error.remedy) from None
+    if general == MOTION:
+        return motion_of(curve, folder, key)
+    return pairs_of(curve, folder, CURVES[general], key, _turns(content))
+
+
+def _turns(content: Mapping[str, Any]) -> int:
+    """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
+    mechanism = content.get("mechanism")
+    drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None
+    rows = [content.get("drive"), *(drives.values() if isinstance(drives, Mapping) else ())]
+    turns = [row.get("turns", 1) for row in rows if isinstance(row, Mapping)]
+    return max((one for one in turns if type(one) is int), default=1)

@@ -9,7 +9,8 @@ from typing import Any
 
 from hpcclear.base.objectives import ENDS
 from hpcclear.scene.distributions import OURS
-from hpcclear.scene.fields import LONGEST_CURVE, Table
+from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
+from hpcclear.scene.file_curves import FileCurve
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -85,6 +86,15 @@ def _as_written(definitions: dict[str, Any]) -> None:
         rows[name]["additionalProperties"] = {"anyOf": [one, alike]}
 
 
+def _with_files(schema: Any) -> Any:
+    """A schema with references to `FileCurve` wherever a curve may come from a file."""
+    if schema == OF_FILE:
+        return {"$ref": "#/$defs/FileCurve"}
+    if isinstance(schema, dict):
+        return {key: _with_files(entry) for key, entry in schema.items()}
+    return [_with_files(entry) for entry in schema] if isinstance(schema, list) else schema
+
+
 def scene_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the scene file.
 
@@ -92,7 +102,9 @@ def scene_schema() -> dict[str, Any]:
     `load_scene` alone.
     """
     schema = Scene.model_json_schema()
+    schema = _with_files(schema)
     definitions = schema["$defs"]
+    definitions["FileCurve"] = FileCurve.model_json_schema()
     _describe({**definitions, "Scene": schema})
     _as_written(definitions)
     for name in ("Variable", "RandomInput"):
@@ -103,6 +115,13 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
+    entries = definitions["Tolerance"]["properties"]
+    entries["range"] = {**_BOUNDS, "description": entries["range"]["description"]}
+    for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
+        required = definitions[name]["required"]
+        definitions[name]["required"] = [
+            k for k in required if k not in ("clearance", "bearing_radius")
+        ]
     definitions["RandomInput"]["additionalProperties"] = (
         True  # parameters of a distribution from elsewhere
     )

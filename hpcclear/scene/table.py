@@ -1,11 +1,8 @@
-"""A user's own table of designs, as CSV."""
+"""A user's own table of designs."""
 
-import csv
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -14,24 +11,39 @@ from hpcclear.scene.fields import nearest
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.units import UnitError, decimal, factor, note_turns, noting, to_si
+from hpcclear.scene.sheets import Column, Sheet, read
+from hpcclear.scene.units import UnitError, factor, note_turns, noting, to_si
 from hpcclear.scene.variables import SHORT_NAMES
 
-LONGEST_LINE = 100_000
-"""Characters of a line of a table; a design has some ten numbers."""
+LABELS = (
+    "design",
+    "name",
+    "label",
+    "part",
+    "id",
+    "no",
+    "no.",
+    "nr",
+    "nr.",
+    "number",
+    "index",
+    "run",
+    "#",
+)
+"""Headings, in small letters, of columns that name the rows."""
 
 
 def read_points(path: str | Path, scene: Scene) -> Points:
-    """A user's table of designs, a CSV file.
+    """A user's table of designs: a CSV file of any spreadsheet program, or an Excel workbook.
 
     The first row names the columns: study variables, short names (m2, C, ...), or dotted
-    scene paths, each with an optional unit, as in ``C [mm]``. Every further row is a design; lines
-    that are empty or begin with # are left out.
+    scene paths, each with an optional unit, as in ``C [mm]`` or in a row below. Every further row is a design; lines
+    that are empty or begin with # are left out. A column of text names the rows.
 
     Parameters
     ----------
     path : path
-        The file, in UTF-8.
+        The file.
     scene : Scene
         What the columns change; a study is not needed.
 
@@ -46,9 +58,21 @@ def read_points(path: str | Path, scene: Scene) -> Points:
         If the file cannot be read, or a cell is no number; it names row (line of the file) and
         column.
     """
-    key = str(path)
-    lines = csv_lines(Path(path))
-    columns = [_column(cell, scene, key) for cell in lines[0][1]]
+    key, sheet = str(path), read(Path(path))
+    labels, columns = [], []
+    for column in sheet.columns:
+        found = _driven(column, scene, key, sheet)
+        if found is None:
+            labels.append(column)
+        else:
+            columns.append(found)
+    if not columns:
+        raise InputError(
+            key,
+            ", ".join(sheet.names),
+            "no column has numbers of this scene",
+            "Name one such as m2 [g]",
+        )
     names, paths = tuple(c.name for c in columns), tuple(c.paths for c in columns)
     driven = [path for column in paths for path in column]
     for path_ in driven:
@@ -56,100 +80,69 @@ def read_points(path: str | Path, scene: Scene) -> Points:
             raise InputError(
                 key, ", ".join(names), f"two columns drive {path_}", "Remove one of them"
             )
-    values = np.empty((len(lines) - 1, len(columns)))
-    for row, (line, cells) in enumerate(lines[1:]):
-        if len(cells) != len(columns):
-            reason = f"has {len(cells)} cells instead of {len(columns)}"
-            raise InputError(
-                f"{key}, line {line}", ",".join(cells), reason, "Give each column a value"
-            )
-        for column, cell in enumerate(cells):
-            where = f"{key}, line {line}, column {names[column]}"
-            values[row, column] = columns[column].read(cell, where)
-    points = Points(names, values, paths)
-    check_points(scene, points, lambda row: f"{key}, line {lines[row + 1][0]}")
+    rows = range(len(sheet.lines))
+    values = np.array([[column.read(sheet, row) for column in columns] for row in rows])
+    named = tuple(" ".join(column.cells[row] for column in labels) for row in rows)
+    points = Points(names, values, paths, named if labels else ())
+    check_points(scene, points, lambda row: f"{key}, line {sheet.lines[row]}")
     return points
 
 
-def csv_lines(path: Path, what: str = "table of points") -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of the header and of the rows below it; an InputError says `what` the file is."""
-    remedy = "Give a CSV file in UTF-8"
-    try:
-        if not path.is_file():
-            raise InputError(what, str(path), "there is no such regular file", remedy)
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(_short_lines(stream, path), strict=True)
-            lines = [
-                (reader.line_num, [cell.strip() for cell in cells])
-                for cells in reader
-                if any(cells) and not cells[0].lstrip().startswith("#")
-            ]
-    except InputError:
-        raise
-    except (OSError, ValueError, csv.Error) as error:
-        reason = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError(what, str(path), reason, remedy) from None
-    lines = [(line, cells) for line, cells in lines if any(cells)]  # not of blanks alone
-    if len(lines) < 2:
-        remedy = "Write a row of names, then a row for each point or value"
-        raise InputError(what, str(path), "holds no points", remedy)
-    return lines
-
-
-def _short_lines(stream: TextIO, path: Path) -> Iterator[str]:
-    """The lines of a file, none of them long enough to fill the memory."""
-    while line := stream.readline(LONGEST_LINE + 1):
-        if len(line) > LONGEST_LINE:
-            reason = f"a line has more than {LONGEST_LINE} characters"
-            raise InputError("table of points", str(path), reason, "Write a line for each point")
-        yield line
-
-
 @dataclass(frozen=True)
-class _Column:
+class _Driven:
+    """A column of numbers of the scene."""
+
     name: str
     paths: tuple[str, ...]
     unit: str  # as written, "" for SI
+    column: Column
 
-    def read(self, cell: str, where: str) -> float:
+    def read(self, sheet: Sheet, row: int) -> float:
         """The cell in SI, within the bounds of every entry it drives."""
         quantity = quantities()[self.paths[0]]
-        try:
-            value = decimal(cell)
-            if self.unit:
-                with noting(lambda *_: None):  # noted once, of the heading
-                    value = to_si(f"{cell} {self.unit}", quantity.unit)
-        except UnitError as error:
-            raise InputError(where, cell, error.reason, error.remedy) from None
+        value = sheet.number(self.column, row, quantity.unit)
+        if self.unit:
+            with noting(lambda *_: None):  # noted once, of the heading
+                value = to_si(f"{value!r} {self.unit}", quantity.unit)
         for path in self.paths:
             if not quantities()[path].holds(value):
                 reason = f"must be {quantities()[path].bounds()}"
-                raise InputError(where, cell, reason, "Mend the value or the unit of its column")
+                where = f"{sheet.path}, line {sheet.lines[row]}, column {self.name}"
+                raise InputError(
+                    where,
+                    self.column.cells[row],
+                    reason,
+                    "Correct the value or the unit of its column",
+                )
         return value
 
 
-def _column(cell: str, scene: Scene, key: str) -> _Column:
-    """A header cell such as ``C [mm]``."""
-    found = re.fullmatch(r"([^\s\[\]]{1,200})\s*(?:\[\s*([^\[\]]{0,40}?)\s*\])?", cell)
-    if found is None:
-        raise InputError(
-            key, cell, "is not a column name", 'Write a name, and its unit as in "C [mm]"'
-        )
-    name, unit = found.group(1), found.group(2) or ""
+def _driven(column: Column, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
+    """What a column such as ``C [mm]`` drives, None if it names the rows."""
     numbers = scene.numeric_paths()
     of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
     named = {**SHORT_NAMES, **of_study}
-    paths = tuple(path for path in named.get(name, (name,)) if path in numbers)
+    paths = tuple(path for path in named.get(column.name, (column.name,)) if path in numbers)
     if not paths:
-        remedy = nearest(name, (*named, *numbers))
-        raise InputError(key, name, "is neither a variable nor a number of this scene", remedy)
-    column = _Column(name, paths, unit)
-    column_unit = quantities()[paths[0]].unit
-    if unit and unit != column_unit:
-        try:
-            factor(unit, column_unit)
-            note_turns(f"1 {unit} in {cell}", "1", unit, column_unit)
-        except UnitError as error:
-            raise InputError(key, cell, error.reason, error.remedy) from None
-        return column
-    return _Column(name, paths, "")
+        if column.name.lower() in LABELS or sheet.is_text(column):
+            return None
+        if re.search(r"[\s\[\]]", column.name):
+            raise InputError(
+                key,
+                column.heading,
+                "is not a column name",
+                'Write a name, and its unit as in "C [mm]"',
+            )
+        remedy = nearest(column.name, (*named, *numbers))
+        raise InputError(
+            key, column.name, "is neither a variable nor a number of this scene", remedy
+        )
+    unit, own = column.unit, quantities()[paths[0]].unit
+    if not unit or unit == own:
+        return _Driven(column.name, paths, "", column)
+    try:
+        factor(unit, own)
+        note_turns(f"1 {unit} in {column.heading}", "1", unit, own)
+    except UnitError as error:
+        raise InputError(key, column.heading, error.reason, error.remedy) from None
+    return _Driven(column.name, paths, unit, column)

@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import Table, nearest
 from hpcclear.scene.paths import quantities
+from hpcclear.scene.wanted import hint
 
 Valid = TypeVar("Valid", bound=Table)
 
@@ -144,9 +145,10 @@ def _explained(error: ErrorDetails, found: Any, path: str) -> tuple[str, str]:
         case "literal_error" | "union_tag_invalid":
             expected = str(context.get("expected") or context.get("expected_tags"))
             words = re.findall(r"'([^']*)'", expected)
-            return "is not one of the known values", nearest(found, words) if isinstance(
-                found, str
-            ) else (f"Write {expected}")
+            remedy = f"Write {expected}"
+            if isinstance(found, str):
+                remedy = hint(found) + nearest(found, words)
+            return "is not one of the known values", remedy
         case "union_tag_not_found":
             table = path.removesuffix(".kind")
             table = table.removeprefix("mechanism.")

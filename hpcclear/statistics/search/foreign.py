@@ -1,4 +1,4 @@
-"""Searches of pymoo in the place of the swarm, through ask and tell: same evaluations, same constraints, same kind of front.
+"""Algorithms of pymoo instead of the swarm, through ask and tell: same evaluations, same constraints, same kind of front.
 
 Whatever an algorithm keeps of what it met, the front is made as the swarm's: the archive of all feasible designs that no
 other one dominates, cut to size. A design whose objectives are not all finite breaks constraints without limit.
@@ -85,7 +85,7 @@ class Pymoo:
         return np.clip(lower + unit * width, *self._bounds.T)
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
-        """Objectives (n, m) and violations (n,) of what was asked for, or of the first of it."""
+        """Objectives (n, m) and violations (n,) of what was requested, or of the first of it."""
         from pymoo.problems.static import StaticProblem
 
         asked, finite = self._asked[: len(designs)], np.isfinite(objectives)
@@ -99,7 +99,7 @@ class Pymoo:
 
 
 def is_algorithm(source: Any) -> bool:
-    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they are asked."""
+    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they return designs."""
     return all(hasattr(source, name) for name in ("setup", "ask", "tell"))
 
 

@@ -1,0 +1,322 @@
+"""Curves from files: a measured pressure, force, torque or motion against the crank angle, as the pairs that a table has."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.sheets import Column, Sheet, parsed_heading, read
+from hpcclear.scene.units import UnitError, factor, to_si
+
+TURN = 2 * math.pi
+SEAM = 0.02
+"""Of the range of a curve: how far its ends may differ where they are the same angle; both are then replaced by their mean."""
+LARGEST_GAP = math.radians(20)
+"""Angle that may be left out of a revolution, where steps are smaller."""
+FINEST = math.radians(0.1)
+"""Step to which longer tables are resampled."""
+_GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
+"""Units of gauge pressures."""
+_VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
+_HINTS = {
+    "angle": ("angle", "deg", "phi", "φ", "crank", "winkel", "kw", "ca", "theta", "θ"),
+    "time": ("time", "zeit", "t"),
+    "pressure": ("pressure", "druck", "p_", "p"),
+    "force": ("force", "kraft", "f"),
+    "torque": ("torque", "moment", "drehmoment", "m"),
+}
+"""How headings begin, in small letters, of columns whose unit says nothing."""
+
+
+class FileCurve(Table):
+    """A curve from a file: CSV or Excel workbook, in place of a table ``[[angle, value], ...]``."""
+
+    file: str
+    """Relative to the scene file; "book.xlsx#Sheet" for one of several sheets."""
+    angle: str | None = None
+    """Unit or heading of the crank angles; left out, what the headings say."""
+    time: str | None = None
+    """Of a drive's motion: unit or heading of the times."""
+    pressure: str | None = None
+    """Unit or heading of pressures, which push on a piston of that `bore`."""
+    force: str | None = None
+    """Unit or heading of forces."""
+    torque: str | None = None
+    """Unit or heading of torques."""
+    bore: PositiveLength | None = None
+    """Diameter of the piston, m."""
+    area: Annotated[float, Quantity("m**2", above=0)] | None = None
+    """In place of `bore`: the area that the pressure pushes on, m2."""
+    ambient: Annotated[float, Quantity("Pa", least=0)] | None = None
+    """Pressure on the other side of the piston, Pa, needed with pressures: 0 where those of the file are gauge pressures."""
+    pushes: Literal["+x", "-x"] | None = None
+    """Of the load on a slider: where the pressure pushes it; unless said otherwise "-x", away from a cylinder head beyond its
+    outer dead centre."""
+    zero: Annotated[float, Quantity("rad")] = 0.0
+    """Crank angle of the scene at which the file has 0, rad: that of the dead centre it counts from."""
+    clockwise: bool = False
+    """Whether the angles of the file count clockwise."""
+
+    elsewhere: ClassVar = {
+        "column": (
+            "belongs to measured values of a random input",
+            'Write, say, pressure = "heading [bar]"',
+        ),
+    }
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> "FileCurve":
+        given = [kind for kind in _VALUES if getattr(self, kind) is not None]
+        if len(given) > 1:
+            raise invalid(f"stands beside {given[0]}", "Keep one of them", given[1])
+        piston = [
+            key for key in ("bore", "area", "ambient", "pushes") if getattr(self, key) is not None
+        ]
+        if given not in ([], ["pressure"]) and piston:
+            raise invalid(
+                "belongs to a pressure",
+                f"Remove it, or write pressure in place of {given[0]}",
+                piston[0],
+            )
+        if self.bore is not None and self.area is not None:
+            raise invalid("stands beside bore", "Keep one of them", "area")
+        if (given == ["pressure"] or piston) and self.bore is None and self.area is None:
+            raise invalid(
+                "is missing: pressures push on a piston",
+                'Add bore = "42 mm", or area',
+                "bore",
+                None,
+            )
+        return self
+
+    @property
+    def piston(self) -> float | None:
+        """Area that a pressure pushes on, m2; None where there is no pressure."""
+        return self.area if self.bore is None else math.pi / 4 * self.bore**2
+
+
+def pairs_of(
+    curve: FileCurve, folder: Path, unit: str, key: str, turns: int = 1
+) -> tuple[list[list[float]], str]:
+    """The pairs of a curve against the crank angle, rad and `unit`, rising, and what was read in words.
+
+    Parameters
+    ----------
+    curve : FileCurve
+    folder : Path
+        What its file is relative to.
+    unit : str
+        Of the entry that it stands for: N or N*m.
+    key : str
+        Of that entry.
+    turns : int
+        Of a revolution of the scene: a file of one turn is repeated as often.
+
+    Raises
+    ------
+    InputError
+        If the file is no such curve; it says what was found.
+    """
+    sheet = read(folder / curve.file, f"{key}.file", headed=False)
+    kind = _kind(curve, unit, key)
+    first, angles = _column(sheet, "angle", curve.angle, "rad", key, ())
+    second, values = _column(sheet, kind, getattr(curve, kind), _VALUES[kind], key, (first,), curve)
+    shown = f"{sheet.found}, {len(angles)} rows, {second.name} from {_span(values, second)}"
+    if kind == "pressure":
+        values = _forces(curve, second, values, unit, key)
+    if curve.clockwise:
+        angles = -angles
+    where = f"{key}.file", str(folder / curve.file)
+    angles, values = _revolution(angles, values, where)
+    if angles[-1] - angles[0] < TURN:
+        angles = np.concatenate([angles + k * TURN for k in range(turns)])
+        values = np.tile(values, turns)
+    angles = angles + curve.zero
+    return [[float(a), float(v)] for a, v in zip(angles, values, strict=True)], shown
+
+
+def motion_of(curve: FileCurve, folder: Path, key: str) -> tuple[list[list[float]], str]:
+    """The pairs of a drive's motion, s and rad, as `pairs_of` does."""
+    sheet = read(folder / curve.file, f"{key}.file", headed=False)
+    first, times = _column(sheet, "time", curve.time, "s", key, ())
+    _, angles = _column(sheet, "angle", curve.angle, "rad", key, (first,))
+    made = np.column_stack([times - times[0], angles]).tolist()
+    return made, f"{sheet.found}, {len(times)} rows"
+
+
+def _kind(curve: FileCurve, unit: str, key: str) -> str:
+    own = next(kind for kind, of in _VALUES.items() if of == unit)
+    given = next((kind for kind in _VALUES if getattr(curve, kind) is not None), None)
+    kind = given or ("pressure" if curve.piston is not None else own)
+    if kind not in (own, "pressure") or (kind == "pressure" and own != "force"):
+        raise InputError(
+            f"{key}.{kind}", getattr(curve, kind), f"this entry is a {own}", f"Write {own} = ..."
+        )
+    return kind
+
+
+def _span(values: Array, column: Column) -> str:
+    try:
+        size = float(factor(_plain(column.unit, "Pa"), "Pa"))
+    except UnitError:
+        return f"{values.min():.6g} to {values.max():.6g} in SI"
+    return f"{values.min() / size:.6g} to {values.max() / size:.6g} {column.unit}"
+
+
+def _column(
+    sheet: Sheet, kind: str, given: str | None, target: str, key: str, taken: Sequence[Column], curve: FileCurve | None = None,
+) -> tuple[Column, Array]:  # fmt: skip
+    """The column of a kind, and its numbers in SI, shape (n,)."""
+    name, unit = (None, "") if given is None else _named(given, target)
+    free = [one for one in sheet.columns if one not in taken]
+    column = (
+        sheet.column(name, f"{key}.{kind}") if name else _likely(sheet, free, kind, target, key)
+    )
+    own = _plain(column.unit, target)
+    if unit and own and _size(unit, target, key, kind) != _size(own, target, key, kind):
+        raise InputError(
+            f"{key}.{kind}", given, f"the heading {column.heading!r} has the unit {column.unit}", "Remove one of the two"
+        )  # fmt: skip
+    if curve is not None and own != column.unit and curve.ambient:
+        raise InputError(
+            f"{key}.ambient", curve.ambient, f"the heading {column.heading!r} is of gauge pressures", 'Write ambient = "0 bar"'
+        )  # fmt: skip
+    unit = unit or own
+    if not unit:
+        raise InputError(
+            f"{key}.{kind}", given, f"nothing says the unit of the column {column.heading!r} of {sheet.path}",
+            f'Write {kind} = "{ {"rad": "deg", "Pa": "bar", "s": "s", "N": "N"}.get(target, "Nm") }", say',
+        )  # fmt: skip
+    size = _size(unit, target, key, kind)
+    return column, size * np.array([sheet.number(column, row) for row in range(len(sheet.lines))])
+
+
+def _plain(unit: str, target: str) -> str:
+    """A unit without the g of gauge pressures, where it is one."""
+    return _GAUGE.sub(r"\1", unit) if target == "Pa" else unit
+
+
+def _size(unit: str, target: str, key: str, kind: str) -> float:
+    try:
+        return to_si(f"1 {unit}", target)
+    except UnitError as error:
+        raise InputError(f"{key}.{kind}", unit, error.reason, error.remedy) from None
+
+
+def _named(given: str, target: str) -> tuple[str | None, str]:
+    """Heading and unit of an entry such as "bar", "cylinder 1" or "cylinder 1 [bar]"."""
+    try:
+        factor(given, target)
+        return None, given
+    except UnitError:
+        name, unit = parsed_heading(given)
+        return name, unit
+
+
+def _likely(sheet: Sheet, free: Sequence[Column], kind: str, target: str, key: str) -> Column:
+    """The column of a kind by its unit, by its heading, or because it is the only one left."""
+    free = [one for one in free if not sheet.is_text(one)]
+
+    def fits(column: Column) -> bool:
+        try:
+            return bool(column.unit) and factor(_plain(column.unit, target), target) is not None
+        except UnitError:
+            return False
+
+    by_unit = [one for one in free if fits(one)]
+    by_name = [one for one in free if one.name.lower().startswith(_HINTS[kind])]
+    for found in (by_unit, by_name if not by_unit else [], free):
+        if len(found) == 1 or (found and kind in ("angle", "time") and found is free):
+            return found[0]
+        if len(found) > 1:
+            break
+    listed = ", ".join(one.heading for one in (by_unit or by_name or free)) or "none with numbers"
+    raise InputError(
+        f"{key}.{kind}", None, f"which column of {sheet.path} it is does not follow from its headings: {listed}",
+        f'Name it, as in {kind} = "heading"',
+    )  # fmt: skip
+
+
+def _forces(curve: FileCurve, column: Column, values: Array, unit: str, key: str) -> Array:
+    gauge = _GAUGE.fullmatch(column.unit)
+    if curve.piston is None:
+        raise InputError(
+            f"{key}.bore",
+            None,
+            "is missing: pressures push on a piston",
+            'Add bore = "42 mm", or area',
+        )
+    if curve.ambient is None and not gauge:
+        raise InputError(
+            f"{key}.ambient", None, "is missing: nothing says whether these are absolute or gauge pressures",
+            'Add ambient = "1 bar" for absolute, "0 bar" for gauge pressures',
+        )  # fmt: skip
+    on_slider = key == "effects.slider_load"
+    if curve.pushes is not None and not on_slider:
+        raise InputError(
+            f"{key}.pushes",
+            curve.pushes,
+            "belongs to the load on a slider",
+            "Write direction of this load",
+        )
+    sign = -1.0 if on_slider and curve.pushes != "+x" else 1.0
+    found: Array = sign * curve.piston * (values - (curve.ambient or 0.0))
+    return found
+
+
+def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[Array, Array]:
+    """Rising angles over one or two turns without the end point repeated, and their values."""
+    if len(angles) < 2:
+        raise InputError(*where, "has less than two rows", "Give a whole revolution")
+    if angles[-1] < angles[0] and (np.diff(angles) < 0).sum() > len(angles) / 2:
+        angles, values = angles[::-1], values[::-1]
+    falls = np.flatnonzero(np.diff(angles) <= 0)
+    if (
+        len(falls) == 1 and angles[-1] <= angles[0] + 1e-9
+    ):  # begins within a revolution: 180 to 359, 0 to 179
+        period = TURN * max(1, math.ceil((angles.max() - angles.min()) / TURN - 1e-6))
+        angles = angles + period * (np.arange(len(angles)) > falls[0])
+        falls = np.flatnonzero(np.diff(angles) <= 0)
+    if len(falls):
+        row = int(falls[0])
+        pair = ", ".join(f"{math.degrees(one):.6g}" for one in angles[row : row + 2])
+        reason = f"the angles do not rise from row to row: {pair} deg"
+        raise InputError(*where, reason, "Sort the rows, each angle once; average cycles first")
+    span = angles[-1] - angles[0]
+    if span > 2 * TURN * (1 + 1e-6):
+        reason = f"goes over {math.degrees(span):.6g} deg, more than two turns"
+        raise InputError(
+            *where,
+            reason,
+            "Give one turn, or the two of a four-stroke engine; average cycles first",
+        )
+    turns = 1 if span <= TURN * (1 + 1e-6) else 2
+    step = float(np.median(np.diff(angles)))
+    gaps = np.append(np.diff(angles), max(turns * TURN - span, 0.0))
+    worst = int(np.argmax(gaps))
+    if gaps[worst] > LARGEST_GAP and gaps[worst] > 4 * step:
+        begin = math.degrees(angles[worst])
+        reason = f"leaves out {begin:.6g} to {begin + math.degrees(gaps[worst]):.6g} deg of {360 * turns} deg"
+        raise InputError(*where, reason, "Give the whole revolution")
+    if gaps[-1] < 1e-6 * TURN:  # the end point repeats the first
+        if abs(values[-1] - values[0]) > SEAM * np.ptp(values):
+            reason = (
+                f"ends at {values[-1]:.6g} and begins at {values[0]:.6g} (SI), at the same angle"
+            )
+            raise InputError(*where, reason, "Give a curve that repeats, or leave the last row out")
+        values = np.append((values[0] + values[-1]) / 2, values[1:-1])
+        angles = angles[:-1]
+    if len(angles) > LONGEST_CURVE - 1:
+        fine = angles[0] + FINEST * np.arange(round(turns * TURN / FINEST))
+        values = np.interp(
+            fine, np.append(angles, angles[0] + turns * TURN), np.append(values, values[0])
+        )
+        angles = fine
+    return angles, values

@@ -1,0 +1,325 @@
+"""What people bring: tables from any program, curves from files, in whatever way they were written."""
+
+import math
+from pathlib import Path
+
+import kinds_of_tables
+import numpy as np
+import pytest
+from pydantic import BaseModel
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
+from hpcclear.dynamics.curves import curve_at
+from hpcclear.ensemble.session import samples_of
+from hpcclear.results import netcdf
+from hpcclear.scene import load_scene
+from hpcclear.scene.fields import CurveOf, MotionTable
+from hpcclear.scene.loading import scene_of_text
+from hpcclear.scene.measured import CURVES, MOTION
+from hpcclear.scene.paths import PHYSICAL, _named, _parts
+from hpcclear.scene.planar import Planar
+from hpcclear.scene.points import Points
+from hpcclear.scene.table import read_points
+
+JOBS = Path(__file__).parents[1] / "jobs"
+ALL = kinds_of_tables.kinds()
+
+
+@pytest.mark.parametrize("kind", ALL, ids=[kind.words.replace(" ", "-") for kind in ALL])
+def test_each_file_is_read_rightly_or_refused_with_the_cause(kind, tmp_path):
+    right, shown = kinds_of_tables.outcome(kind, tmp_path)
+    assert right, shown
+    refused = isinstance(kind.expected, str)
+    assert shown.startswith("refused" if refused else "read")
+
+
+def test_there_are_enough_kinds():
+    assert len(ALL) >= 40
+    assert len({kind.data for kind in ALL}) == len(ALL)
+    assert sum(isinstance(kind.expected, str) for kind in ALL) > 15
+
+
+def test_files_stand_wherever_a_table_stands():
+    """By the declarations: no entry that may be a curve is left out."""
+    found = {}
+
+    def walk(annotation, prefix):
+        for model in _parts(annotation):
+            if not (isinstance(model, type) and issubclass(model, BaseModel)):
+                continue
+            for name, field in model.model_fields.items():
+                path = f"{prefix}.{name}"
+                kinds = [*field.metadata, *_parts(field.annotation)]
+                for one in kinds:
+                    if isinstance(one, CurveOf):
+                        found[path] = one.unit
+                    if isinstance(one, MotionTable):
+                        found[path] = "motion"
+                walk(field.annotation, f"{path}.*" if _named(field) else path)
+
+    for top, model in (*PHYSICAL.items(), ("mechanism", Planar)):
+        walk(model, top)
+    assert found == {**CURVES, MOTION: "motion"}
+
+
+def pressure_file(folder, angles, law, name="p.csv"):
+    path = folder / name
+    path.write_bytes(kinds_of_tables.curve(angles, law))
+    return path
+
+
+def with_file(scene, key, row):
+    content = scene.resolved()
+    table = content
+    *owners, leaf = key.split(".")
+    for owner in owners:
+        table = table.setdefault(owner, {})
+    table[leaf] = row
+    return load_scene(content)
+
+
+def test_a_pressure_is_a_force_on_the_piston(tmp_path):
+    path = pressure_file(tmp_path, np.arange(0.0, 360.0, 2.0), kinds_of_tables.compressed)
+    base = load_scene(JOBS / "slider_crank.toml")
+    row = {"file": str(path), "bore": "42 mm", "ambient": "1 bar"}
+    angles = np.linspace(0.0, 2 * math.pi, 777)
+    area, pressure = math.pi / 4 * 0.042**2, 1e5 * kinds_of_tables.compressed(np.degrees(angles))
+
+    def at(row, angles=angles):
+        return curve_at(with_file(base, "effects.slider_load", row).effects.slider_load, angles)
+
+    force = -area * (pressure - 1e5)
+    np.testing.assert_allclose(at(row), force, atol=2e-4 * np.ptp(force))
+    np.testing.assert_allclose(at({**row, "pushes": "+x"}), -force, atol=2e-4 * np.ptp(force))
+    by_area = {"file": str(path), "area": f"{1e6 * area!r} mm2", "ambient": 1e5}
+    np.testing.assert_allclose(at(by_area), at(row), rtol=1e-12)
+    later = at({**row, "zero": "90 deg"}, angles + math.pi / 2)
+    np.testing.assert_allclose(later, at(row), atol=1e-3 * np.ptp(force))
+    back = at({**row, "clockwise": True}, -angles)
+    np.testing.assert_allclose(back, at(row), atol=1e-3 * np.ptp(force))
+
+
+def test_no_kink_at_the_seam(tmp_path):
+    """Wherever a file begins, the curve and its slope at the seam are those of anywhere else."""
+    base, near = load_scene(JOBS / "slider_crank.toml"), np.linspace(-0.05, 0.05, 2001)
+    row = {"bore": "42 mm", "ambient": "1 bar"}
+    slopes = []
+    for k, begin in enumerate((0.0, -180.0, 90.0)):
+        path = pressure_file(
+            tmp_path, begin + np.arange(0.0, 361.0), kinds_of_tables.compressed, f"{k}.csv"
+        )
+        load = with_file(
+            base, "effects.slider_load", {**row, "file": str(path)}
+        ).effects.slider_load
+        slopes.append(np.diff(curve_at(load, near)) / np.diff(near))
+    for slope in slopes:
+        assert np.abs(np.diff(slope)).max() < 0.01 * np.abs(slope).max()
+        np.testing.assert_allclose(slope, slopes[0], rtol=5e-3)
+
+
+def test_measured_ends_that_nearly_meet_are_joined(tmp_path):
+    base = load_scene(JOBS / "slider_crank.toml")
+    angles = np.arange(0.0, 361.0)
+    path = pressure_file(
+        tmp_path, angles, lambda a: kinds_of_tables.compressed(a) + 0.05 * a / 360.0
+    )
+    row = {"file": str(path), "bore": "42 mm", "ambient": "1 bar"}
+    load = with_file(base, "effects.slider_load", row).effects.slider_load
+    middle = kinds_of_tables.compressed(0.0) + 0.025
+    assert load[0][1] == pytest.approx(-math.pi / 4 * 0.042**2 * 1e5 * (middle - 1.0), rel=1e-9)
+    assert len(load) == 360
+
+
+LINKAGE = JOBS / "linkages" / "four_stroke.toml"
+
+
+def test_two_turns_of_a_four_stroke_engine(tmp_path):
+    base = load_scene(LINKAGE)
+    key = next(
+        f"mechanism.loads.{row.name}.size" for row in base.mechanism.loads if row.kind == "force"
+    )
+    degrees = np.arange(-360.0, 360.0)
+    row = {
+        "file": str(pressure_file(tmp_path, degrees, kinds_of_tables.indicated)),
+        "bore": "80 mm",
+        "ambient": "1 bar",
+    }
+    size = next(
+        one.size for one in with_file(base, key, row).mechanism.loads if one.kind == "force"
+    )
+    angles = np.radians(degrees[::7])
+    expected = math.pi / 4 * 0.08**2 * 1e5 * (kinds_of_tables.indicated(degrees[::7]) - 1.0)
+    np.testing.assert_allclose(curve_at(size, angles, 2), expected, atol=2e-3 * np.ptp(expected))
+    # a compressor's turn in a scene of two is repeated
+    one = pressure_file(tmp_path, np.arange(0.0, 360.0), kinds_of_tables.compressed, "one.csv")
+    twice = next(
+        r.size
+        for r in with_file(base, key, {**row, "file": str(one)}).mechanism.loads
+        if r.kind == "force"
+    )
+    assert len(twice) == 720
+    np.testing.assert_allclose(
+        curve_at(twice, angles, 2),
+        curve_at(twice, angles + 2 * math.pi, 2),
+        atol=1e-9 * np.ptp(expected),
+    )
+    wrong = {**row, "pushes": "-x"}
+    with pytest.raises(InputError, match="belongs to the load on a slider"):
+        with_file(base, key, wrong)
+
+
+def test_a_torque_and_a_motion_from_files(tmp_path):
+    (tmp_path / "t.csv").write_text(
+        "phi;M\ndeg;Nm\n"
+        + "\n".join(f"{k};{5 + k / 90:.4f}".replace(".", ",") for k in range(0, 360, 10))
+    )
+    base = load_scene(JOBS / "slider_crank.toml")
+    drive = {
+        "kind": "torque",
+        "initial_speed": "300 rpm",
+        "torque": {"file": str(tmp_path / "t.csv")},
+    }
+    torque = with_file(base, "drive", drive).drive.torque
+    assert len(torque) == 36
+    assert torque[9] == (pytest.approx(math.pi / 2), 6.0)
+    times = np.linspace(0.0, 0.5, 26)
+    lines = [f"{1e3 * t:.6f},{20 * math.sin(4 * math.pi * t):.9f}" for t in times]
+    (tmp_path / "m.csv").write_text("time [ms],angle [deg]\n" + "\n".join(lines))
+    linkage = load_scene(JOBS / "linkages" / "crank_rocker.toml")
+    name, body = linkage.mechanism.drives[0].name, linkage.mechanism.drives[0].body
+    moved = {"kind": "table", "body": body, "angle": {"file": str(tmp_path / "m.csv")}}
+    angle = with_file(linkage, f"mechanism.drives.{name}", moved).mechanism.drives[0].angle
+    np.testing.assert_allclose(np.array(angle)[:, 0], times, atol=1e-9)
+    np.testing.assert_allclose(
+        np.array(angle)[:, 1], np.radians(20 * np.sin(4 * np.pi * times)), atol=1e-10
+    )
+
+
+def test_a_result_carries_what_files_held(tmp_path):
+    """Without the file the text of a result gives the same scene; it says which file it was."""
+    path = pressure_file(tmp_path, np.arange(0.0, 360.0, 5.0), kinds_of_tables.compressed)
+    (tmp_path / "c.csv").write_text("part;C [mm]\nA;0,31\nB;0,36\nC;0,44\n", encoding="cp1252")
+    text = (JOBS / "quickstart.toml").read_text()
+    row = 'C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }'
+    new = 'C = { distribution = "samples", file = "c.csv" }'
+    assert row in text
+    load = 'slider_load = { file = "p.csv", bore = "20 mm", ambient = "1 bar" }'
+    text = text.replace(row, new).replace("[effects]", f"[effects]\n{load}", 1)
+    (tmp_path / "scene.toml").write_text(text)
+    scene = load_scene(tmp_path / "scene.toml")
+    assert scene.required_study.random_input("C").values == (3.1e-4, 3.6e-4, 4.4e-4)
+    assert [one.split(":")[0] for one in scene.readings] == [
+        "effects.slider_load",
+        "study.random.C",
+    ]
+    assert (
+        "'p.csv' is read as UTF-8, commas, decimal points, 72 rows, pressure from 1 to 8 bar, SHA-256"
+        in scene.readings[0]
+    )
+    before = scene.text
+    path.unlink()
+    assert scene_of_text(before, "result.nc") == scene
+    assert "# effects.slider_load: 'p.csv' is read as" in before
+    changed = scene.with_({"drive.speed": "900 rpm"})
+    assert scene_of_text(changed.text, "result.nc") == changed
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ({"bore": "42 mm"}, "ambient = None: is missing"),
+        ({}, "the unit 'bar' does not fit|the heading"),
+        ({"pressure": "bar"}, "bore = None: is missing"),
+        ({"pressure": "bar", "force": "N", "bore": "1 mm"}, "force = 'N': stands beside pressure"),
+        ({"torque": "Nm"}, "this entry is a force"),
+        ({"bore": "42 mm", "ambient": "1 bar", "pressure": "kPa"}, "has the unit bar"),
+        ({"bore": "42 mm", "ambient": "1 bar", "area": "5 cm2"}, "area = .*stands beside bore"),
+        ({"bore": "42 mm", "ambient": "1 bar", "pressure": "p2 [bar]"}, "pressure = 'p2': is no column"),
+        ({"bore": "42 mm", "ambient": "1 bar", "diameter": 1}, "diameter = 1: is not a known key"),
+        ({"bore": "42 mm", "ambient": "1 bar", "column": "p"}, "belongs to measured values"),
+        ({"bore": "0 mm", "ambient": "1 bar"}, "bore = '0 mm': must be above 0"),
+    ],
+)  # fmt: skip
+def test_curves_that_are_none(row, words, tmp_path):
+    path = pressure_file(tmp_path, np.arange(0.0, 360.0, 5.0), kinds_of_tables.compressed)
+    with pytest.raises(InputError, match=words) as error:
+        with_file(
+            load_scene(JOBS / "slider_crank.toml"),
+            "effects.slider_load",
+            {"file": str(path), **row},
+        )
+    assert error.value.key.startswith("effects.slider_load")
+
+
+def test_files_are_read_where_curves_are_only(tmp_path):
+    path = pressure_file(tmp_path, np.arange(0.0, 360.0, 5.0), kinds_of_tables.compressed)
+    base = load_scene(JOBS / "slider_crank.toml")
+    with pytest.raises(InputError, match="no file is read here"):
+        with_file(base, "mechanism.rod.mass", {"file": str(path)})
+    with pytest.raises(InputError, match="the name of a table is expected"):
+        with_file(base, "effects.slider_load", {"file": 3})
+    with pytest.raises(InputError, match="no such regular file"):
+        with_file(base, "effects.slider_load", {"file": "none.csv", "bore": 1})
+    with pytest.raises(InputError, match="files are read where a scene is loaded"):
+        base.with_({"effects.slider_load": {"file": str(path), "bore": "42 mm", "ambient": 0}})
+
+
+def test_a_column_of_names_is_kept(tmp_path):
+    path = tmp_path / "d.csv"
+    path.write_text("design,remark,m2 [g]\nA-17,as built,210\nB-02,lighter,180\n")
+    points = read_points(path, load_scene(JOBS / "slider_crank.toml"))
+    assert points.labels == ("A-17 as built", "B-02 lighter")
+    assert points.take([1]).labels == ("B-02 lighter",)
+    assert points.names == ("m2",)
+    records = np.zeros(2, OUTCOME)
+    records["sample"] = [1, 0]  # in any order
+    content = samples_of(points.take([1, 0]), records, {})
+    netcdf.save(content, tmp_path / "s.nc")
+    back = netcdf.load(tmp_path / "s.nc")
+    assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
+    assert back["m2"].values.tolist() == [0.21, 0.18]
+    assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
+
+
+def test_editors_take_files():
+    from jsonschema import Draft202012Validator
+
+    from hpcclear.scene import scene_schema
+
+    content = load_scene(JOBS / "slider_crank.toml").resolved()
+    validator = Draft202012Validator(scene_schema())
+    content["effects"]["slider_load"] = {
+        "file": "p.csv",
+        "angle": "deg",
+        "bore": "42 mm",
+        "ambient": "1 bar",
+    }
+    assert not list(validator.iter_errors(content))
+    content["effects"]["slider_load"]["bor"] = 1
+    assert list(validator.iter_errors(content))
+
+
+def test_a_sketch_draws_each_table():
+    from hpcclear.dynamics.planar.problem import poses_at_start
+    from hpcclear.report import sketch_figure
+    from hpcclear.report.figures.curves import tabulated
+
+    linkage = load_scene(LINKAGE)
+    (gas,) = tabulated(linkage)
+    assert (gas.key, gas.unit, gas.turns) == ("mechanism.loads.gas.size", "N", 2)
+    with_load = load_scene(
+        JOBS / "slider_crank.toml",
+        ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
+    )
+    for scene, poses, peak in ((linkage, poses_at_start(linkage), None), (with_load, None, 1.0)):
+        figure = sketch_figure(scene, poses)
+        curve = figure.axes[-1]
+        (line,) = curve.get_lines()
+        angles, values = line.get_data()
+        assert curve.get_xlim() == (0.0, 360.0 * tabulated(scene)[0].turns)
+        assert angles[0] < 0.0 < 360.0 < angles[-1] + 1e-9  # the seam is drawn closed
+        assert values[1] == values[-1]
+        assert "kN" in curve.get_title(loc="left")
+        assert peak is None or values.max() == peak
+    assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
