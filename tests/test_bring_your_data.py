@@ -9,13 +9,17 @@ import pytest
 from pydantic import BaseModel
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.curves import curve_at
+from hpcclear.ensemble.session import samples_of
+from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.measured import CURVES, MOTION
 from hpcclear.scene.paths import PHYSICAL, _named, _parts
 from hpcclear.scene.planar import Planar
+from hpcclear.scene.points import Points
 from hpcclear.scene.table import read_points
 
 JOBS = Path(__file__).parents[1] / "jobs"
@@ -268,6 +272,14 @@ def test_a_column_of_names_is_kept(tmp_path):
     assert points.labels == ("A-17 as built", "B-02 lighter")
     assert points.take([1]).labels == ("B-02 lighter",)
     assert points.names == ("m2",)
+    records = np.zeros(2, OUTCOME)
+    records["sample"] = [1, 0]  # in any order
+    content = samples_of(points.take([1, 0]), records, {})
+    netcdf.save(content, tmp_path / "s.nc")
+    back = netcdf.load(tmp_path / "s.nc")
+    assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
+    assert back["m2"].values.tolist() == [0.21, 0.18]
+    assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
 
 
 def test_editors_take_files():

@@ -172,12 +172,12 @@ FAULTS = {
     "another kind": ("Bad = load", "is no objective"),
     "what nobody gives": (
         "def f(normal_forc): return normal_forc\nBad = Objective('', 'N', rate=f)",
-        "asks for 'normal_forc', which nobody gives",
+        "uses 'normal_forc', which is not known",
     ),
     "what no record has": (
-        "def f(sound): return sound\nBad = Objective('', 'N', f)", "asks for 'sound'",
+        "def f(sound): return sound\nBad = Objective('', 'N', f)", "uses 'sound'",
     ),
-    "a value of no rate": ("Bad = Objective('', 'N', largest)", "asks for 'rate'"),
+    "a value of no rate": ("Bad = Objective('', 'N', largest)", "uses 'rate'"),
     "made of nothing": ("Bad = Objective('', 'N', rate=load, made='median')", "made is 'median'"),
     "a wrong unit": ("Bad = Objective('', 'J', rate=load)", "its unit says J"),
     "a work that is a mean": (
@@ -200,7 +200,7 @@ FAULTS = {
     "a loop": (
         "def f(normal_force):\n    for _ in range(2): normal_force += normal_force\n    return normal_force\n"
         "Bad = Objective('', 'N', rate=f)",
-        "more in it than arithmetic",
+        "more than arithmetic",
     ),
     "a value that is an array": (
         "def f(rate): return rate\nBad = Objective('', 'N', f, load)", "its value raised TypeError",
@@ -226,6 +226,8 @@ def test_a_rate_without_a_motion_to_be_of_is_refused(tmp_path):
     with pytest.raises(InputError, match="this motion is prescribed") as caught:
         simulate(scene)
     assert caught.value.key == "numerics.objective"
+    of_joints = scene.with_({"numerics.objective": "mygoals:PeakForce"})
+    assert (evaluate(of_joints, HEAVIER)["objective"] == 0.0).all()  # as forces of ours
 
 
 def test_a_value_that_fails_in_use_names_the_objective():

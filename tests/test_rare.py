@@ -196,3 +196,14 @@ def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
     grid = [(a, b) for a in np.linspace(0.105, 0.42, 22) for b in np.linspace(0.07, 0.28, 106)]
     heaviest = max(b for a, b in grid if share_above(values, a, b) <= 5e-4)
     assert float(best["m3"]) > 0.99 * heaviest
+
+
+@pytest.mark.full  # pytest -m full tests/test_rare.py: half a minute
+def test_a_study_of_rare_failures_stopped_after_every_stage_ends_with_the_same_bytes(tmp_path, monkeypatch):  # fmt: skip
+    formula.replace_dynamics(monkeypatch.setattr)
+    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
+    run_study(scene, tmp_path / "whole", alone(), progress_style="quiet")
+    assert formula.run_in_pieces(scene, str(tmp_path / "pieces"), alone()) > 3
+    for path in sorted((tmp_path / "whole").glob("*.nc")):
+        if path.name != "timing.nc":
+            assert path.read_bytes() == (tmp_path / "pieces" / path.name).read_bytes(), path.name

@@ -2,7 +2,6 @@
 
 import dis
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,6 @@ from numba import njit
 from running import scene_with
 from some_laws import effects_with
 
-import hpcclear.dynamics
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
@@ -23,6 +21,7 @@ from hpcclear.dynamics.implicit.columns import leave
 from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.rows import Rows
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -145,6 +144,21 @@ def test_what_is_measured_goes_by_the_effects():
     )  # what the compiler then knows of the distance between two rows
 
 
+def test_rows_stand_one_behind_the_other_and_have_names():
+    """Nobody counts them: a row that is declared moves all behind it."""
+    values = {value for value in vars(at).values() if type(value) is int}
+    buffers = [one for one in vars(at).values() if isinstance(one, Rows)]
+    assert len(buffers) == 7
+    for rows in buffers:
+        firsts = [row.first for row in rows.declared]
+        assert firsts == [0, *np.cumsum([row.size for row in rows.declared])[:-1]]
+        assert rows.end == rows.declared[-1].first + rows.declared[-1].size
+        assert set(firsts) <= values
+        assert all(row.words for row in rows.declared)
+    asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
+    assert asked <= set(at.Effects._fields)
+
+
 def test_rules_are_numbers_of_one_kind():
     """So that one compiled stepper serves all effects."""
     for effects, on in (
@@ -185,24 +199,6 @@ def test_lanes_begin_where_a_line_of_the_cache_does():
         lanes = Lanes(problem_of(scene_with()), width)
         assert lanes._block.work.ctypes.data % 64 == 0
         assert (lanes._block.work == 0.0).all()
-
-
-def test_no_stepper_names_a_rate_of_its_own():
-    """A rate is one entry of `layout.INTEGRATED` and its formula in the motion."""
-    names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
-    rows = {one.rate for one in at.MEASURES}
-    powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
-    followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
-    own = powers | followed
-    fields = ("force", "sliding_power", "objective_rate")
-    of_joints = {getattr(joint, field) for joint in at.JOINTS for field in fields}
-    assert {getattr(at, name) for name in own} | of_joints == rows
-    own |= {"SLIDING_POWERS", "sliding_power", "OBJECTIVE_RATES", "objective_rate"}
-    room = Path(hpcclear.dynamics.__file__).parent
-    for folder in ("explicit", "implicit"):
-        for path in (room / folder).glob("*.py"):
-            text = path.read_text()
-            assert not [name for name in own if f"at.{name}" in text], path.name
 
 
 # ---- loops that are written out --------------------------------------------------------------------

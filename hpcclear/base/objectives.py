@@ -1,8 +1,7 @@
 """What a study may make small: each objective's name, unit and words, and what it is of a sample's record.
 
-Ours and a user's are declared alike. The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` puts the
-objective that was asked for in its place, on the rank that simulated it, and everybody after that reads ``objective``.
-"""
+Ours and a user's are declared alike. The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` replaces
+it by the requested objective, on the rank that simulated it, and everybody after that reads ``objective``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -217,7 +216,7 @@ ORDINALS = ("first", "second", "third", "fourth", "fifth")
 """The same places, as variables of files are called by them."""
 
 MEAN_GAP = OURS["mean-gap"]
-"""f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
+"""f of eq. 13, of a scene without a study, and of a study that names no other."""
 
 
 @cache
@@ -242,7 +241,7 @@ _OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("obj
 
 
 def asked(records: Records, objective: Objective) -> Records:
-    """Records (n,) as the kernel leaves them, with the objective that was asked for as ``objective``.
+    """Records (n,) as the kernel leaves them, with the requested objective as ``objective``.
 
     How far f scatters between revolutions and copies says nothing of another objective, so that is NaN then.
     """

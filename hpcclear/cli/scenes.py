@@ -19,6 +19,7 @@ from hpcclear.cli.options import (
     say,
     show,
     with_scene,
+    without_pint,
 )
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
@@ -178,6 +179,7 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
 
+    without_pint()
     scene = written.scene()
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):

@@ -240,6 +240,10 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     return record
 
 
+NO_RATE = -1e299
+"""A place whose largest rate is below this has none."""
+
+
 def outcome_records(
     labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
     objective: Objective = MEAN_GAP,
@@ -281,7 +285,8 @@ def outcome_records(
     records[RATE] = np.nan
     if objective.rate is not None:
         period = (outcome.time / outcome.revolutions)[:, None]
-        made = objective.made_of(outcome.mean_rate, outcome.largest_rate, period)
+        largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
+        made = objective.made_of(outcome.mean_rate, largest, period)
         records[RATE][valid] = made[valid]
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]

@@ -156,6 +156,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     e = scene.effects
     count = len(scene.clearance_joints())
     main = planar.linkage_of(scene).mechanism.period
+    judge = scene.objective
     waves = scene.waves()
     models = {film.model for film in scene.films().values()}
     return at.Effects(
@@ -166,7 +167,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         torque=_flag(isinstance(main, TorqueDrive)),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
-        objective=rate_in_lanes(scene.objective) if scene.objective.rate else None,
+        objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         ledger=_flag(scene.numerics.energy if ledger is None else ledger),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
@@ -230,17 +231,13 @@ def _cells_of_curves(
 
 
 def check_objective(scene: Scene) -> None:
-    """InputError where the objective's rate has no motion that is integrated, or no joint, to be of."""
-    rate = scene.objective.rate_of
-    if rate and not coordinate_count(scene):
-        reason = "its rate is integrated along with the motion, and this motion is prescribed"
-    elif rate == "joints" and not scene.clearance_joints():
-        reason = "its rate is of joints with clearance, and there are none"
-    else:
-        return
-    raise InputError(
-        scene.objective_key, scene.objective.name, reason, 'Give a joint kind = "clearance"'
-    )
+    """InputError where the objective has a rate of the whole mechanism, and no motion is integrated that it could go with."""
+    if scene.objective.whole and not coordinate_count(scene):
+        raise InputError(
+            scene.objective_key, scene.objective.name,
+            "its rate is integrated along with the motion, and this motion is prescribed",
+            'Give a joint kind = "clearance"',
+        )  # fmt: skip
 
 
 def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:

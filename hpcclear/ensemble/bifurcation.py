@@ -26,7 +26,7 @@ REDUCED: "dict[str, Callable[[Array], float]]" = {"max": np.max, "min": np.min, 
 """What may stand before the name of a series: of a revolution, at the stored instants, in place of a section."""
 
 OBJECTIVE = "objective"
-"""Name of f of each revolution."""
+"""Name of the mean gap, f of eq. 13, of each revolution."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Observation:
     def described(self, response: xr.Dataset) -> Objective:
         """Its unit and words, of a short response."""
         if self.name == OBJECTIVE:
-            return replace(MEAN_GAP, name=OBJECTIVE, words="f of each revolution")
+            return replace(MEAN_GAP, name=OBJECTIVE, words="mean gap of each revolution")
         series = self.of(response)
         word = self.name.partition(" ")[0]
         at = f"at crank angle {np.degrees(self.section):g} deg"

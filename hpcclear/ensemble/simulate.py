@@ -30,7 +30,7 @@ Compiled = TypeVar("Compiled", bound="Worker")
 def content_of(scene: "Scene") -> dict[str, Any]:
     """A scene as it travels to ranks. Its study is left out: they simulate, whatever for.
 
-    What the study asks of each sample goes into the numerics.
+    Requests of the study for each sample become part of the numerics.
     """
     content = scene.resolved()
     content.pop("study", None)
@@ -57,7 +57,7 @@ _MOST_COMPILED = 8
 
 
 class Judge:
-    """A rank's worker: an evaluator whose records hold the objective that was asked for; see `ranks.schedule.Worker`."""
+    """A rank's worker: an evaluator whose records contain the requested objective; see `ranks.schedule.Worker`."""
 
     def __init__(self, evaluator: "Evaluator | SteadyEvaluator", objective: Objective) -> None:
         self._evaluator, self._objective = evaluator, objective

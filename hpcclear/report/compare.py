@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.report import bearings
@@ -92,6 +93,15 @@ class Comparison:
     """Simulated revolutions, continued periodically."""
     quantities: tuple[Quantity, ...]
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the norms of each quantity, SI."""
+        rows = [
+            (f"{one.name} ({one.unit})", *(f"{value:.4g}" for value in one.norms.values()))
+            for one in self.quantities
+        ]
+        header = ("quantity", "RMS error", "relative", "largest", "mean", "peak", "correlation")
+        return markup.table(f"Comparison, {self.aligned}", rows, header)
+
 
 def compare(
     response: xr.Dataset,
@@ -161,7 +171,7 @@ def compare(
 
 
 def read_columns(path: Path) -> list[Column]:
-    """Return the columns of numbers of a measured table, each with its unit."""
+    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series."""
     sheet = read(path, "measured table")
     columns = [one for one in sheet.columns if not sheet.is_text(one)]
     if len(columns) < 2 or len(sheet.lines) < 3:

@@ -44,6 +44,7 @@ RESERVED = frozenset(
             *JUDGED,
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        "label",
         *("searched", "searched_first", "searched_second", "constraints"),
     )
 )
@@ -253,9 +254,9 @@ class RandomInput(NamedInput):
     fit: str | None = None
     """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
     bore: Tolerance | None = None
-    """Of "fit": how the bore is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the bore is made; left out, normal within the limits of size of the fit, with cp = 1."""
     pin: Tolerance | None = None
-    """Of "fit": how the pin is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the pin is made; left out, normal within the limits of size of the fit, with cp = 1."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
     parameters: dict[str, float] | None = None

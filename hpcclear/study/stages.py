@@ -16,6 +16,7 @@ from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
     certificate,
     chaos,
+    contributions,
     edge,
     fronts,
     lives,
@@ -247,6 +248,10 @@ STAGES = (
         words={"lives": "wear of the baseline and the best designs"}, samples=_of_lives,
     ),
     Stage("front", _front, needs=("surrogates", "verification", "lives"), files=("verification.nc",)),
+    Stage(
+        "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
+        needs=("verification",), files=("contributions.nc",),
+    ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(
         "responses", _responses, needs=("verification",),

@@ -12,7 +12,7 @@ from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import goals, verdicts
+from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -80,9 +80,24 @@ def simulate(
     """
     settings = run.study.verification
     if settings.draws is not None:
-        return told_of(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
-    made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-    return told_of(run, choices, contested(run, choices, made, stage, purpose))
+        made = _values(run, choices, stage, purpose, settings.draws, None)
+    else:
+        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+        made = contested(run, choices, made, stage, purpose)
+    return told_of(run, choices, made) | explained(run, choices, made, purpose)
+
+
+def explained(
+    run: StudyRun, choices: Sequence[Choice], made: Sequence[Array], purpose: str = "verification"
+) -> Result:
+    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from f of each, (rows, n) or (n,)."""
+
+    def drawn(choice: Choice, f: Array) -> Points:
+        if run.study.verification.draws is not None:
+            return samples_of(run, choice, f.size, purpose)
+        return scattered(run, choice, f.shape[1], purpose)
+
+    return contributions.of_designs(run, choices, made, drawn)
 
 
 def scrambled_length(simulations: int) -> int:

@@ -98,7 +98,7 @@ def check_objective(objective: Objective) -> None:
         for name in () if function is None else arguments(function):
             if name not in known:
                 raise LawError(
-                    f"{title} asks for {name!r}, which nobody gives",
+                    f"{title} uses {name!r}, which is not known",
                     f"There are {', '.join(sorted(known))}",
                 )
     numbers = {name: np.array([1.0, 2.0]) if OUTCOME[name].shape else 1.5 for name in RECORDED}

@@ -74,7 +74,7 @@ def _check_followed(scene: Scene, follow: str) -> None:
         )  # fmt: skip
     if "acceleration_x" in asks and not follow:
         raise InputError(
-            scene.objective_key, name, "nothing is followed, and it asks for an acceleration",
+            scene.objective_key, name, "no body or point is followed, so there is no acceleration",
             'Name a point: mechanism.followed = "body.point"',
         )  # fmt: skip
     of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}

@@ -122,5 +122,5 @@ class Piecewise:
 
 
 def beginning(arrays: Mapping[str, np.ndarray], start: str) -> dict[str, np.ndarray]:
-    """Arrays whose names begin so, by what follows."""
+    """Arrays, of any shapes, whose names begin so, by what follows."""
     return {name[len(start) :]: one for name, one in arrays.items() if name.startswith(start)}
