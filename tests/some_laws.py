@@ -28,5 +28,11 @@ def row(kind: str, law: str, number: str) -> int:
     return first + laws(kind)[law].read.index(number)
 
 
-STIFFNESS = at.CONTACT_NUMBERS
-"""Row of Hertz' stiffness, of all our laws of contact."""
+def contact_row(effects, number: str) -> int:
+    """Row of a number of the law of contact among such effects; Hertz' where none of ours is named."""
+    law = next((CONTACT[name] for name in CONTACT if name in effects), "hertz")
+    return row("contact", law, number)
+
+
+STIFFNESS = row("contact", "hertz", "stiffness")
+"""Row of the stiffness of Hertz' law alone."""

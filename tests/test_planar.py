@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from running import scene_with
-from some_laws import STIFFNESS
+from some_laws import row
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -15,8 +15,10 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.tables import mechanism_of, planar_mechanism
+from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.start import start_states
+from hpcclear.scene.planar import Planar
+from hpcclear.scene.validation import validated
 
 TEXT = """
 kind = "planar"
@@ -103,7 +105,7 @@ def changed(path, value):
 
 
 def test_tables_are_read_into_data_and_assembled():
-    mechanism = planar_mechanism(TABLES)
+    mechanism = mechanism_of(validated(Planar, TABLES))
     assert [body.name for body in mechanism.bodies] == ["crank", "coupler", "rocker"]
     crank, coupler, rocker = mechanism.bodies
     assert (crank.mass, crank.center) == (0.2, (0.02, 0.0))
@@ -140,7 +142,7 @@ def test_tables_are_read_into_data_and_assembled():
         ("joints.o2.journal", "crank.c", "joints.o2.journal", "no point"),
         ("drives", {}, "drives", "nothing drives"),
         ("drives.motor.body", "piston", "drives.motor.body", "no such moving body"),
-        ("drives.motor.speed", 0, "drives.motor.speed", "there would be no motion"),
+        ("drives.motor.speed", 0, "drives.motor.speed", "nothing would turn"),
         ("loads.weight.place", "coupler", "loads.weight.place", "no point"),
         ("loads.band.kind", "rubber", "loads.band.kind", "spring"),
         ("bodies.extra", {"mass": 1.0}, "bodies.extra.inertia", "inertia"),
@@ -148,8 +150,8 @@ def test_tables_are_read_into_data_and_assembled():
 )
 def test_wrong_tables_are_refused_by_name(path, value, key, said):
     with pytest.raises(InputError) as caught:
-        planar_mechanism(changed(path, value))
-    assert caught.value.key == key
+        mechanism_of(validated(Planar, changed(path, value)))
+    assert caught.value.key.removeprefix("mechanism.") == key
     assert said in str(caught.value)
 
 
@@ -171,7 +173,8 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     np.testing.assert_allclose(assembly.q[order], start.coordinates(4)[0], atol=1e-14)
     np.testing.assert_allclose(assembly.v[order], start.velocities(4)[0], rtol=1e-9, atol=1e-9)
     stiffness = [joint.stiffness for joint in mechanism.clearances]
-    found = [par[0, first + STIFFNESS] for first in (one.block for one in at.JOINTS[:2])]
+    here = row("contact", "lankarani-nikravesh", "stiffness")
+    found = [par[0, one.block + here] for one in at.JOINTS[:2]]
     np.testing.assert_allclose(stiffness, found, rtol=1e-15)
 
 
