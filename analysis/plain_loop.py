@@ -16,11 +16,13 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TSITOURAS
+from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.planar.problem import linkage_of
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
-# first numbers of the laws that it has
-STIFFNESS, COEFFICIENT = at.CONTACT_NUMBERS, at.FRICTION_NUMBERS
+# numbers of the laws that it has
+STIFFNESS = at.CONTACT_NUMBERS + laws("contact")["hunt-crossley"].read.index("stiffness")
+COEFFICIENT = at.FRICTION_NUMBERS
 OUTPUTS = ("objective", "slider_position", "slider_velocity", "evaluations", "steps", "status")
 
 FIRST, SECOND = (joint.block for joint in at.JOINTS[:2])

@@ -8,12 +8,16 @@ CONTACT = {"fixed": "hunt-crossley", "latched": "lankarani-nikravesh"}
 FRICTION = ("coulomb", "ambrosio", "lugre")
 
 
+def contact_law(names) -> str:
+    """Name of the law of contact among these effects, Hertz' without."""
+    return next((law for name, law in CONTACT.items() if name in names), "hertz")
+
+
 def effects_with(names, **more) -> at.Effects:
     """Effects of these names that are on; with an open joint and no law of contact named, Hertz'."""
     on = set(names) - {*CONTACT, *FRICTION}
-    found = [CONTACT[name] for name in CONTACT if name in names]
     is_open = "joints" in {*on, *more}
-    law = found[0] if found else "hertz" if is_open else None
+    law = contact_law(names) if is_open or set(names) & {*CONTACT} else None
     rubs = [name for name in FRICTION if name in names]
     return at.Effects(
         **dict.fromkeys(on, 1) | more,
@@ -28,11 +32,5 @@ def row(kind: str, law: str, number: str) -> int:
     return first + laws(kind)[law].read.index(number)
 
 
-def contact_row(effects, number: str) -> int:
-    """Row of a number of the law of contact among such effects; Hertz' where none of ours is named."""
-    law = next((CONTACT[name] for name in CONTACT if name in effects), "hertz")
-    return row("contact", law, number)
-
-
 STIFFNESS = row("contact", "hertz", "stiffness")
-"""Row of the stiffness of Hertz' law alone."""
+"""Of Hertz' law alone; laws that damp have it elsewhere."""

@@ -9,13 +9,17 @@ import pytest
 from pydantic import BaseModel
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.curves import curve_at
+from hpcclear.ensemble.session import samples_of
+from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.measured import CURVES, MOTION
 from hpcclear.scene.paths import PHYSICAL, _named, _parts
 from hpcclear.scene.planar import Planar
+from hpcclear.scene.points import Points
 from hpcclear.scene.table import read_points
 
 JOBS = Path(__file__).parents[1] / "jobs"
@@ -268,6 +272,14 @@ def test_a_column_of_names_is_kept(tmp_path):
     assert points.labels == ("A-17 as built", "B-02 lighter")
     assert points.take([1]).labels == ("B-02 lighter",)
     assert points.names == ("m2",)
+    records = np.zeros(2, OUTCOME)
+    records["sample"] = [1, 0]  # in any order
+    content = samples_of(points.take([1, 0]), records, {})
+    netcdf.save(content, tmp_path / "s.nc")
+    back = netcdf.load(tmp_path / "s.nc")
+    assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
+    assert back["m2"].values.tolist() == [0.21, 0.18]
+    assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
 
 
 def test_editors_take_files():
@@ -286,3 +298,28 @@ def test_editors_take_files():
     assert not list(validator.iter_errors(content))
     content["effects"]["slider_load"]["bor"] = 1
     assert list(validator.iter_errors(content))
+
+
+def test_a_sketch_draws_each_table():
+    from hpcclear.dynamics.planar.problem import poses_at_start
+    from hpcclear.report import sketch_figure
+    from hpcclear.report.figures.curves import tabulated
+
+    linkage = load_scene(LINKAGE)
+    (gas,) = tabulated(linkage)
+    assert (gas.key, gas.unit, gas.turns) == ("mechanism.loads.gas.size", "N", 2)
+    with_load = load_scene(
+        JOBS / "slider_crank.toml",
+        ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
+    )
+    for scene, poses, peak in ((linkage, poses_at_start(linkage), None), (with_load, None, 1.0)):
+        figure = sketch_figure(scene, poses)
+        curve = figure.axes[-1]
+        (line,) = curve.get_lines()
+        angles, values = line.get_data()
+        assert curve.get_xlim() == (0.0, 360.0 * tabulated(scene)[0].turns)
+        assert angles[0] < 0.0 < 360.0 < angles[-1] + 1e-9  # the seam is drawn closed
+        assert values[1] == values[-1]
+        assert "kN" in curve.get_title(loc="left")
+        assert peak is None or values.max() == peak
+    assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []

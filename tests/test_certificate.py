@@ -656,7 +656,7 @@ def test_what_is_needed_is_said_so(certified):
 
 def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     place, _ = certified
-    timing = dataset.read(place / "timing.nc", "timing")
+    timing = dataset.read(place / "e.timing.nc", "timing")
     seconds = seconds_of(timing)
     assert set(seconds) >= {"all on", "gravity", "friction in joints + gravity + slider load"}
     assert all(0.0 < value < 10.0 for value in seconds.values())
@@ -684,7 +684,7 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
 
 def test_figure_and_page(certified):
     place, _ = certified
-    content, timing = (dataset.read(place / name) for name in ("e.nc", "timing.nc"))
+    content, timing = (dataset.read(place / name) for name in ("e.nc", "e.timing.nc"))
     figure = effects_figure(content, timing)
     bars = figure.axes[0].patches
     names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]

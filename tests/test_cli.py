@@ -178,7 +178,7 @@ def test_a_table_of_designs(tmp_path):
     assert done.returncode == 0, done.stderr
     samples = dataset.read(out, "samples")
     assert samples["C"].to_numpy().tolist() == [3e-4, 5e-4]
-    assert (tmp_path / "timing.nc").exists()
+    assert (tmp_path / "designs.timing.nc").exists()
 
 
 @pytest.mark.mpi

@@ -29,7 +29,7 @@ import formula
 
 def test_the_accuracy_of_a_probability_follows_what_is_allowed():
     rare = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
-    assert goals.wanted(rare, MomentAccuracy()) == (1e-4, False)
+    assert goals.wanted(rare, MomentAccuracy()) == (2e-5, False)
     assert goals.wanted(rare, MomentAccuracy(exceedance=0.02)) == (0.02, False)
     assert goals.wanted(Goal(statistic="exceedance", limit=1.0), MomentAccuracy()) == (0.01, False)
 
@@ -191,10 +191,24 @@ def done(tmp_path_factory):
             alone(),
             progress_style="quiet",
         )
-    return dataset.read(place / "verification.nc", "verification")
+    kinds = ("verification", "contributions")
+    return {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
+
+
+def test_what_scatters_at_the_recommended_design_makes_all_of_its_scatter(done):
+    """f is linear in C: all of the variance is its own, and half its scatter is half the deviation."""
+    own = done["contributions"].sel(design="light alpha", input="C")
+    assert float(own["contribution"]) == pytest.approx(1.0, abs=1e-3)
+    assert float(own["halved"]) == pytest.approx(0.5, abs=1e-3)
+    assert float(own["unexplained"]) == pytest.approx(0.0, abs=1e-9)
+    lines = dict(answer(done, "out"))
+    assert "C 100% ±" in lines["contributions"]
+    assert "m2" not in lines["contributions"].partition(":")[2]
+    assert "C 50% ±" in lines["tolerances"]
 
 
 def test_verdicts_of_a_study_agree_with_the_truth(done):
+    done = done["verification"]
     shares = [share_above(float(m2)) for m2 in done["m2"]]
     assert min(shares) < 0.001 < max(shares)
     for share, text in zip(shares, done["constraints"].to_numpy(), strict=True):
@@ -211,7 +225,9 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
 def test_check_states_what_a_rare_failure_costs():
     study = load_scene(tomllib.loads(formula.PHYSICS + STUDY)).required_study
     (text,) = verdicts.costs(study, "m")
-    assert "share with f above 0.00047 m at most 0.001: 3687 simulations without any" in text
-    assert "too few" not in text
-    few = study.model_copy(update={"verification": Verification(most_samples=1024)})
-    assert "too few to decide" in next(verdicts.costs(few, "m"))
+    assert (
+        "share with f above 0.00047 m at most 0.001: 3687 simulations of a design without" in text
+    )
+    assert "12288 decide a design near it by importance sampling" in text
+    few = study.model_copy(update={"verification": Verification(samples=1024)})
+    assert "samples allows 1024, too few to decide" in next(verdicts.costs(few, "m"))

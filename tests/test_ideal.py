@@ -10,12 +10,12 @@ from test_motion import scene_of as scene_of_effects
 
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.curves import curve_at, periodic_cells
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.tables import mechanism_of
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
@@ -183,7 +183,7 @@ BARE = {
 def test_a_queue_of_scenes_without_clearance_is_done_at_once():
     scene = scene_with(BARE, revolutions=3)
     par = np.tile(parameters(scene), (4, 1))
-    lanes = ClosedForm(problem_of(scene))
+    lanes = PrescribedSamples(problem_of(scene))
     lanes.queue(par[:3], start_states(scene, par[:3]), np.array([5, 6, 7]))
     lanes.queue(par[3:], start_states(scene, par[3:]), np.array([2]))
     assert lanes.pending == 4

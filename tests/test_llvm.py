@@ -102,14 +102,13 @@ def of_joints(*rows):
     return {par(joint.block + row) for joint in at.JOINTS[:2] for row in rows}
 
 
-def rubbing(law):
-    """Rows of a friction law's numbers in both joints."""
-    return of_joints(*(row("friction", law, name) for name in laws("friction")[law].read))
+def numbers_of(law, kind="friction"):
+    """Rows of a law's numbers in both joints."""
+    return of_joints(*(row(kind, law, name) for name in laws(kind)[law].read))
 
 
 FIRST, SECOND = at.JOINTS[:2]
-DAMPING = at.CONTACT_NUMBERS + 1
-"""Row of the second number of laws that damp: Hertz' law has one."""
+DAMPED = numbers_of("hunt-crossley", "contact") - numbers_of("hertz", "contact")
 
 # effect: what is on besides it and the bare scene, and the markers of its law
 MARKERS = {
@@ -121,10 +120,10 @@ MARKERS = {
         set(),
         {par(SECOND.block + at.CLEARANCE), par(SECOND.block + STIFFNESS)},
     ),
-    "fixed": (set(), {par(FIRST.block + DAMPING)}),
+    "fixed": (set(), DAMPED),
     "latched": (set(), {work(at.INVERSE_IMPACT), work(at.ACTIVE + 1)}),
-    "coulomb": (set(), rubbing("coulomb")),
-    "ambrosio": (set(), rubbing("ambrosio") - rubbing("coulomb")),
+    "coulomb": (set(), numbers_of("coulomb")),
+    "ambrosio": (set(), numbers_of("ambrosio") - numbers_of("coulomb")),
     "torque": (set(), {par("motor_torque")}),
     "torque_table": ({"torque"}, {("constant", PER_TURN)}),
     "torque_falls": ({"torque"}, {par("motor_fall")}),
@@ -159,15 +158,15 @@ MARKERS = {
             par(SECOND.finite + at.FINITE_ROWS - 1),
         },
     ),
-    "lugre": (set(), rubbing("lugre") - rubbing("ambrosio")),
+    "lugre": (set(), numbers_of("lugre") - numbers_of("ambrosio")),
     "bending": (set(), {par("rod_bend_stiffness_1"), par("rod_bend_lateral_1")}),
     "long_film": ({"film"}, of_joints(at.FILM_LONG)),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {
-    "latched": {par(FIRST.block + DAMPING)},
-    "ambrosio": rubbing("coulomb"),
-    "lugre": rubbing("ambrosio"),
+    "latched": DAMPED,
+    "ambrosio": numbers_of("coulomb"),
+    "lugre": numbers_of("ambrosio"),
     "film": of_joints(at.FILM_SHORT),
 }
 

@@ -112,12 +112,12 @@ BROKEN = {
     "a name with a blank": (
         lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="a b"))),
         "bodies.a b",
-        "no name",
+        "not a valid name",
     ),
     "a body named ground": (
         lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="ground"))),
         "bodies.ground",
-        "no name",
+        "not a valid name",
     ),
     "a name twice": (with_more("bodies", BASE.bodies[0]), "bodies.crank", "twice"),
     "no clearance": (with_joint("o2", clearance=0.0), "joints.o2.clearance", "above 0"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
 from running import scene_with
-from some_laws import CONTACT, contact_row, row
+from some_laws import contact_law, row
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import laws
@@ -142,24 +142,24 @@ def scene_of(effects):
 def row_of_parameters(effects, rng):
     """Parameters as the kernel reads them, with this file's constants and two different joints."""
     par = parameters(scene_of(frozenset(effects)))[0]
-    values = {}
+    values, law = {}, contact_law(effects)
     for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
         base = BASES[name]
         if name not in effects:
             continue
         values |= {
-            base + contact_row(effects, "stiffness"): 3e9 * (1 + clearance),
+            base + row("contact", law, "stiffness"): 3e9 * (1 + clearance),
             base + at.FILM_SHORT: FILM["short"],
             base + at.FILM_LONG: FILM["long"],
             base + at.FILM_SHEAR: FILM["shear"],
             base + at.FILM_FLOOR: FILM["floor"],
         }
-        if effects & {*CONTACT}:
-            damping = DAMPING if "fixed" in effects else RESTITUTION_FACTOR
-            values[base + contact_row(effects, "damping")] = damping
-        for law in {"coulomb", "ambrosio", "lugre"} & effects:
-            for name in laws("friction")[law].read:
-                values[base + row("friction", law, name)] = RUBBING[name]
+        if law != "hertz":
+            factor = DAMPING if "fixed" in effects else RESTITUTION_FACTOR
+            values[base + row("contact", law, "damping")] = factor
+        for rubs in {"coulomb", "ambrosio", "lugre"} & effects:
+            for name in laws("friction")[rubs].read:
+                values[base + row("friction", rubs, name)] = RUBBING[name]
     for place, value in values.items():
         par[place] = value
     return par
@@ -195,7 +195,10 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
             return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
-    clearance, stiffness = par[base + at.CLEARANCE], par[base + contact_row(effects, "stiffness")]
+    clearance, stiffness = (
+        par[base + at.CLEARANCE],
+        par[base + row("contact", contact_law(effects), "stiffness")],
+    )
     factors = {name: FILM[name] * (f"{name}_film" in effects) for name in ("short", "long")}
     return Joint(
         clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,

@@ -125,7 +125,7 @@ def test_a_gif_has_the_length_that_is_given_and_is_the_same_again(tmp_path):
     frames = [np.asarray(film.convert("L")) for k in (0, 5) if film.seek(k) is None]
     assert (frames[0] != frames[1]).any()
     (tmp_path / "mine.gif").write_bytes(b"GIF89a")
-    with pytest.raises(InputError, match="did not write"):
+    with pytest.raises(InputError, match="not written by hpcclear"):
         animate(response, tmp_path / "mine.gif", 0.2)
 
 
@@ -162,7 +162,7 @@ def test_a_map_is_drawn_in_readable_units_and_shown_on_the_page(tmp_path):
 @pytest.mark.parametrize(
     ("name", "unit", "words"),
     [
-        ("objective", "m", "f of each revolution"),
+        ("objective", "m", "mean gap of each revolution"),
         ("slider_velocity", "m/s", "slider velocity, at crank angle 90 deg"),
         ("max contact_force rod_slider", "N", "contact force rod_slider, max of each revolution"),
     ],

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from margins import FALSE_RED, at_least, at_most, fewest
+from margins import FALSE_RED, at_least, at_most, fewest, most
 from SALib.test_functions import Ishigami, Sobol_G
 from scipy import stats
 
@@ -19,6 +19,7 @@ from hpcclear.statistics.sensitivity import (
     best_estimates,
     convergence_intervals,
     design_intervals,
+    noise_share,
     select_influential,
     sobol_design,
 )
@@ -235,7 +236,7 @@ def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
 
 
 def test_all_failed_is_refused() -> None:
-    with pytest.raises(InputError, match="no surface"):
+    with pytest.raises(InputError, match="fit a surface"):
         history(lambda p: np.full(len(p), np.nan))
 
 
@@ -421,3 +422,26 @@ def test_sobol_refuses() -> None:
     rng = np.random.default_rng(0)
     with pytest.raises(InputError, match="nearly every row"):
         analyse_sobol(np.full(50, np.nan), 3, rng)
+
+
+def test_chaotic_scatter_is_no_inputs(shift: int) -> None:
+    """A part that every evaluation draws anew, as large as the input's: its share is found, and taken off the total index of
+    inputs that do nothing these are within their error of 0, where the index by itself is a half."""
+    beyond = 0
+    bounds = np.array([[0.0, 1.0]] * 3)
+    for seed in range(60):
+        rng = np.random.default_rng([shift, seed])
+        points = sobol_design(bounds, 256, rng)
+
+        def f(x: np.ndarray, rng: np.random.Generator = rng) -> np.ndarray:
+            return 12.0**0.5 * x[:, 0] + rng.standard_normal(len(x))
+
+        values = f(points)
+        found = analyse_sobol(values, 3, rng, n_resamples=50)
+        share, error = noise_share(values[:64], f(points[:64]), found.variance)
+        assert share == pytest.approx(0.5, abs=6.0 * error)
+        assert found.total[1] > 0.3
+        errors = np.hypot(np.ptp(found.total_limits, axis=1) / 3.92, error)
+        beyond += int((abs(found.total[1:] - share) > 1.96 * errors[1:]).sum())
+    at_most(beyond, most(120, 0.05))
+    assert np.isnan(noise_share(np.array([1.0, np.nan]), np.array([1.0, 2.0]), 1.0)).all()

@@ -2,6 +2,7 @@
 
 import dis
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from hpcclear.dynamics.implicit.columns import leave
 from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.rows import Rows
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -113,7 +115,10 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS, first=0)
+    every, whole = (SimpleNamespace(whole=flag, largest=None) for flag in (None, 1))
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(
+        joints=at.MAX_JOINTS, first=0, objective=every
+    )
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
     responses = at.Effects(joints=2, responses=1)
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
@@ -125,6 +130,9 @@ def test_what_is_measured_goes_by_the_effects():
     assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
     worn = at.Effects(joints=1, first=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
+    judged = at.Effects(joints=1, first=1, objective=every)
+    assert list(at.measures_of(judged)) == [at.JOINTS[1].objective_rate]
+    assert list(at.measures_of(judged._replace(objective=whole))) == [at.OBJECTIVE_RATES]
     for mask, largest in (
         (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
         (at.JOINT_MASK, at.MAX_JOINTS - 1),
@@ -134,6 +142,21 @@ def test_what_is_measured_goes_by_the_effects():
     assert (
         at.MEASURE_MASK < at.RATES
     )  # what the compiler then knows of the distance between two rows
+
+
+def test_rows_stand_one_behind_the_other_and_have_names():
+    """Nobody counts them: a row that is declared moves all behind it."""
+    values = {value for value in vars(at).values() if type(value) is int}
+    buffers = [one for one in vars(at).values() if isinstance(one, Rows)]
+    assert len(buffers) == 7
+    for rows in buffers:
+        firsts = [row.first for row in rows.declared]
+        assert firsts == [0, *np.cumsum([row.size for row in rows.declared])[:-1]]
+        assert rows.end == rows.declared[-1].first + rows.declared[-1].size
+        assert set(firsts) <= values
+        assert all(row.words for row in rows.declared)
+    asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
+    assert asked <= set(at.Effects._fields)
 
 
 def test_rules_are_numbers_of_one_kind():

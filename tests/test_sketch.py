@@ -85,6 +85,8 @@ def test_the_key_has_the_scenes_own_numbers():
         "-9 kN to -200 N",
         "crank_rod",
         "rod_slider",
+        "mass centre at 10 mm",
+        "drawn at 50°",
     ):
         assert words in text, words
     rigid = " ".join(t.get_text() for t in drawn(engine(*SCENES["ideal"], study=False))[2])

@@ -9,7 +9,7 @@ import report_data as data
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES
+from hpcclear.base.objectives import MEAN_GAP, OURS
 from hpcclear.base.outcome import Flag
 from hpcclear.report import spread
 from hpcclear.report.html.page import write_report
@@ -117,7 +117,7 @@ def test_a_threshold_is_read_in_the_unit_of_its_result(words, expected):
 def test_a_threshold_that_is_none_is_refused(words, reason):
     with pytest.raises(InputError, match=reason):
         spread.beyond(spread.units_of(MEAN_GAP), words)
-    assert spread.beyond(spread.units_of(OBJECTIVES["peak-contact-force"]), "3 kN").value == 3000.0
+    assert spread.beyond(spread.units_of(OURS["peak-contact-force"]), "3 kN").value == 3000.0
 
 
 def test_warnings_are_those_of_a_response_with_their_numbers_of_samples():

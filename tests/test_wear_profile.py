@@ -211,7 +211,8 @@ def test_a_journal_rests_where_an_oval_bearing_is_lowest():
     """h = a cos 2 x + b sin 2 x under a load (0, -F): N = -F sin x along e, N h'/|e| = F cos x across it."""
     a, b, force = 1e-5, 6e-6, 500.0
     round_one = rotor()
-    stiffness = parameters(round_one)[0, at.JOINT_BLOCKS + row("contact", "hunt-crossley", "stiffness")]
+    first = row("contact", round_one.effects.contact.law, "stiffness")
+    stiffness = parameters(round_one)[0, at.JOINT_BLOCKS + first]
 
     def rest(angle):
         """What is left across e, N, and |e|."""

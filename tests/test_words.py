@@ -36,9 +36,11 @@ FILES = (
     "docs/validation.md",
     "docs/how-to/accuracy.md",
     "docs/how-to/archive.md",
+    "docs/how-to/bring-your-data.md",
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",
+    "docs/how-to/decisions.md",
     "docs/how-to/designs.md",
     "docs/how-to/distribution.md",
     "docs/how-to/editor-and-shell.md",
@@ -53,6 +55,7 @@ FILES = (
     "docs/how-to/speeds.md",
     "docs/how-to/stick-slip.md",
     "docs/how-to/surrogates.md",
+    "docs/how-to/take-results-away.md",
     "docs/how-to/wear.md",
     "docs/how-to/xarray.md",
 )
@@ -62,7 +65,7 @@ INSTEAD = {
     r"tells?|told|telling": "report, state, print; statistically indistinguishable",
     r"plays?": "clearance",
     r"limits": "confidence interval, bounds, threshold",
-    r"(?<!standard )(?<!std\. )deviations?": "standard deviation, difference",
+    r"(?<!standard )(?<!std\. )(?<!limit )(?<!fundamental )deviations?(?! A to H)": "standard deviation, difference",
     r"kick(s|ed|ing)?|a hair": "perturbation, perturbed run",
     r"true (mean|dynamics|deviation|values?)|directly simulated": "simulated, by simulation",
     r"scramblings?": "randomised-QMC replicate",
@@ -91,6 +94,8 @@ INSTEAD = {
 
 ALLOWED = (
     "room within the allowed values",  # space
+    "limits of size",  # of a fit
+    "The play of a joint",  # for those who search for it
 )
 """Phrases in which such a word has its everyday meaning."""
 
@@ -132,7 +137,7 @@ def _plain(token) -> str:
 def without_quotations(text: str) -> str:
     """Text without what stands in quotation marks and without allowed phrases."""
     for phrase in ALLOWED:
-        text = text.replace(phrase, "")
+        text = re.sub(re.escape(phrase), "", text, flags=re.I)
     return re.sub(r'"[^"]*"', '""', text)
 
 
@@ -267,7 +272,9 @@ def test_messages_have_the_fields_words_and_short_sentences():
         for known in (*STORED, *METHODS):
             text = re.sub(re.escape(known), "x", text, flags=re.IGNORECASE)
         found += [f"{place}: {word!r} in {text!r}" for word, _ in private_words(text)]
-        found += [f"{place}: long: {one}" for one in sentences(text) if len(one.split()) >= LONGEST]
+        if "\n" not in text:  # a source or a file
+            long = [one for one in sentences(text) if len(one.split()) >= LONGEST]
+            found += [f"{place}: long: {one}" for one in long]
     assert count > 2000
     assert not found, "\n".join(found)
 

@@ -1,4 +1,4 @@
-"""Error of the objective against the revolutions waited for and averaged, and the floor that chaos sets.
+"""Error of the objective against transient and averaged revolutions, and its lower bound by chaos.
 
 Copies of the scene that differ by tiny perturbations run for a long time, half of them with ten times stricter tolerances.
 Where

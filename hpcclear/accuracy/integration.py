@@ -25,7 +25,7 @@ REFERENCE_RTOL = 1e-13
 MARGIN = 100.0
 """The reference must be this many times better than what is measured against it."""
 LOST = 10.0
-"""Error of the position, in lengths of the crank, from which a method has lost the motion: no error of its is told."""
+"""Error of the position, in lengths of the crank, above which a method has lost the motion: its errors are not reported."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Integration:
-    """The panel; arrays (methods, rungs), errors (methods, rungs, 4), orders (methods, 4)."""
+    """The panel; arrays (methods, levels), errors (methods, levels, 4), orders (methods, 4)."""
 
     methods: tuple[str, ...]
     setting: Array
@@ -114,10 +114,10 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
 
 
 def observed_order(evaluations: Array, errors: Array, floor: float) -> float:
-    """Slope of error against force evaluations (shape (rungs,) each), both logarithmic: the median over all
-    pairs of rungs (Theil and Sen).
+    """Slope of error against force evaluations (shape (levels,) each), both logarithmic: the median over all pairs of
+    tolerance levels (Theil and Sen).
 
-    Rungs count whose error lies above `floor` and below a tenth, and that are at least twice as dear as one another.
+    Levels count whose error lies above `floor` and below a tenth, and that are at least a factor of two apart in cost.
 
     Returns NaN where fewer than two count.
     """

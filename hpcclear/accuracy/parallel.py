@@ -1,4 +1,4 @@
-"""Speed-up and efficiency on the ranks at hand, and where time is lost."""
+"""Speed-up and efficiency on the available ranks, and lost time by cause."""
 
 import os
 import time

@@ -103,7 +103,7 @@ def measure(
 
 
 def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
-    """Simulate one design on the ranks at hand: every rank compiles the kernel, or loads it."""
+    """Simulate one design on the available ranks: every rank compiles the kernel, or loads it."""
     region = region_of(scene, case)
     simulated(scene, region, 0.5 * (region.lower + region.upper)[None], ranks)
 

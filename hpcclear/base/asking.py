@@ -1,4 +1,4 @@
-"""Procedures that ask: generators that yield what they want to know, are sent the answer, and return what they found."""
+"""Procedures that request simulations: generators that yield requests, receive the results, and return their findings."""
 
 from collections.abc import Callable, Generator
 from typing import TypeVar

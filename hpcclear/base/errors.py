@@ -2,6 +2,7 @@
 
 import difflib
 import errno
+import importlib.util
 import os
 import platform
 import re
@@ -104,10 +105,13 @@ class LimitError(RuntimeError):
     """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
 
 
-LEAST_ADDRESS_SPACE = 700
+_PYARROW = 200 if importlib.util.find_spec("pyarrow") else 0
+"""MB more where pyarrow is installed (the extra ``tables``): pandas, which xarray needs, then loads it."""
+
+LEAST_ADDRESS_SPACE = 700 + _PYARROW
 """MB of it that one process takes to load the program and a compiled kernel."""
 
-LEAST_BESIDE_OTHERS = 900
+LEAST_BESIDE_OTHERS = 900 + _PYARROW
 """MB that each takes under an MPI launcher: the library maps buffers that it shares with the ranks of its node."""
 
 

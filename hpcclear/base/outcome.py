@@ -11,10 +11,10 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Joints that a record has room for; datasets hold those that the scene has."""
+"""Largest number of joints of a record; datasets contain those of the scene."""
 
 WAVE_ROWS = 32
-"""Numbers that profiles around the surfaces of all joints have room for."""
+"""Largest number of profile coefficients of all joints."""
 
 
 class Status(IntEnum):
@@ -137,10 +137,10 @@ RESPONSES = (
     "point_acceleration_deviation",
     "peak_point_acceleration",
 )
-"""Fields of `OUTCOME` that a study of one of them asks for."""
+"""Fields of `OUTCOME` that a study of one of them records."""
 
-ON_REQUEST = (*RESPONSES, "sliding_work", "sliding_waves", "energy_error")
-"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
+ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
+"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
 """Fields of `OUTCOME` that a target error fills in, and that datasets hold where a `regime` was judged."""
@@ -175,6 +175,11 @@ OUTCOME = np.dtype(
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
+        (
+            "rate_of_objective",
+            np.float64,
+            MAX_JOINTS,
+        ),  # what is made of the objective's own rate; NaN without one
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         (
             "sliding_waves",

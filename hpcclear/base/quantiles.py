@@ -92,7 +92,7 @@ class Samples:
 
 
 class Cut:
-    """A distribution in scipy's shape, cut off at two limits."""
+    """A distribution in scipy's shape, truncated at two bounds."""
 
     lower: float
     upper: float

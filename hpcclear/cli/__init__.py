@@ -28,6 +28,7 @@ from hpcclear.ranks.stopping import Exit, StopSwitch
 
 _ROOT_ALONE = (
     scenes.init,
+    scenes.import_,
     scenes.simulate,
     ensembles.merge,
     scenes.report,

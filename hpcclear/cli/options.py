@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -219,6 +220,20 @@ def on_ranks(
             return program(ranks)
 
     return run_on_ranks(noted, stop, ahead, resumes=resumes)
+
+
+def without_pint() -> None:
+    """Have xarray take no value for one of pint's, in this process: it imports pint to find out, a fifth of a start.
+
+    Values of result files are plain numbers. Where a version of xarray has other names, pint is loaded.
+    """
+    from xarray.namedarray import pycompat
+
+    known = getattr(pycompat, "_cached_duck_array_modules", {})
+    kind = getattr(pycompat, "DuckArrayModule", None)
+    if kind is not None and "pint" not in sys.modules:
+        absent = known["pint"] = object.__new__(kind)
+        absent.module, absent.version, absent.type, absent.available = None, None, (), False
 
 
 def show(text: str) -> None:

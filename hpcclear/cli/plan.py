@@ -18,6 +18,7 @@ def preview(plan: Plan, ranks: int) -> str:
     row = plan.rows[-1]
     simulations = plan.simulations
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
+    name = f"first look, {name}" if plan.first else name
     return (
         f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
         f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"

@@ -295,7 +295,15 @@ def describe_statistics(found: "Finished") -> None:
 
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the baseline, the answer of a finished study, its run time, and its files."""
-    kinds = ("samples", "sensitivity", "kriging", "verification", "chaos", "timing")
+    kinds = (
+        "samples",
+        "sensitivity",
+        "kriging",
+        "verification",
+        "contributions",
+        "chaos",
+        "timing",
+    )
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()

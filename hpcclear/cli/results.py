@@ -80,7 +80,7 @@ def export(file: Path, output: Path, units: tuple[str, ...]) -> int:
 def compare(
     file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]
 ) -> int:
-    """Compare a response with measured series (CSV) and print error norms in the units of the measurement.
+    """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
 
     The first column is time or crank_angle, the others are quantities as exported tables name them, such as
     "contact_force crank_rod [kN]". The averaged revolutions are compared, continued periodically.

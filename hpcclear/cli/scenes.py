@@ -1,4 +1,4 @@
-"""Commands about one scene: `init`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
+"""Commands about one scene: `init`, `import`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
 
 import time
 from pathlib import Path
@@ -19,6 +19,7 @@ from hpcclear.cli.options import (
     say,
     show,
     with_scene,
+    without_pint,
 )
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
@@ -75,6 +76,41 @@ def _copy_jobs(place: Path) -> None:
     show(
         f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
     )
+
+
+@click.command("import", short_help="Write a linkage from a table of its points.")
+@click.argument("table", type=PATH)
+@click.argument("file", type=PATH)
+@click.option(
+    "--sketch",
+    type=PATH,
+    metavar="FIGURE",
+    help="Draw the linkage with names, axes and signs to this file (png, svg, pdf).",
+)
+@of_one_process
+def import_(table: Path, file: Path, sketch: Path | None) -> int:
+    """Write a linkage from a table of its points.
+
+    TABLE is a CSV file or Excel workbook with the columns name, x [mm], y [mm] and bodies; points that bodies share
+    are pins, "ground" stands still. Without bodies the points are a chain of bars between the first and the last.
+    FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
+
+    Example: hpcclear import points.csv linkage.toml --sketch linkage.png
+    """
+    from hpcclear.results import files
+    from hpcclear.scene import load_scene
+    from hpcclear.scene.points_of_linkage import linkage_of, text_of
+
+    check_free(file)
+    content = linkage_of(table)
+    scene = load_scene(content)
+    mechanism = content["mechanism"]
+    files.write_bytes(file, text_of(content, table.name).encode())
+    show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    if sketch is not None:
+        _draw(scene, sketch)
+    show(f"next     put masses and the speed in, then: hpcclear check {file}")
+    return Exit.DONE
 
 
 @click.command(short_help="Validate an input file and estimate run time.")
@@ -143,6 +179,7 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
 
+    without_pint()
     scene = written.scene()
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):

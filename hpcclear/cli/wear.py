@@ -11,7 +11,7 @@ from hpcclear.cli.printing import _load, console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
-from hpcclear.statistics.random.survival import quantiles
+from hpcclear.statistics.random.survival import order_limits, quantiles
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -72,12 +72,20 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
-    """Median and nine tenths of a quantile over lives."""
-    told = []
-    for level in (0.05, 0.5, 0.95):
-        value = float(content[name].sel(quantile=level))
-        told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {beyond:.4g}")
-    return f"{told[1]} (5 to 95 %: {told[0]} to {told[2]})"
+    """Median and nine tenths of lives, each with its confidence interval; lives that failed may be of any length."""
+    lives = content[name].to_numpy()
+    known = lives[~np.isnan(lives)]
+
+    def one(value: float) -> str:
+        return f"{value:.4g}" if value < np.inf else f"beyond {beyond:.4g}"
+
+    shown = []
+    for level in (0.5, 0.05, 0.95):
+        low, high = order_limits(known, level, len(lives) - len(known))
+        ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
+        value = one(float(content[f"{name}_quantile"].sel(quantile=level)))
+        shown.append(f"{value} (95 % CI {ends[0]} to {ends[1]})")
+    return f"{shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
 
 
 def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
@@ -92,10 +100,10 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     if not given:
         return [*rows, ("service life", "no limit given (wear.limit)")]
     rows += [
-        ("life in revolutions", _spread(content, "lifetime_quantile", cycles)),
+        ("life in revolutions", _spread(content, "lifetime", cycles)),
         (
             "life in hours",
-            _spread(content, "lifetime_hours_quantile", float((cycles * each).min())),
+            _spread(content, "lifetime_hours", float((cycles * each).min())),
         ),
     ]
     limits = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"

@@ -9,13 +9,13 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -136,9 +136,11 @@ class Evaluator:
         self._objective = objective
         problem = problem_of(scene)
         if recorder is not None:
-            self._lanes: Lanes | ClosedForm = recorder
+            self._lanes: Lanes | PrescribedSamples = recorder
         else:
-            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+            self._lanes = (
+                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
+            )
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}
@@ -172,7 +174,9 @@ class Evaluator:
         labels, outcome, par = self._lanes.collect()
         effects = self._problem.effects
         told = responses_told(self._problem)
-        records = outcome_records(labels, outcome, par, told, bool(effects.wear))
+        records = outcome_records(
+            labels, outcome, par, told, bool(effects.wear), self.scene.objective
+        )
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
             off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
@@ -236,13 +240,19 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     return record
 
 
+NO_RATE = -1e299
+"""A place whose largest rate is below this has none."""
+
+
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False
-) -> Records:
+    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
+    objective: Objective = MEAN_GAP,
+) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `told` (as of `responses_told`), sliding work unless `worn`, uncertainty and energy error until their makers fill them in.
+    `told` (as of `responses_told`), sliding work unless `worn`,
+    what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
@@ -272,6 +282,12 @@ def outcome_records(
         outcome.profile * (outcome.time / outcome.revolutions)[:, None] if worn else np.nan
     )
     records["sliding_waves"][~valid] = np.nan
+    records[RATE] = np.nan
+    if objective.rate is not None:
+        period = (outcome.time / outcome.revolutions)[:, None]
+        largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
+        made = objective.made_of(outcome.mean_rate, largest, period)
+        records[RATE][valid] = made[valid]
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1)

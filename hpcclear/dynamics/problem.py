@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import bending
 from hpcclear.dynamics import layout as at
@@ -15,6 +16,7 @@ from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
 from hpcclear.dynamics.laws.lanes import in_lanes
+from hpcclear.dynamics.laws.objectives import rate_in_lanes
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
@@ -154,6 +156,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     e = scene.effects
     count = len(scene.clearance_joints())
     main = planar.linkage_of(scene).mechanism.period
+    judge = scene.objective
     waves = scene.waves()
     models = {film.model for film in scene.films().values()}
     return at.Effects(
@@ -164,6 +167,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         torque=_flag(isinstance(main, TorqueDrive)),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
+        objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         ledger=_flag(scene.numerics.energy if ledger is None else ledger),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
@@ -226,9 +230,20 @@ def _cells_of_curves(
     )
 
 
+def check_objective(scene: Scene) -> None:
+    """InputError where the objective has a rate of the whole mechanism, and no motion is integrated that it could go with."""
+    if scene.objective.whole and not coordinate_count(scene):
+        raise InputError(
+            scene.objective_key, scene.objective.name,
+            "its rate is integrated along with the motion, and this motion is prescribed",
+            'Give a joint kind = "clearance"',
+        )  # fmt: skip
+
+
 def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
+    check_objective(scene)
     drive: Any = main_drive(scene.linkage)
     linkage = planar.linkage_of(scene)
     cells = partial(

@@ -9,7 +9,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import alone, outcome_records, responses_told
@@ -20,6 +19,7 @@ from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
@@ -108,7 +108,7 @@ def simulate(
     objective = named.objective if objective is None else objective
     still = coordinate_count(scene) == 0
     if still:
-        times, data, record = _closed_form(scene)
+        times, data, record = _prescribed(scene)
     else:
         kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
@@ -200,10 +200,10 @@ def _shown(scene: Scene, steady: Records) -> Scene:
     return scene.with_(changes)
 
 
-def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
+def _prescribed(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
     problem = problem_of(scene)
-    lanes = ClosedForm(problem)
+    lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
     record = outcome_records(*lanes.collect(), responses_told(problem), bool(problem.effects.wear))

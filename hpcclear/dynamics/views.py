@@ -142,6 +142,8 @@ class Outcome(View):
     stiff_steps = Column(at.OUT_STIFF_STEPS)
     mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE))  # N
     sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
+    mean_rate = _of_joints(at.OUT_MEAN + at.place(at.OBJECTIVE_RATES))  # of the objective
+    largest_rate = _of_joints(at.OUT_LARGEST_RATE)
     profile = Column(
         slice(at.OUT_MEAN + at.place(at.PROFILES), at.OUT_MEAN + len(at.INTEGRATED))
     )  # W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there

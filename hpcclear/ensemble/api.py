@@ -48,7 +48,7 @@ def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        If it is none of these.
+        If it is not one of these.
     """
     if scene.study is not None and name in scene.study.names:
         return scene.study.variable(name).paths

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ REDUCED: "dict[str, Callable[[Array], float]]" = {"max": np.max, "min": np.min, 
 """What may stand before the name of a series: of a revolution, at the stored instants, in place of a section."""
 
 OBJECTIVE = "objective"
-"""Name of f of each revolution."""
+"""Name of the mean gap, f of eq. 13, of each revolution."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class Observation:
     def described(self, response: xr.Dataset) -> Objective:
         """Its unit and words, of a short response."""
         if self.name == OBJECTIVE:
-            return MEAN_GAP._replace(name=OBJECTIVE, words="f of each revolution")
+            return replace(MEAN_GAP, name=OBJECTIVE, words="mean gap of each revolution")
         series = self.of(response)
         word = self.name.partition(" ")[0]
         at = f"at crank angle {np.degrees(self.section):g} deg"
         how = f"{word} of each revolution" if word in REDUCED else at
         name = self.name.removeprefix(f"{word} ") if word in REDUCED else self.name
         words = f"{name.replace('_', ' ')}, {how}"
-        return MEAN_GAP._replace(name=self.name, unit=str(series.attrs["units"]), words=words)
+        return replace(MEAN_GAP, name=self.name, unit=str(series.attrs["units"]), words=words)
 
     def __call__(self, scene: Scene, response: xr.Dataset) -> Array:
         """Values (revolutions,), NaN of a failed simulation."""

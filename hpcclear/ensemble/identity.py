@@ -27,7 +27,9 @@ def run_key(scene: Scene, command: str) -> dict[str, str]:
 
 def sample_key(scene: Scene, points: Points) -> dict[str, str]:
     """The key of `sample`: the run's, and the points themselves."""
-    digest = hashlib.sha256(points.values.tobytes() + repr((points.names, points.paths)).encode())
+    labels = (points.labels,) if points.labels else ()
+    named = repr((points.names, points.paths, *labels))
+    digest = hashlib.sha256(points.values.tobytes() + named.encode())
     return {**run_key(scene, "sample"), "points": digest.hexdigest()[:16]}
 
 

@@ -1,4 +1,4 @@
-"""What lives come to, as a dataset: curves and their quantiles, profiles, survival, what decides, and what to mind."""
+"""Service lives as a dataset: curves and their quantiles, profiles, survival, main causes, and warnings."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -186,7 +186,8 @@ def _evenly(
 
 
 def doubts(content: xr.Dataset) -> list[str]:
-    """What to mind of lives in a file, a sentence each: rates that scatter too much, motion that had not settled."""
+    """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
+    state."""
     texts = []
     unsure = int((content["flags"] == Flag.TARGET_MISSED).sum())
     if unsure:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
-    """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; limits in SI or with a unit.
+    """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; bounds in SI or with a unit.
 
     Raises
     ------

@@ -59,7 +59,7 @@ def run_sample(
     ----------
     scene : Scene
     output : Path
-        NetCDF file; timing.nc goes beside it, finished samples into a hidden directory until it is written.
+        NetCDF file; NAME.timing.nc goes beside it, finished samples into a hidden directory until it is written.
     ranks : Ranks
     table : Path, optional
         CSV of designs.
@@ -83,7 +83,7 @@ def run_sample(
         place = Place.of_file(output, options.fresh)
     else:
         rows, key = part.rows(len(points)), part.key(scene, points)
-        place = Place.of_part(part.place(output))
+        place = Place.of_file(part.place(output), False)
     with Session(place, key, ranks, options) as session:
         samples = session.found("samples")
         if samples is None:

@@ -1,4 +1,4 @@
-"""The `wear` command: lives of a mechanism whose joints wear, on all ranks.
+"""The `wear` command: service lives of a mechanism with wear, on all ranks.
 
 Root follows the lives (`hpcclear.dynamics.wear.life`) side by side: what all of them ask for is a design like any other,
 simulated on all ranks and kept in the checkpoint; who goes on after a kill asks for the same once more and finds it done.
@@ -227,7 +227,7 @@ def _simulated(
 
 
 def waiting_longer(scene: Scene) -> Scene:
-    """The scene for copies that wait longer before they are measured, by a stretch as long as is averaged."""
+    """The scene for copies that wait longer before they are measured, by an interval as long as is averaged."""
     numerics = scene.numerics
     wait = numerics.transient_revolutions + numerics.averaged_revolutions
     return scene.with_({"numerics.transient_revolutions": wait})
@@ -266,7 +266,7 @@ def run_wear(
     options: Options = DEFAULT_OPTIONS,
     timing: Path | None = None,
 ) -> Finished:
-    """Follow the lives of a scene on all ranks and write them; on root.
+    """Simulate the service lives of a scene on all ranks and write them; on root.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Process(Protocol):
         """Raise `Stopped` if requested to end early."""
 
     def pass_on_stop(self) -> None:
-        """Tell root of a signal that only this rank may have got."""
+        """Report to root a signal that only this rank may have received."""
 
     def heed(self, message: Message, /) -> None:
         """Act on what a rank may say at any time."""

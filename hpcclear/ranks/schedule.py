@@ -64,7 +64,7 @@ class Need(NamedTuple):
 
 
 class Allotment(NamedTuple):
-    """What it gets: so many samples, and the stock below which it asks again."""
+    """What it gets: so many samples, and the stock below which it requests more."""
 
     size: int
     ask_below: int
@@ -87,7 +87,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     ranks : int
         Ranks that work.
     need : Need
-        Lanes, stock and speed of the rank that asks.
+        Lanes, stock and speed of the requesting rank.
 
     Returns
     -------
@@ -161,7 +161,7 @@ class HandOut:
         return 0 < self.remaining <= ENDING * self._rate * self._ranks
 
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
-        """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
+        """Indices of samples for the requesting rank (none when nothing is left), and when it requests more."""
         self._rate = need.rate
         size, ask_below = allot(self.remaining, self._ranks, need)
         index = self._waiting(self._next, self._next + size)
@@ -238,7 +238,7 @@ class Desk:
 
     @property
     def need(self) -> Need:
-        """What to tell root."""
+        """What to report to root."""
         finished, seconds = self._recent
         rate = float(finished / seconds) if seconds > 0.0 else 0.0
         return Need(self._worker.lanes, self._worker.pending, rate)

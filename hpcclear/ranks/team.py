@@ -112,7 +112,7 @@ class Ranks:
         return f"{place}, sample {shown}" if samples else place
 
     def stop_requested(self) -> bool:
-        """Whether a signal on any rank or the time limit asks to end early; for root.
+        """Whether a signal on any rank or the time limit requests an early end; for root.
 
         Raises
         ------
@@ -336,7 +336,7 @@ class Ranks:
         return records
 
     def pass_on_stop(self) -> None:
-        """Tell root of a signal that only this rank may have got."""
+        """Report to root a signal that only this rank may have received."""
         if self.stop_switch.is_set() and not self._passed_on:
             self.mail.send(0, Tag.STOP, f"{self.stop_switch.reason} on rank {self.rank}")
             self._passed_on = True

@@ -5,15 +5,16 @@ The command prints them at its end, and they head the page.
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.base.outcome import Flag
-from hpcclear.report import alike, failures
+from hpcclear.report import alike, failures, scatter
 from hpcclear.report.figures import fits, labels
+from hpcclear.report.scatter import HALF_WIDTH
+from hpcclear.report.spread import Line
 
 SPAN = 2.0
 """Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
@@ -33,18 +34,8 @@ LARGE = 0.1
 LITTLE = 0.01
 """Share of the variance of f, with its half-width, below which a variable is called negligible."""
 
-HALF_WIDTH = 1.96
-"""Half-width of a 95 % confidence interval, standard errors."""
-
 COARSE = 0.1
 """Half-width of a Sobol index above which more samples are advised."""
-
-
-class Line(NamedTuple):
-    """One line of the answer: its subject and its text."""
-
-    label: str
-    text: str
 
 
 def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
@@ -63,7 +54,8 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ours = _ours(verified)
     best = _best(ours)
     original = _original(ours)
-    scatter = _scatter(files, best)
+    chaotic = _scatter(files, best)
+    near = alike.flat(ours, best, _judged(ours))
     return [
         Line("recommended", _named(best)),
         Line("criterion", f"{_merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
@@ -74,12 +66,14 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *(Line("objective", text) for text in _goals(best)),
         *(Line("constraint", text) for text in constraints(best)),
         Line("equivalent", alike.words(ours, best)),
+        *([Line("near", near)] if near else []),
         Line("active bounds", bounds(best)),
+        *scatter.lines(files, best),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("contact model", _left(files, best)),
         *(Line("failed", text) for text in _failed(files)),
-        *([Line("chaos", scatter)] if scatter else []),
+        *([Line("chaos", chaotic)] if chaotic else []),
         Line("confidence", _sure(best, verified)),
         Line("next steps", "; ".join(_next(files, ours, best, place))),
     ]  # fmt: skip
@@ -230,7 +224,7 @@ _NONE = {
     "broken": "none: every simulated design violates a constraint",
     "cannot be told": "none: no simulated design is certain to satisfy the constraints",
 }
-"""What stands in place of a recommendation where no design surely keeps to the constraints, by the best verdict."""
+"""What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
 
 def _named(best: xr.Dataset) -> str:
@@ -307,9 +301,7 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     little = total + HALF_WIDTH * error < LITTLE
     texts = {
         kind: ", ".join(
-            f"{names[k]} {value[k]:.0%} ± {HALF_WIDTH * error[k]:.1%}"
-            for k in order
-            if not little[k]
+            scatter.share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
         )
         for kind, (value, error) in indices.items()
     }
@@ -319,6 +311,10 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     if texts["total"]:
         words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
         yield Line("interactions", f"{words}: {texts['total']}")
+    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
+    if noise > HALF_WIDTH * doubt and noise > LITTLE:
+        text = f"{scatter.share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
+        yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
     if little.any():
         hardly = ", ".join(names[k] for k in order if little[k])
         yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")

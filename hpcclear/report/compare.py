@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.report import bearings
@@ -91,6 +92,15 @@ class Comparison:
     revolutions: int
     """Simulated revolutions, continued periodically."""
     quantities: tuple[Quantity, ...]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the norms of each quantity, SI."""
+        rows = [
+            (f"{one.name} ({one.unit})", *(f"{value:.4g}" for value in one.norms.values()))
+            for one in self.quantities
+        ]
+        header = ("quantity", "RMS error", "relative", "largest", "mean", "peak", "correlation")
+        return markup.table(f"Comparison, {self.aligned}", rows, header)
 
 
 def compare(

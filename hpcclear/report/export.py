@@ -40,7 +40,7 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
     Raises
     ------
     InputError
-        The result cannot be read, the format is none of these or needs a package that is not installed, or another
+        The result cannot be read, the format is not known or needs a package that is not installed, or another
         file is in the way.
     StorageError
         The disk is full or fails.
@@ -109,7 +109,7 @@ def _column(values: np.ndarray) -> np.ndarray:
 def _xlsx(table: "DataFrame") -> Written:
     """Three sheets: the data; quantities with their units and meanings; what the result is."""
     if len(table) > MOST_ROWS:
-        reason = f"an Excel sheet has room for {MOST_ROWS} rows, the result has {len(table)}"
+        reason = f"an Excel sheet has at most {MOST_ROWS} rows, the result has {len(table)}"
         raise InputError("output", len(table), reason, "Export it as csv or parquet")
     attributes = table.attrs
     units, words = attributes["units"], attributes["long_names"]

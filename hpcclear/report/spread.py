@@ -92,7 +92,7 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
     Parameters
     ----------
     samples : xarray.Dataset
-        Kind ``samples``. Failed ones are left out of moments; limits of quantiles and shares hold whatever these were.
+        Kind ``samples``. Failed ones are left out of moments; the intervals of quantiles and shares hold whatever these were.
     thresholds : sequence of Beyond
 
     Returns
@@ -163,7 +163,7 @@ def _moments(known: Array, unit: str, drawn: bool) -> list[Line]:
 
 
 def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
-    """A quantile with its limits by the order of the values; not stated where the samples do not reach so far."""
+    """A quantile with its confidence interval by the order of the values; not stated where the samples do not reach so far."""
     known = values[np.isfinite(values)]
     value = float(np.quantile(known, level, method="hazen"))
     if not drawn:
@@ -178,7 +178,7 @@ def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
 
 
 def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
-    """Share of samples beyond a threshold, with Clopper and Pearson's limits."""
+    """Share of samples beyond a threshold, with Clopper and Pearson's confidence interval."""
     if one.name not in samples:
         return Line(one.name, "not recorded in these samples")
     values = _values(samples, one.name)

@@ -30,6 +30,7 @@ ROWS: dict[str, tuple[str, ...]] = {
     "front": ("case", "run", "solution"),
     "verification": ("design",),
     "chaos": ("design",),
+    "contributions": ("design", "input"),
     "claims": ("claim",),
     "readings": ("reading", "design"),
     "statistics": ("bin",),

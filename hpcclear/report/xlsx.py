@@ -13,7 +13,7 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 MARK = b"<dc:creator>hpcclear</dc:creator>"
-"""What tells our files from others, near their beginning."""
+"""Mark of our files, near their beginning."""
 
 LONGEST = 32_000  # letters of a cell
 

@@ -78,6 +78,7 @@ RESPONSE: Columns = {
 
 SAMPLES: Columns = {
     "sample": count(("sample",), "number of the sample in the design"),
+    "label": text(("sample",), "name of the design in the table that it comes from"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
     **outcome("sample"),
@@ -122,8 +123,10 @@ SENSITIVITY: Columns = {
     "mean_objective_error": number(("clearance",), "objective", "standard error of the value before"),
     "sobol_first": number(("parameter",), "1", "first-order Sobol index"),
     "sobol_first_error": number(("parameter",), "1", "its standard error"),
-    "sobol_total": number(("parameter",), "1", "total Sobol index"),
+    "sobol_total": number(("parameter",), "1", "total Sobol index, without the share of chaotic scatter"),
     "sobol_total_error": number(("parameter",), "1", "its standard error"),
+    "sobol_noise": number((), "1", "share of the variance over the ranges that is chaotic scatter, by perturbed runs"),
+    "sobol_noise_error": number((), "1", "its standard error"),
     "influence": number(("parameter",), "objective", "mean effect; parameters are ranked by it"),
     "selected": flag(("parameter",), "whether the parameter is selected for its influence"),
 }
@@ -204,6 +207,7 @@ VERIFICATION: Columns = {
     "constraint_excess": number(("design",), "1",
         "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation"),
     "samples": count(("design",), "number of simulations"),
+    "rare_samples": count(("design",), "number of further simulations, where the design fails, for its rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations with indentation outside the range of Hertz contact"),
     "random": text(("design",), "random inputs of its case"),
@@ -217,6 +221,20 @@ CHAOS: Columns = {
     "chaos_share": number(("design",), "1", "its share of the variance over random inputs", required=True),
     "chaotic": number(("design",), "1", "share of samples whose objective changes with such a perturbation", required=True),
     "pairs": count(("design",), "samples simulated twice", required=True),
+}
+
+CONTRIBUTIONS: Columns = {
+    "design": text(("design",), "name of the design"),
+    "input": text(("input",), "random input"),
+    "contribution": number(("design", "input"), "1",
+        "share of the variance of the objective that an input makes alone, or with those it is correlated with", required=True),
+    "contribution_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "halved": number(("design", "input"), "1",
+        "fall of the standard deviation with half the scatter of an input, relative", required=True),
+    "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "unexplained": number(("design",), "1", "share of the variance that no input or pair of them explains", required=True),
+    "unexplained_error": number(("design",), "1", "standard error of it"),
+    "together": flag(("input",), "whether the input is correlated with others, whose contribution is one"),
 }
 
 CLAIMS: Columns = {

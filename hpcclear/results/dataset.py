@@ -115,7 +115,7 @@ def dataset(
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
-    if objective != MEAN_GAP:
+    if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 
@@ -188,6 +188,7 @@ def samples_dataset(
     objective: Objective = MEAN_GAP,
     words: Mapping[str, str] | None = None,
     joints: Sequence[str] = JOINTS,
+    labels: Sequence[str] = (),
 ) -> xr.Dataset:
     """Outcome records and the designs they belong to, by growing sample number.
 
@@ -209,6 +210,8 @@ def samples_dataset(
         Long names of the design variables.
     joints : sequence of str
         Labels of the scene's joints with clearance: as many places of the records are kept.
+    labels : sequence of str, length n
+        Names of the designs, where they have some.
 
     Returns
     -------
@@ -239,6 +242,8 @@ def samples_dataset(
     left_out = {"sample", *ON_REQUEST, *JUDGED} - asked
     kept = [name for name in OUTCOME.names or () if name not in left_out]
     data |= {name: at_joints(records[name], joints) for name in kept}
+    if len(labels):
+        data["label"] = np.array(labels, dtype=str)[order]
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)

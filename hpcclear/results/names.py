@@ -75,6 +75,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "judged": _meanings("reported", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
+    "together": _meanings("independent", "correlated"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -92,7 +93,9 @@ def _kind(
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
     required = (
-        set(data) - {*ON_REQUEST, *JUDGED} if whole else {n for n in data if data[n].required}
+        set(data) - {*ON_REQUEST, *JUDGED, "label"}
+        if whole
+        else {n for n in data if data[n].required}
     )
     return Kind(title, coords, data, frozenset(required), design_dims, limit_dims)
 
@@ -119,6 +122,7 @@ KINDS = {
         "Simulated designs with confidence intervals", columns.VERIFICATION, ("design",)
     ),
     "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
+    "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
     "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
     "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),

@@ -1,6 +1,7 @@
 """What a row of the tables of result files is, and rows that several of them share.
 
-``objective`` in the place of a unit, and ``objective^2``, stand for the unit of the study's objective (`Column.of`).
+``objective`` in the place of a unit, and ``objective^2``, stand for the unit of the study's objective, ``rate`` for that of
+what is made of its rate (`Column.of`).
 Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
@@ -20,18 +21,17 @@ class Column(NamedTuple):
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
 
-    def unit(self, objective: str) -> str:
-        """The unit in a study whose objective has the unit `objective`."""
-        if self.units == "objective":
-            return objective
+    def unit(self, objective: str, rate: str = "that of the rate") -> str:
+        """The unit in a study whose objective has the unit `objective`, and what is made of its rate the unit `rate`."""
         if self.units == "objective^2":
             return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
-        return self.units
+        return {"objective": objective, "rate": rate}.get(self.units, self.units)
 
     def of(self, objective: Objective) -> "Column":
         """The row in a file of results for that objective: its unit, and its words in place of the mean gap's."""
         words = self.long_name.replace(MEAN_GAP.words, objective.words)
-        return self._replace(units=self.unit(objective.unit), long_name=words)
+        unit = self.unit(objective.unit or "1", objective.unit_of_rate or "1")
+        return self._replace(units=unit, long_name=words)
 
 
 Columns = dict[str, Column]
@@ -83,6 +83,7 @@ def outcome(*per_sample: str) -> Columns:
         "point_acceleration_deviation": number(per_sample, "m/s^2",
         "root mean square of the acceleration of the followed point about its mean"),
         "peak_point_acceleration": number(per_sample, "m/s^2", "largest acceleration of the followed point"),
+        "rate_of_objective": number(per_joint, "rate", "what is made of the objective's own rate"),
         "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
         "energy_error": number(per_sample, "1", "residual of the energy balance, relative"),
         "latched": flag(per_joint, "whether damping uses the last impact velocity, for whole revolutions"),

@@ -49,7 +49,7 @@ class PlanarSpeed(Table):
     kind: Literal["constant-speed"]
     body: str
     """That turns."""
-    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="nothing would turn")]
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
     """rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
     period: bool = False
     """Whether its turn is the revolution; the first drive is, where none says so."""

@@ -6,11 +6,29 @@ from typing import Annotated, Any, Literal
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
-from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import Objective
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.formula import FormulaError, names_in
+from hpcclear.scene.laws import check_objective
+from hpcclear.scene.plugged import PluginName
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
+
+
+class ObjectiveName(PluginName):
+    """An entry that names an objective."""
+
+    def convert(self, value: Any) -> str:
+        """The name of one that is there and without fault; raises PydanticCustomError."""
+        name = super().convert(value)
+        found = self.registry.get(name)
+        if not isinstance(found, Objective):
+            raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
+        if name not in self.registry.ours():
+            check_objective(found)
+        return name
 
 
 class Goal(Table):
@@ -95,8 +113,10 @@ def in_si(case: Any, objective: object, key: str) -> Any:
     """
     if not isinstance(case, Mapping):
         return case
-    found = OBJECTIVES.get(objective) if isinstance(objective, str) else None
-    unit = "" if found is None else found.unit
+    try:
+        unit = OBJECTIVES.get(objective).unit  # type: ignore[arg-type]
+    except (InputError, AttributeError, TypeError):  # which the entry itself says
+        unit = ""
     made = dict(case)
     for table in ("objectives", "constraints"):
         if isinstance(rows := made.get(table), (list, tuple)):

@@ -28,6 +28,12 @@ def _module(name: str) -> Any:
     return importlib.import_module(f"{_HOME}.{name}")
 
 
+def check_objective(objective: Any) -> None:
+    """An error for validators where an objective is at fault."""
+    with as_mended(""):
+        _module("objectives").check_objective(objective)
+
+
 @contextlib.contextmanager
 def as_mended(key: str) -> Iterator[None]:
     """What is wrong with a law as an error of an entry."""

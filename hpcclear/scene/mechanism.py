@@ -89,7 +89,7 @@ class ConstantSpeed(Table):
     """The crank angle is prescribed: it turns at a constant speed, whatever moment that takes."""
 
     kind: Literal["constant-speed"]
-    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="nothing would turn")]
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
     """Crank speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
     turns: Turns = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""

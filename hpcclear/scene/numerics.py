@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from hpcclear.base.remarks import remark
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
+from hpcclear.scene.goals import ObjectiveName
 
 
 class Numerics(Table):
@@ -40,6 +42,8 @@ class Numerics(Table):
     """Revolutions before the average starts."""
     averaged_revolutions: Annotated[int, Count(1, 10**9)] = 5
     """Revolutions of the average."""
+    objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
+    """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
     objective_joints: tuple[str, ...] = ()
     """Joints with clearance whose gaps or contact forces make up the objective; default all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000

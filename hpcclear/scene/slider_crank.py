@@ -1,6 +1,6 @@
 """The slider-crank as a template of a linkage: its tables written out as bodies, joints, drive and load.
 
-Nothing below the scene asks which template wrote a linkage; `SERIES` and `HOLDS` say what its own names stand for.
+Nothing below the scene depends on which template wrote a linkage; `SERIES` and `HOLDS` say what its own names stand for.
 """
 
 import math
@@ -42,7 +42,7 @@ HOLDS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "bearing_y": (("crank_frame_y", 1.0),),
     "guide_force": (("guide_across", 1.0),),
 }
-"""What its reactions without play are: those of constraints, each with its sign; a column each where there are several."""
+"""Its reactions without clearance: those of constraints, each with its sign; a column each where there are several."""
 
 DRAWN_AT = math.radians(50.0)
 """Crank angle of its drawing, rad; at the start, crank and rod lie on one line."""

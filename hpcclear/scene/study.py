@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
 from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
@@ -43,16 +44,8 @@ class Study(Table):
     """Points of a design: training points of each Kriging model, or what `sample` simulates."""
     test_samples: Annotated[int, Count(0, 10**6)] = 50
     """Fresh points each Kriging model is tested on."""
-    objective: Literal[
-        "mean-gap",
-        "mean-contact-force",
-        "peak-contact-force",
-        "peak-crank-moment",
-        "slider-acceleration-deviation",
-        "point-acceleration-deviation",
-        "peak-point-acceleration",
-    ] = "mean-gap"
-    """The objective f to minimise: eq. 13, or another response."""
+    objective: Annotated[str, goals.ObjectiveName(OBJECTIVES)] = "mean-gap"
+    """The objective f to minimise: eq. 13, another response, or one of your own."""
     accuracy: MomentAccuracy | None = None
     """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: a number for
     both, or a table. Each design is simulated until it meets them. They include the error of the integration tolerance,

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, of_joints
-from hpcclear.base.outcome import RESPONSES
+from hpcclear.base.objectives import MEAN_GAP, Objective, bound
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
@@ -186,10 +186,15 @@ class SceneTables(Table):
                 )
         if len(set(chosen)) < len(chosen):
             raise invalid("a joint is named twice", "Name each once", key=key)
-        asked = MEAN_GAP.name if self.study is None else self.study.objective
-        if chosen and OBJECTIVES[asked].by_joint is None:
+        if self.study is not None and self.numerics.objective is not None:
             raise invalid(
-                f'study.objective = "{asked}" is of no joint',
+                "a study names its objective itself",
+                "Write study.objective instead",
+                "numerics.objective",
+            )
+        if chosen and not self.objective.of_joints:
+            raise invalid(
+                f'study.objective = "{self.objective.name}" is of no joint',
                 "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
                 key=key,
             )
@@ -222,17 +227,25 @@ class SceneTables(Table):
     @property
     def objective(self) -> Objective:
         """What each sample is judged by: the study's objective, f where there is no study."""
-        return self.objective_named(MEAN_GAP.name if self.study is None else self.study.objective)
+        named = self.numerics.objective if self.study is None else self.study.objective
+        return self.objective_named(named or MEAN_GAP.name)
+
+    @property
+    def objective_key(self) -> str:
+        """The entry that names it."""
+        return "numerics.objective" if self.study is None else "study.objective"
 
     def objective_named(self, name: str) -> Objective:
         """An objective, of the joints that count here."""
-        chosen = self.numerics.objective_joints
-        places = [self.joint_labels.index(joint) for joint in chosen]
-        return of_joints(OBJECTIVES[name], places, chosen) if chosen else OBJECTIVES[name]
+        chosen, labels = self.numerics.objective_joints, self.joint_labels
+        joints, places = (
+            tuple(map(labels.index, names)) for names in (chosen, self.clearance_joints())
+        )
+        return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.name.replace("-", "_") in RESPONSES
+        return self.numerics.responses or self.objective.needs_responses
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""

@@ -44,6 +44,7 @@ RESERVED = frozenset(
             *JUDGED,
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        "label",
         *("searched", "searched_first", "searched_second", "constraints"),
     )
 )
@@ -116,7 +117,9 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
         reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
         raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
     if quantity.nonzero and lower < 0.0 < upper:
-        raise invalid("0 is between the bounds", "Keep to one sign: nothing turns at 0", key=key)
+        raise invalid(
+            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
+        )
     return lower, upper
 
 
@@ -251,9 +254,9 @@ class RandomInput(NamedInput):
     fit: str | None = None
     """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
     bore: Tolerance | None = None
-    """Of "fit": how the bore is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the bore is made; left out, normal within the limits of size of the fit, with cp = 1."""
     pin: Tolerance | None = None
-    """Of "fit": how the pin is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the pin is made; left out, normal within the limits of size of the fit, with cp = 1."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
     parameters: dict[str, float] | None = None

@@ -20,8 +20,10 @@ is done, and each finished sample within seconds, so that the same command goes 
 and ends with the same bytes.
 """
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -30,13 +32,14 @@ from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import Options, Place, Session
 from hpcclear.ensemble.simulate import saving
+from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
 from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points
-from hpcclear.study import lives, optimisation
+from hpcclear.study import launched, lives, optimisation
 from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
@@ -48,13 +51,13 @@ __all__ = ["run_study"]
 def run_study(
     scene: Scene,
     directory: str | Path,
-    ranks: Ranks,
+    ranks: Ranks | int = 1,
     *,
     fresh: bool = False,
     progress_style: Style = "auto",
     tell: Callable[[str], object] = lambda text: None,
 ) -> Path:
-    """Carry a study through; call it on root, under `hpcclear.ranks.boundary.run_on_ranks`.
+    """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
     Parameters
     ----------
@@ -63,7 +66,9 @@ def run_study(
     directory : path
         Where results go; made if its parent exists. What an earlier run of the same study finished
         there is not done again.
-    ranks : Ranks
+    ranks : int or Ranks
+        Number of processes: 1 is this one, more are started by mpiexec. Results have the same bytes for any number. `Ranks` is
+        what `hpcclear.ranks.boundary.run_on_ranks` gives a program, on root.
     fresh : bool
         Start anew in a directory beside it, if there is one already.
     progress_style : {"auto", "bar", "log", "quiet"}
@@ -83,6 +88,12 @@ def run_study(
     Stopped
         If asked to end early; everything finished is on disk.
     """
+    if isinstance(ranks, int) and ranks > 1:
+        return launched.launch(
+            scene, Path(directory), ranks, fresh=fresh, progress_style=progress_style
+        )
+    if isinstance(ranks, int):
+        ranks = alone()
     study = scene.required_study
     if not study.cases:
         raise InputError("study.cases", None, "there is no case to optimise", "Name a case")
@@ -122,3 +133,12 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     with saving(checkpoint.flush):  # samples of small stages wait for the next save
         carry_out(run, certificate_extent)
     return run.times
+
+
+class _Study(ModuleType):
+    """This package, which can be called: ``hpcclear.study(scene, directory, ranks=4)`` stands beside ``hpcclear.map``."""
+
+    __call__ = staticmethod(run_study)
+
+
+sys.modules[__name__].__class__ = _Study

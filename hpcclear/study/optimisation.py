@@ -25,7 +25,7 @@ from hpcclear.statistics.search.asking import Search, Task, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study.goals import ends_in_all, excess, guessed
+from hpcclear.study.goals import ends_in_all, excess, guessed, shortfall
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate, method_of
 
@@ -76,12 +76,16 @@ class Problem:
             return self.objective(designs)
         drawn = self.objective.sampled(designs, self.draws)
         named = dict(zip(self.names, designs.T, strict=True))
-        asked = (*self.case.goals, *self.case.kept)
-        found = np.column_stack([guessed(goal, drawn, named) for goal in asked])
+        found = np.column_stack([guessed(goal, drawn, named) for goal in self.case.goals])
         if not self.case.kept:
             return found
-        count = len(self.case.goals)
-        return found[:, :count], np.maximum(excess(self.case.kept, found[:, count:]), 0.0)
+        broken = [
+            shortfall(one, one.most, drawn)
+            if one.statistic == "exceedance"
+            else excess([one], guessed(one, drawn, named)[:, None])
+            for one in self.case.kept
+        ]
+        return found, np.maximum(np.max(broken, axis=0), 0.0)
 
     def moments(self, designs: Array) -> Array:
         """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""

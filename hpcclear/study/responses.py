@@ -50,6 +50,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
     changes: dict[str, object] = {
         "numerics.averaged_revolutions": revolutions,
         "numerics.responses": run.scene.responses_asked(),
+        "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
         changes |= dict.fromkeys(run.study.variable(name).paths, value)
@@ -93,7 +94,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
-            response = simulate(scene, run.scene.objective)
+            response = simulate(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
             run.tell(

@@ -16,15 +16,19 @@ from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
     certificate,
     chaos,
+    contributions,
+    edge,
     fronts,
     lives,
     optimisation,
+    rare,
     refinement,
     responses,
     sensitivities,
     surrogates,
     tolerance,
     truth,
+    verdicts,
     verification,
 )
 from hpcclear.study.certificate import Extent
@@ -123,8 +127,10 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
 def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
     """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
     if run.study.paired:
-        return tolerance.verified(run, designs)
-    return truth.simulate(run, designs, "verification")
+        true = tolerance.verified(run, designs)
+    else:
+        true = truth.simulate(run, designs, "verification")
+    return rare.decided(run, designs, true, "verification")
 
 
 def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
@@ -165,7 +171,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 def _of_search(scene: Scene) -> dict[str, int]:
     begun, rounds = refinement.simulations(scene.required_study)
-    return {"check": begun, "infill": rounds}
+    return {"check": begun, "infill": rounds, "edge": edge.simulations(scene.required_study)}
 
 
 def _designs(scene: Scene) -> int:
@@ -179,8 +185,10 @@ def _designs(scene: Scene) -> int:
 
 def _of_verification(scene: Scene) -> dict[str, int]:
     study = scene.required_study
+    failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
+    each = truth.expected(study) + failing // len(study.cases)
     return {
-        "verification": _designs(scene) * truth.expected(study),
+        "verification": _designs(scene) * each,
         "pairs": tolerance.simulations(study),
     }
 
@@ -225,6 +233,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
+            "edge": "search along constraints on rare failures",
         },
         files=("front.nc",), samples=_of_search,
     ),
@@ -239,6 +248,10 @@ STAGES = (
         words={"lives": "wear of the baseline and the best designs"}, samples=_of_lives,
     ),
     Stage("front", _front, needs=("surrogates", "verification", "lives"), files=("verification.nc",)),
+    Stage(
+        "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
+        needs=("verification",), files=("contributions.nc",),
+    ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(
         "responses", _responses, needs=("verification",),

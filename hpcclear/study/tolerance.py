@@ -86,7 +86,8 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
             _left(run.study.wanted, list(taken.values())),
         )  # fmt: skip
         made = truth.contested(run, designs, made, "verification", "verification")
-    return _widened(run, designs, truth.told_of(run, designs, made), taken)
+    true = _widened(run, designs, truth.told_of(run, designs, made), taken)
+    return true | truth.explained(run, designs, made)
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:

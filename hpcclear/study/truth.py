@@ -12,7 +12,7 @@ from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import goals, verdicts
+from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -69,8 +69,9 @@ def simulate(
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``standing`` and
-        ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``samples``, ``failed``, ``beyond_hertz``.
+        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
 
     Raises
     ------
@@ -79,9 +80,24 @@ def simulate(
     """
     settings = run.study.verification
     if settings.draws is not None:
-        return told_of(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
-    made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-    return told_of(run, choices, contested(run, choices, made, stage, purpose))
+        made = _values(run, choices, stage, purpose, settings.draws, None)
+    else:
+        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+        made = contested(run, choices, made, stage, purpose)
+    return told_of(run, choices, made) | explained(run, choices, made, purpose)
+
+
+def explained(
+    run: StudyRun, choices: Sequence[Choice], made: Sequence[Array], purpose: str = "verification"
+) -> Result:
+    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from what was made of them."""
+
+    def drawn(choice: Choice, f: Array) -> Points:
+        if run.study.verification.draws is not None:
+            return samples_of(run, choice, f.size, purpose)
+        return scattered(run, choice, f.shape[1], purpose)
+
+    return contributions.of_designs(run, choices, made, drawn)
 
 
 def scrambled_length(simulations: int) -> int:
@@ -102,7 +118,8 @@ def expected(study: Study) -> int:
     if settings.draws is not None:
         return settings.draws
     needed = FIRST * max(0.014 / study.wanted.deviation, 1.0) ** 1.7
-    needed = max([needed, *(verdicts.usual(goal) for case in study.cases for goal in case.kept)])
+    kept = [goal for case in study.cases for goal in case.kept if not verdicts.rare(goal, settings)]
+    needed = max([needed, *(verdicts.usual(goal, settings) for goal in kept)])
     return int(np.clip(needed, first_length(settings) * SCRAMBLINGS, settings.most_samples))
 
 
@@ -251,6 +268,7 @@ def _accurate(
                 (*case.goals, *case.kept), _goals(run, choice, values), strict=True
             )
             if goal.statistic in ("quantile", "exceedance")
+            and not (goal in case.kept and verdicts.rare(goal, settings))
         )
     return bool(good)
 
@@ -298,6 +316,8 @@ def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> 
         kept = run.study.case(choice.case).kept
         certain = [goals.told(goal, values, choice.design, sure) for goal in kept]
         missing = [np.nan] * (held - len(kept))
+        row["counted"] = [float(values.size)] * len(certain) + missing
+        row["excess"] = goals.steered(kept, values, choice.design)
         row["sure_lower"] = [one.lower for one in certain] + missing
         row["sure_upper"] = [one.upper for one in certain] + missing
         rows.append(row)

@@ -70,16 +70,16 @@ def level(settings: Verification, many: int, simulations: int) -> float:
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
     """What is known of designs, with the verdicts on their constraints from ``sure_lower`` and ``sure_upper``.
 
-    Added are ``standing`` (`Standing`) and ``price``, (n, constraints): the simulations of a design that would decide, NaN
-    where it is decided or where no number would.
+    ``counted`` are the simulations behind each constraint. Added are ``standing`` (`Standing`) and ``price``, (n, constraints):
+    the simulations of a design that would decide, NaN where it is decided or where no number would.
     """
     true["standing"], true["price"] = np.full((2, *true["sure_lower"].shape), np.nan)
     many = rivals(choices)
     for row, choice in enumerate(choices):
         case = run.study.case(choice.case)
-        simulations = int(true["samples"][row])
-        sure = level(run.study.verification, many[row], simulations)
         for k, goal in enumerate(case.kept):
+            simulations = int(true["counted"][row, k])
+            sure = level(run.study.verification, many[row], simulations)
             value = true["goal"][row, len(case.goals) + k]
             limits = true["sure_lower"][row, k], true["sure_upper"][row, k]
             found = of_limits(goal, Told(value, *limits, _NOTHING), simulations, sure)
@@ -117,13 +117,33 @@ def without_any(most: float, confidence: float) -> float:
     return math.log((1.0 - confidence) / 2.0) / math.log1p(-min(most, 1.0 - 1e-9))
 
 
+RARE = 5e-3
+"""Probability below which a constraint is decided by importance sampling where plain samples do not decide it."""
+
+
+def rare(goal: Constraint, settings: Verification) -> bool:
+    """Whether a constraint is a probability of failure for importance sampling; a fixed number of draws leaves none."""
+    return goal.statistic == "exceedance" and goal.most < RARE and settings.draws is None
+
+
 HITS = 16
 """Exceedances after which a probability of half or twice what is allowed is told from it."""
 
 
-def usual(goal: Constraint) -> float:
+WEIGHTED = 12288
+"""Simulations of a design by importance sampling that decide a rare failure as a rule."""
+
+
+def usual(goal: Constraint, settings: Verification) -> float:
     """Simulations that decide a constraint of a design that is not too near its threshold; 0 of what is no probability."""
+    if rare(goal, settings):
+        return float(min(WEIGHTED, 2 * settings.most_samples))
     return HITS / goal.most if goal.statistic == "exceedance" and goal.most > 0.0 else 0.0
+
+
+def usual_in(case: Case, settings: Verification) -> int:
+    """Simulations of a design for the rare failures of its case, beside those for mean and deviation."""
+    return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
 
 
 def costs(study: Study, unit: str) -> Iterator[str]:
@@ -131,17 +151,20 @@ def costs(study: Study, unit: str) -> Iterator[str]:
     settings = study.verification
     for case in study.cases:
         for goal in case.kept:
-            rate = usual(goal)
+            rate = usual(goal, settings)
             if rate == 0.0:
                 continue
             given = settings.draws or settings.most_samples
             least = without_any(goal.most, settings.confidence)
             text = (
-                f"{goal.words(unit)} at most {goal.most:g}: {least:.0f} simulations without any show it, about {rate:.0f} "
-                f"decide a design near it; at most {given} are made"
+                f"{goal.words(unit)} at most {goal.most:g}: {least:.0f} simulations of a design without an exceedance would "
+                f"show it; about {rate:.0f} decide a design near it"
             )
-            if least > given:
-                text += ", too few to decide: raise study.verification.most_samples"
+            if rare(goal, settings):
+                text += " by importance sampling"
+            elif least > given:
+                key = "most_samples" if settings.draws is None else "samples"
+                text += f"; study.verification.{key} allows {given}, too few to decide: raise it"
             yield text
 
 

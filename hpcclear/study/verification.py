@@ -251,6 +251,8 @@ def write(
         data[name] = true[name]
     for name in ("samples", "failed", "beyond_hertz"):
         data[name] = true[name].astype(np.int64)
+    if true["rare_samples"].any():
+        data["rare_samples"] = true["rare_samples"].astype(np.int64)
     data["same_as"] = np.array(table.same_as)
     data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])

@@ -13,6 +13,7 @@ from hpcclear.dynamics.laws.declared import (
     FrictionLaw,
     Law,
 )
+from hpcclear.dynamics.laws.lanes import text_of
 from hpcclear.dynamics.laws.numbers import (
     elastic_at,
     evaluate,
@@ -50,8 +51,6 @@ SAME = 1e-4
 
 def check_shape(law: Law) -> None:
     """LawError unless the law's functions ask for what there is, are arithmetic, and fit their rows."""
-    from hpcclear.dynamics.laws.lanes import text_of
-
     own = {one.name for one in law.parameters}
     given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
     for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
@@ -84,7 +83,8 @@ def check_shape(law: Law) -> None:
 
 # ---- units ----------------------------------------------------------------------------------------
 @lru_cache(maxsize=1)
-def _registry() -> Any:
+def registry() -> Any:
+    """Pint's units."""
     from pint import UnitRegistry
 
     return UnitRegistry()
@@ -100,10 +100,10 @@ def _size_and_sign(x: Any, y: Any) -> Any:
 
 
 def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: _registry().Quantity(float(function(_pure(x))), "")
+    return lambda x: registry().Quantity(float(function(_pure(x))), "")
 
 
-_WORDS = {
+WORDS = {
     "sqrt": lambda x: x**0.5,
     "fabs": abs,
     "absolute": abs,
@@ -121,7 +121,7 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
     """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
     import pint
 
-    made = _registry().Quantity
+    made = registry().Quantity
     given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
     given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
     given["depth"] = made(1e-5, "m")
@@ -146,7 +146,7 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
 
     def run(title: str, function: Callable[..., Any], unit: str) -> Any:
         try:
-            found = with_words(function, _WORDS, {})(
+            found = with_words(function, WORDS, {})(
                 *(given[name] for name in law.arguments(function))
             )
             return _expected(found, title, unit)

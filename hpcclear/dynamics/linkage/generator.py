@@ -41,6 +41,7 @@ class On(NamedTuple):
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     follow: str = ""  # a guided body, or body.point
+    objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
 
 
@@ -365,9 +366,9 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
-        if on.ledger or on.series or on.responses:
+        if on.ledger or on.series or on.responses or on.objective:
             moments = [self._moment(drive, found, torques) for drive in self._drives()]
-            if on.series or on.responses:
+            if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
         if on.ledger:
             power = ZERO
@@ -387,8 +388,24 @@ class _Generator:
                 loss = loss + bend.loss()
             self._rate(at.DISSIPATION, loss)
             self._rate(at.LOAD_POWER, self.load_power)
-        if on.follow and (on.series or on.responses):
+        if on.follow and (on.series or on.responses or on.objective):
             self._follow(found)
+        if on.objective:
+            self._objective()
+
+    def _objective(self) -> None:
+        """Calls of the objective's rate, which reads the rates that were written before."""
+        kin, body = self.kinematics, self.mechanism.period.body
+        frame = self.forest.frames[body]
+        terms = (*kin.rotated(frame, kin.offset(body)), kin.spin(frame))
+        drive = ", ".join(map(self.writer.text, terms))
+        whole = self.on.objective == "whole"
+        for k in range(1 if whole else len(self.mechanism.clearances)):
+            row = self.rows.rates + at.OBJECTIVE_RATES
+            joint = "None" if whole else f"joints[{k}]"
+            where = f"{row}" if whole else f"({self.rows.rates} + joints[{k}].objective_rate)"
+            call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
+            self.writer.line(f"work[{where} * W + i] = {call}")
 
     def _follow(self, found: dict[int, Term]) -> None:
         """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""

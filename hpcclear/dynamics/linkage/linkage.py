@@ -37,6 +37,8 @@ class Linkage:
         Whether surfaces of joints with clearance are out of round.
     follow : str
         A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
+    objective : str
+        The objective's own rate: "joints", or "whole" of the mechanism; "" for none.
     bristled : bool
         Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
     places : tuple of int, optional
@@ -50,13 +52,15 @@ class Linkage:
 
     def __init__(
         self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = "",
-        bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
+        objective: str = "", bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
         self._bristles = len(mechanism.clearances) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
         self.places = tuple(range(len(mechanism.clearances))) if places is None else places
-        self._on = On(friction=friction, gravity=gravity, follow=follow, waves=waves)
+        self._on = On(
+            friction=friction, gravity=gravity, follow=follow, objective=objective, waves=waves
+        )
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN

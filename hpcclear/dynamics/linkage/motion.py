@@ -105,6 +105,10 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     )
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
+    store_rate(effects.objective, work, joint.friction, tangential, i, W)
+    store_rate(effects.objective, work, joint.sliding_speed, sliding, i, W)
+    store_rate(effects.objective, work, joint.normal_x, nx, i, W)
+    store_rate(effects.objective, work, joint.normal_y, ny, i, W)
     store_kinks(effects, work, par, joint, (depth, rate, inverse_impact, active), sliding, i, W)
     wearing = force_that_wears(effects.threshold, par, joint, normal, i, W)
     store_rate(effects.wear, work, joint.sliding_power, wearing * abs(sliding), i, W)

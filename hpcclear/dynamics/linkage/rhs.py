@@ -8,9 +8,10 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from numba import cfunc, types
+from numba import types
 
 from hpcclear.base.bits import call_at
+from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, interleaved, lane_function
 from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
@@ -59,7 +60,7 @@ def compiled_text(name: str) -> Any:
     lanes = int(name.split("_")[1])
     long = inspect.getsource(text).count("\n") > LONG
     with interleaved(lanes // 2 if long else lanes):
-        return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+        return c_function(SIGNATURE, text, fastmath=FASTMATH)
 
 
 @lane_function

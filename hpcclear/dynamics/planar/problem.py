@@ -1,8 +1,8 @@
 """A scene's linkage as the kernel takes it: its texts and rows, parameters and starts of its samples."""
 
-import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, reduce
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,7 @@ def linkage_of(scene: Scene) -> Linkage:
         gravity=scene.effects.gravity > 0.0,
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
+        objective=scene.objective.rate_of,
         bristled=scene.bristles > 0,
         waves=any(scene.waves().values()),
         places=scene.open_places,
@@ -64,16 +65,22 @@ def linkage_of(scene: Scene) -> Linkage:
 
 def _check_followed(scene: Scene, follow: str) -> None:
     """InputError where the objective is of something that is not followed."""
-    name, point = scene.objective.name, "." in follow
-    if name == "slider-acceleration-deviation" and (point or not follow):
+    name, asks, point = scene.objective.name, scene.objective.asks, "." in follow
+    if "slider_acceleration_deviation" in asks and (point or not follow):
         raise InputError(
-            "study.objective", name,
+            scene.objective_key, name,
             "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
             'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
-    if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
+    if "acceleration_x" in asks and not follow:
         raise InputError(
-            "study.objective", name, "no point is followed",
+            scene.objective_key, name, "no body or point is followed, so there is no acceleration",
+            'Name a point: mechanism.followed = "body.point"',
+        )  # fmt: skip
+    of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}
+    if asks & of_points and not point:
+        raise InputError(
+            scene.objective_key, name, "no point is followed",
             'Name it: mechanism.followed = "body.point"',
         )  # fmt: skip
 
@@ -167,7 +174,7 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     p[:, at.SPEED] = at.TURN * turns / period
     p[:, at.FIRST_STEP] = 1e-3 * period / turns
     p[:, at.TURN_END] = start_of_turns(sample, linkage.cartesian) + at.TURN * turns
-    p[:, at.DRIVEN_LENGTH] = driven_length(linkage.mechanism)
+    p[:, at.DRIVEN_LENGTH] = driven_length(sample)
     n = scene.numerics
     linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
     return p
@@ -185,11 +192,14 @@ def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
     return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 
 
-def driven_length(mechanism: Mechanism) -> float:
-    """The largest distance between points of the body that gives the period, m: how fast the mechanism is goes by it."""
+def driven_length(mechanism: Mechanism) -> Any:
+    """The largest distance between points of the body that gives the period, m, of samples (m,): how fast the mechanism is
+    goes by it."""
     body = mechanism.body(mechanism.period.body)
     places = [*body.points.values(), body.center]
-    return max((math.dist(a, b) for a in places for b in places), default=0.0) or 1.0
+    apart = (np.hypot(a[0] - b[0], a[1] - b[1]) for a, b in combinations(places, 2))
+    longest: Any = reduce(np.maximum, apart, np.float64(0.0))
+    return np.where(longest > 0.0, longest, 1.0)
 
 
 def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
@@ -203,7 +213,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     linkage = linkage_of(scene)
     a = scene.numerics.absolute_tolerance
     angles = [one.kind == "angle" for one in linkage.forest.coordinates[scene.modes :]]
-    speed = at.TURN / float(period_of(linkage.mechanism)) * driven_length(linkage.mechanism)
+    speed = at.TURN / float(period_of(linkage.mechanism)) * float(driven_length(linkage.mechanism))
     rate = 1e3 * min(1.0, speed / 25.0)
     first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
     bent = bending.tolerances(linkage.mechanism, a, rate * a)

@@ -68,6 +68,8 @@ def load(lane, W, n, block, queue, settings):
         work[k * W + lane] = 0.0
     for k in range(at.RATE_OLD, at.TIME):
         work[k * W + lane] = 0.0
+    for k in range(at.LARGEST_RATE, at.WORK):
+        work[k * W + lane] = -1e300
     for k in range(at.BOOK):
         book[k * W + lane] = 0.0
     for k in range(at.STRICTER, at.STRICTER_AT_EDGE + 1):
@@ -107,6 +109,7 @@ def finish(lane, W, n, status, block, queue, settings):
         out[slot, at.OUT_DEEPEST + k] = work[(at.DEEPEST + k) * W + lane]
         out[slot, at.OUT_ACTIVE + k] = work[(at.ACTIVE + k) * W + lane]
         out[slot, at.OUT_INVERSE_IMPACT + k] = work[(at.INVERSE_IMPACT + k) * W + lane]
+        out[slot, at.OUT_LARGEST_RATE + k] = work[(at.LARGEST_RATE + k) * W + lane]
         out[slot, at.OUT_LATCHED + k] = book[(at.LATCHED + k) * W + lane]
     for r in range(RATES + int(settings[PROFILED])):
         out[slot, at.OUT_TOTAL + r] = book[(at.TOTAL + r) * W + lane]

@@ -55,7 +55,11 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
     share = saving(content, variant, seconds)
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
     text = f"{label(named(content, variant))} changes f by {change.replace(' ± ', ' % ± ')}"
-    cost = f"off saves {100 * share:.0f} %" if share >= 0.005 else "off saves nothing"
+    cost = (
+        f"disabling it saves {100 * share:.0f} %"
+        if share >= 0.005
+        else "disabling it saves nothing"
+    )
     return f"{text}: {cost}{_verdict(one, float(content.attrs['tolerance']))}."
 
 

@@ -107,7 +107,7 @@ def _overlap(one: Array, other: Array) -> float:
 
 
 def draw(axes: "Axes", scene: Scene, poses: Mapping[str, Pose]) -> None:
-    """The linkage at its start."""
+    """The linkage where `poses` has its bodies: at its start, or a template's at an angle that shows more."""
     mechanism = scene.linkage
     placed, words = Placed(mechanism, poses), Words(axes)
     low, high = placed.everything.min(axis=0), placed.everything.max(axis=0)
@@ -207,11 +207,15 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     mechanism = scene.linkage
     q = labels.quantity
     lines = ["angles from x, counter-clockwise; ○ mass centre; a ring about a joint: clearance"]
+    placed = "starts at" if scene.template is None else "drawn at"
     for body in mechanism.bodies:
-        size = "" if body.length is None else f"{q(body.length, 'm')}, "
+        size = centre = ""
+        if body.length is not None:
+            along = 0.5 * body.length if body.mass_center is None else body.mass_center
+            size, centre = f"{q(body.length, 'm')}, ", f"mass centre at {q(along, 'm')}, "
         lines.append(
-            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.own_inertia, 'kg m^2')}, "
-            f"starts at {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
+            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.own_inertia, 'kg m^2')}, {centre}"
+            f"{placed} {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
         )
     for joint in mechanism.joints:
         if joint.kind == "clearance":

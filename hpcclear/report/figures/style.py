@@ -6,10 +6,12 @@ pyplot, so nothing is registered globally and nothing needs closing.
 
 import contextlib
 import functools
+import inspect
 import io
 from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -87,8 +89,6 @@ _MARKS = {
 }
 """What distinguishes our figures from a user's, by kind: where the metadata of `render` come to stand."""
 
-_P = ParamSpec("_P")
-
 
 def matplotlib() -> Any:
     """The matplotlib module.
@@ -106,20 +106,38 @@ def matplotlib() -> Any:
     return module
 
 
-def drawn(function: "Callable[_P, Figure]") -> "Callable[_P, Figure]":
-    """Draw a figure in this style, whatever the user's settings, and leave those alone."""
+_given: "ContextVar[list[Axes] | None]" = ContextVar("axes of a caller", default=None)
+
+
+def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
+    """Draw a figure in this style, whatever the user's settings, and leave those alone.
+
+    The function takes ``ax`` besides: axes of the caller, as many as the figure has panels, from above to below and from left
+    to right. It draws into them, and returns their figure.
+    """
 
     @functools.wraps(function)
-    def styled(*args: _P.args, **kwargs: _P.kwargs) -> "Figure":
-        with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
-            return function(*args, **kwargs)
+    def styled(*args: Any, ax: Any = None, **kwargs: Any) -> "Figure":
+        token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
+        try:
+            with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
+                return function(*args, **kwargs)
+        finally:
+            _given.reset(token)
 
+    signature = inspect.signature(function)
+    given = inspect.Parameter("ax", inspect.Parameter.KEYWORD_ONLY, default=None)
+    parameters = [*signature.parameters.values(), given]
+    styled.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return styled
 
 
 def page(height: float) -> "Figure":
-    """An empty figure of one column's width and `height` in mm."""
+    """An empty figure of one column's width and `height` in mm; raises InputError where the caller gave axes."""
     matplotlib()
+    if (given := _given.get()) is not None:
+        reason = "this figure has a layout of its own"
+        raise InputError("ax", len(given), reason, "Leave ax out")
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -129,7 +147,13 @@ def page(height: float) -> "Figure":
 
 
 def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """A page of equal panels; axes of shape (rows, columns), options as for `Figure.subplots`."""
+    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`."""
+    if (given := _given.get()) is not None:
+        if len(given) != rows * columns:
+            reason = f"this figure has {rows * columns} panels"
+            raise InputError("ax", len(given), reason, "Give as many axes, in an array or list")
+        figure: Any = given[0].figure
+        return figure, np.array(given, dtype=object).reshape(rows, columns)
     figure = page(height)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 

@@ -28,7 +28,7 @@ _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. 
 
 _WORDS = (
     "Values are by simulation, ± half-width of the 95 % confidence interval. f: {}. In brackets: the name of the design in "
-    "verification.nc, which also has the designs that the search met on its way."
+    "verification.nc, which also contains intermediate designs of the search."
 )
 
 
@@ -55,6 +55,7 @@ def designs(content: Content) -> dict[str, object] | None:
         "words": [_WORDS.format(labels.objective(verified)), *_findings(verified)],
         "remarks": "" if remarks == "none" else remarks,
         "tables": tables,
+        "variables": _variables(verified),
         "more": [
             _table(
                 verified, {name: name for name in rest}, columns, "Simulated and predicted values"
@@ -63,6 +64,16 @@ def designs(content: Content) -> dict[str, object] | None:
         if (rest := _distinct(verified, [*named, *spread]))
         else [],
     }
+
+
+def _variables(verified: xr.Dataset) -> str:
+    """What the design variables are: "m2: mass of the rod; ..."."""
+    known = [
+        (str(labels.words(v)), str(v.attrs.get("long_name", "")))
+        for v in labels.design_variables(verified)
+        if bool(np.isfinite(v).any())
+    ]
+    return "; ".join(f"{name}: {words}" for name, words in known if words and words != name)
 
 
 def of_a_paper(content: Content) -> list[object]:

@@ -118,9 +118,9 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
         ("designs", "Optimised designs", "designs.html", designs.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
-        ("summary", "Summary", "summary.html", sections.summary),
         ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
         ("loads", "Loads of the bearings", "parts.html", loads.loads),
+        ("summary", "Summary", "summary.html", sections.summary),
         ("motion", "Animation", "motion.html", lambda one: one.responses or None),
         ("accuracy", "Accuracy and run time", "parts.html", costs.accuracy),
         ("figures", "Figures", "figures.html", drawn),
@@ -160,7 +160,7 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    if not content.whole:
+    if not content.whole or (content.responses and not set(content.files) - {"timing"}):
         return troubles or None
     for kind in ("accuracy", "wear", "effects", "map", "bifurcation"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:

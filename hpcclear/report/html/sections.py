@@ -10,7 +10,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.statistics.random.survival import quantiles
+from hpcclear.statistics.random.survival import order_limits, quantiles
 
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
 LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
@@ -47,7 +47,13 @@ def _lives_words(content: Content) -> list[str]:
         median = lives.sel(quantile=0.5)
         turns, hours = float(median["lifetime_quantile"]), float(median["lifetime_hours_quantile"])
         if np.isfinite(turns):
-            words.append(f"Median service life: {turns:.4g} revolutions, {hours:.4g} h.")
+            every = lives["lifetime"].to_numpy()
+            known = every[~np.isnan(every)]
+            least, most = order_limits(known, 0.5, len(every) - len(known))
+            reach = f"{most:.4g}" if np.isfinite(most) else f"beyond {cycles:.4g}"
+            words.append(
+                f"Median service life: {turns:.4g} revolutions (95 % CI {np.nan_to_num(least):.4g} to {reach}), {hours:.4g} h."
+            )
     if any(name.startswith("limit_") for name in lives.attrs):
         limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
         words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {limits}).")
@@ -189,7 +195,7 @@ def trust(content: Content) -> list[object] | None:
                     code.message,
                     failures.where(status == code, failures.variables(samples)),
                     code.remedy,
-                    _listed(hit),
+                    _listed(hit, len(numbers)),
                 ]
             )
     if rows:
@@ -202,7 +208,7 @@ def trust(content: Content) -> list[object] | None:
     for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]
         if hit.size:
-            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit)])
+            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit, len(numbers))])
     if rows:
         parts.append(
             Table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
@@ -212,6 +218,9 @@ def trust(content: Content) -> list[object] | None:
     return parts
 
 
-def _listed(numbers: np.ndarray) -> str:
+def _listed(numbers: np.ndarray, of: int) -> str:
+    """Numbers of samples, the first ones only where they are many, "all" where all are meant."""
+    if len(numbers) == of > 1:
+        return "all"
     shown = ", ".join(str(n) for n in numbers[:LISTED])
     return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"

@@ -1,4 +1,4 @@
-"""Mean and deviation of a Kriging mean under random inputs (eqs. 19 to 21).
+"""Mean and standard deviation of a Kriging mean under random inputs (eqs. 19 to 21).
 
 Three ways, each a check on the others:
 
@@ -28,7 +28,7 @@ from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
 
 MOST_PLACES = 2**16
-"""Points at which a surrogate is asked at a time."""
+"""Points at which a surrogate is evaluated at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class SampledMoments:
 
 
 def sample_moments(values: np.ndarray) -> SampledMoments:
-    """Mean and deviation of independent samples, with standard errors.
+    """Mean and standard deviation of independent samples, with standard errors.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
     Notes
     -----
     The variance of the variance estimate is (m4 - s^4 (s - 3) / (s - 1)) / s, m4 the fourth central
-    moment; the deviation's follows to first order.
+    moment; that of the standard deviation follows to first order.
     """
     count = values.shape[1]
     if count < 4:
@@ -74,9 +74,9 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
 
 
 class RobustObjective:
-    """Mean and deviation of a surrogate under random inputs, for whole swarms of designs.
+    """Mean and standard deviation of a surrogate under random inputs, for whole swarms of designs.
 
-    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
+    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and standard deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
     On a `Piecewise` model the rules are split at the borders of the boxes (each piece is smooth);

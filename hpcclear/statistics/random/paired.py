@@ -20,7 +20,7 @@ LEAST_KNOWN = 0.9
 
 
 class Change(NamedTuple):
-    """A relative change: its value and the half-width of its limits; NaN where it is not known."""
+    """A relative change: its value and the half-width of its confidence interval; NaN where it is not known."""
 
     value: float
     limit: float

@@ -96,7 +96,7 @@ def _shifts(sums: Array, counts: Array) -> Array:
 
 @dataclass(frozen=True)
 class Limited(Estimate):
-    """An estimate whose limits are not symmetric."""
+    """An estimate whose confidence interval is not symmetric."""
 
     lower: float
     upper: float
@@ -104,7 +104,7 @@ class Limited(Estimate):
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:
-    """A quantile and its limits: those of its order, turned back into values (Woodruff 1952).
+    """A quantile and its confidence interval: that of its order, converted into values (Woodruff 1952).
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     order : float
         Probability of staying below.
     confidence : float
-        Level of the limits.
+        Confidence level.
 
     Returns
     -------
     Limited
-        Its shifts are those of the order times the slope of the quantile function between the limits (Bahadur); all NaN where
-        fewer than `FEWEST` values or replicates are left.
+        Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur);
+        all NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
@@ -139,7 +139,7 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
 
 
 def exceedance(values: Array, limit: float, confidence: float) -> Limited:
-    """Probability of lying above `limit`; its limits are those of as many independent draws as have its error (Korn, Graubard).
+    """Probability of lying above `limit`; its interval is that of as many independent draws as have its error (Korn, Graubard).
 
     Parameters
     ----------

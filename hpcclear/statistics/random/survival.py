@@ -1,4 +1,4 @@
-"""Shares and quantiles of lives, with limits that hold for any number of them.
+"""Shares and quantiles of service lives, with confidence intervals for any number of them.
 
 C. J. Clopper and E. S. Pearson, "The use of confidence or fiducial limits illustrated in the case of the binomial",
 Biometrika 26 (1934), doi:10.1093/biomet/26.4.404.
@@ -12,7 +12,7 @@ CONFIDENCE = 0.95
 
 
 def share_limits(count: Integers, total: int) -> tuple[Array, Array]:
-    """Clopper and Pearson's 95 % limits of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
+    """Clopper and Pearson's 95 % confidence interval of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
     from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
 
     count = np.asarray(count)

@@ -54,7 +54,7 @@ class IntervalDesign:
     """Shape (n, d + 1): the d variables and, last, the clearance. By interval, then clearance, then the training points
     followed by the test points."""
     intervals: Array
-    """Shape (k, d, 2): limits of the variables, the widest first."""
+    """Shape (k, d, 2): bounds of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     settings: IntervalSettings
@@ -65,7 +65,7 @@ class SensitivityHistory:
     """Midpoint derivatives of every surface; NaN where too few simulations succeeded."""
 
     intervals: Array
-    """Shape (k, d, 2): limits of the variables, the widest first."""
+    """Shape (k, d, 2): bounds of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     sensitivity: Array

@@ -129,6 +129,21 @@ def analyse_sobol(
     )
 
 
+def noise_share(values: Array, nearby: Array, variance: float) -> tuple[float, float]:
+    """Share of a variance that is no input's, and its standard error: of f at points (n,) and right beside them (n,).
+
+    Where motion is chaotic f has a part that any change of the inputs draws anew. It is in each total index, that of an input
+    which does nothing included, and in no first-order one. NaN from fewer than four points that both succeeded.
+    """
+    halves = 0.5 * (values - nearby) ** 2
+    halves = halves[np.isfinite(halves)]
+    if len(halves) < 4 or not variance > 0.0:
+        return np.nan, np.nan
+    return float(halves.mean() / variance), float(
+        halves.std(ddof=1) / len(halves) ** 0.5 / variance
+    )
+
+
 def _indices(y: Array) -> tuple[Array, Array]:
     """First-order and total indices from rows A, B, AB_1 ... AB_d, shape (d + 2, n)."""
     both = y[:2]

@@ -1,4 +1,4 @@
-"""What is asked of a surrogate: how it is fitted to points in a box, and what the fitted model answers.
+"""Interface of a surrogate: how it is fitted to points in a box, and what the fitted model returns.
 
 `Method` is what a study knows of a kind of surrogate; `hpcclear.statistics.surrogate.regression` makes one of anything with
 `fit` and `predict`.

@@ -8,7 +8,7 @@ from hpcclear.dynamics.problem import Problem
 from hpcclear.dynamics.views import Outcome, Start
 
 
-class ClosedForm:
+class PrescribedSamples:
     """Stands in for `lanes.Lanes` where no coordinate is left to integrate: every sample is done when queued."""
 
     def __init__(self, problem: Problem) -> None:

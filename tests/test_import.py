@@ -1,0 +1,113 @@
+"""A linkage from a table of its points: every point where the file has it, and what makes none is refused."""
+
+import numpy as np
+import pytest
+from commands import run
+
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.planar.problem import poses_at_start
+from hpcclear.report.figures.linkage_sketch import Placed
+from hpcclear.scene import load_scene
+from hpcclear.scene.points_of_linkage import linkage_of, text_of
+
+FOUR_BAR = """name;x [mm];y [mm];bodies
+A0;0;0;ground crank
+A;15,5;26,85;crank coupler
+B;120,5;60;coupler rocker
+B0;100;0;ground rocker
+K;70;80;coupler
+"""
+SLIDER = """point,x [mm],y [mm],links,slide [deg]
+O,0,10,frame/crank,
+A,0,60,crank+rod,
+P,109.08712,10,rod piston,0
+"""
+CHAIN = "name\tx [cm]\ty [cm]\nA0\t0\t0\nA\t1.5\t2.5\nB\t12\t6\nB0\t10\t0\n"
+
+
+def placed(scene):
+    return Placed(scene.mechanism, poses_at_start(scene))
+
+
+def made(tmp_path, text, name="points.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return linkage_of(path)
+
+
+@pytest.mark.parametrize("text", [FOUR_BAR, SLIDER, SLIDER.replace("rod piston", "rod"), CHAIN])
+def test_points_are_where_the_file_has_them(text, tmp_path):
+    content = made(tmp_path, text)
+    scene = load_scene(content)
+    (tmp_path / "made.toml").write_text(text_of(content, "points.csv"))
+    assert load_scene(tmp_path / "made.toml") == scene
+    where = placed(scene)
+    unit = 1e-2 if "[cm]" in text else 1e-3
+    for line in text.splitlines()[1:]:
+        name, x, y, *_ = (
+            line.replace(",", "." if ";" in line else ";").replace("\t", ";").split(";")
+        )
+        for body, points in where.bodies.items():
+            if name in points:
+                np.testing.assert_allclose(
+                    points[name], [unit * float(x), unit * float(y)], atol=2e-8, err_msg=body
+                )
+    assert scene.clearance_joints() == ()
+
+
+def test_bodies_and_joints_of_each(tmp_path):
+    mechanism = made(tmp_path, FOUR_BAR)["mechanism"]
+    assert list(mechanism["bodies"]) == ["crank", "coupler", "rocker"]
+    assert list(mechanism["joints"]) == ["A0", "A", "B", "B0"]
+    assert set(mechanism["bodies"]["coupler"]["points"]) == {"A", "B", "K"}
+    assert mechanism["drives"]["motor"]["body"] == "crank"
+    assert list(made(tmp_path, CHAIN)["mechanism"]["bodies"]) == ["bar1", "bar2", "bar3"]
+    slider = made(tmp_path, SLIDER)["mechanism"]
+    assert slider["joints"]["P_guide"] == {
+        "kind": "slide",
+        "point": "piston.P",
+        "line": "ground.P",
+        "angle": "0.0 deg",
+    }
+    assert "slider_P" in made(tmp_path, SLIDER.replace("rod piston", "rod"))["mechanism"]["bodies"]
+    three = FOUR_BAR.replace("coupler rocker", "coupler rocker link") + "D;150;90;link\n"
+    assert list(made(tmp_path, three)["mechanism"]["joints"]) == ["A0", "A", "B", "B_2", "B0"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name,x [mm]\nA,1\nB,2\n", "has no column y"),
+        ("name,x,y\nA,1,2\nB,2,3\n", "nothing says its unit"),
+        ("name,x [kg],y [mm]\nA,1,2\nB,2,3\n", "does not fit"),
+        ("name,x [mm],y [mm]\nA,1,2\nB,2,3\nC,3,4\n", "at least 4 points"),
+        (FOUR_BAR.replace("A;15", "A0;15"), "a point of this name stands above"),
+        (FOUR_BAR.replace("A;15", "7;15"), "is no name of a point"),
+        (FOUR_BAR.replace("ground ", ""), "no body is pinned to the ground"),
+        (FOUR_BAR.replace("coupler rocker", ""), "belongs to no body"),
+        (FOUR_BAR.replace("15,5;26,85", "0;0"), "at one place"),
+        (
+            "name,x [mm],y [mm],bodies\nA,0,0,ground crank\nB,1,many,crank rod\n",
+            "is not a finite decimal number",
+        ),
+    ],
+)
+def test_tables_that_make_no_linkage(text, words, tmp_path):
+    with pytest.raises(InputError) as error:
+        made(tmp_path, text)
+    assert words in str(error.value)
+
+
+def test_the_command_writes_a_scene_and_a_sketch(tmp_path):
+    (tmp_path / "points.csv").write_text(FOUR_BAR)
+    words = [str(tmp_path / name) for name in ("points.csv", "linkage.toml")]
+    code, output = run(["import", *words, "--sketch", str(tmp_path / "sketch.png")], 0)
+    assert code == 0, output
+    assert "3 bodies, 4 joints" in output
+    assert (tmp_path / "sketch.png").stat().st_size > 10_000
+    before = (tmp_path / "linkage.toml").read_text()
+    code, _ = run(["import", *words], 0)
+    assert code == 2
+    assert (tmp_path / "linkage.toml").read_text() == before
+    code, output = run(["check", words[1], "--no-cost"], 0)
+    assert code == 0, output
